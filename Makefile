@@ -1,0 +1,63 @@
+# make demo      response curves of the reference oscillator: a table and pictures, in ./demo
+# make test      lint, then the tests (a few minutes at most)
+# make test-all  lint, then all tests, the long ones too
+# make lint      ruff and mypy
+# make clean     remove the environment and everything generated
+#
+# Needs Python (3.11 or newer) and make. Everything is installed into .venv of this folder.
+# Another interpreter: make PYTHON=/path/to/python ...
+
+SHELL := /bin/sh
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+DEMO := demo
+
+# One BLAS thread: the matrices are small, and threads that wait for each other cost more than they give.
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+export MPLBACKEND := Agg
+
+.PHONY: demo test test-all lint format clean
+
+demo: $(STAMP)
+	@$(BIN)/suboctave demo --out $(DEMO)
+
+test: lint
+	@$(BIN)/python -m pytest -m "not slow"
+
+test-all: lint
+	@$(BIN)/python -m pytest
+
+lint: $(STAMP)
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+format: $(STAMP)
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+# An interpreter counts when it runs, is in the range of pyproject.toml and can make environments:
+# a name on the PATH may be a placeholder that fails when it is called.
+$(STAMP): pyproject.toml
+	@found="$(PYTHON)"; \
+	if [ -z "$$found" ]; then \
+	  for name in python3.13 python3.12 python3.11 python3.14 python3.15 python3 python; do \
+	    if $$name -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 16))' \
+	        >/dev/null 2>&1; then found=$$name; break; fi; \
+	  done; \
+	fi; \
+	if [ -z "$$found" ]; then \
+	  echo "suboctave needs Python 3.11 to 3.15; none that runs was found on the PATH." >&2; \
+	  echo "Install one, or name it: make PYTHON=/path/to/python" >&2; exit 1; \
+	fi; \
+	echo "Installing into $(VENV) with $$($$found --version) ..."; \
+	$$found -m venv --clear $(VENV) \
+	  && $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' \
+	  && touch $(STAMP)
+
+clean:
+	rm -rf $(VENV) $(DEMO) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,125 @@
+"""Vibrating structures with nonlinear parts, in the frequency domain.
+
+How does the structure respond, which of those responses are stable, where does the response double its period, split,
+jump or go quasi-periodic? The method is harmonic balance with numerical continuation.
+
+    import suboctave as so
+
+    system = so.library.reference_oscillator(p=0.55, j=0.0)
+    curve = so.frequency_response(system, omega=(4.5, 1.3))
+    print(curve.bifurcations)
+
+The names below are loaded when they are first used, so that importing the package costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    from suboctave.analysis import Branch, continue_branch, frequency_response, stability, verify
+    from suboctave.bifurcation import Bifurcation
+    from suboctave.continuation import Event, NewtonOptions, SteppingOptions
+    from suboctave.errors import ConvergenceError, InputError, SuboctaveError
+    from suboctave.harmonic import HarmonicBalance, HarmonicBasis, PeriodicOrbit
+    from suboctave.model import (
+        CubicSpring,
+        ElasticStop,
+        HarmonicLoad,
+        PolynomialSpring,
+        System,
+        check_derivatives,
+        library,
+    )
+
+# Public name -> the module that defines it. A new public name is one entry here and one import above.
+_HOME = {
+    "System": "suboctave.model",
+    "CubicSpring": "suboctave.model",
+    "PolynomialSpring": "suboctave.model",
+    "ElasticStop": "suboctave.model",
+    "HarmonicLoad": "suboctave.model",
+    "check_derivatives": "suboctave.model",
+    "library": "suboctave.model.library",
+    "HarmonicBasis": "suboctave.harmonic",
+    "HarmonicBalance": "suboctave.harmonic",
+    "PeriodicOrbit": "suboctave.harmonic",
+    "NewtonOptions": "suboctave.continuation",
+    "SteppingOptions": "suboctave.continuation",
+    "Event": "suboctave.continuation",
+    "Bifurcation": "suboctave.bifurcation",
+    "Branch": "suboctave.analysis",
+    "frequency_response": "suboctave.analysis",
+    "continue_branch": "suboctave.analysis",
+    "stability": "suboctave.analysis",
+    "verify": "suboctave.analysis",
+    "SuboctaveError": "suboctave.errors",
+    "InputError": "suboctave.errors",
+    "ConvergenceError": "suboctave.errors",
+}
+
+__all__ = [
+    "Bifurcation",
+    "Branch",
+    "ConvergenceError",
+    "CubicSpring",
+    "ElasticStop",
+    "Event",
+    "HarmonicBalance",
+    "HarmonicBasis",
+    "HarmonicLoad",
+    "InputError",
+    "NewtonOptions",
+    "PeriodicOrbit",
+    "PolynomialSpring",
+    "SteppingOptions",
+    "SuboctaveError",
+    "System",
+    "__version__",
+    "check_derivatives",
+    "continue_branch",
+    "frequency_response",
+    "library",
+    "stability",
+    "verify",
+]
+
+
+def __getattr__(name: str) -> object:
+    home = _HOME.get(name)
+    if home is None:
+        if name.startswith("_"):  # protocol probes of notebooks, copy, pickle: no search for a suggestion
+            raise AttributeError(f"module 'suboctave' has no attribute {name!r}")
+        from suboctave.errors import suggest
+
+        raise AttributeError(f"suboctave has no {name!r}{suggest(name, __all__)}")
+    module = importlib.import_module(home)
+    value = module if home.endswith(f".{name}") else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(__all__))
+
+
+class _Package(ModuleType):
+    """Keeps a public verb when a room of the same name is imported.
+
+    Python hangs every imported submodule on its package. `suboctave.stability` is a verb first: without this, the
+    verb would turn into the room as soon as anything imports from it. `from suboctave.stability import ...` is
+    unaffected.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if isinstance(value, ModuleType) and _HOME.get(name, f"suboctave.{name}") != value.__name__:
+            return
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -1,0 +1,39 @@
+"""What the package raises, and how it helps with a misspelt name.
+
+Every message says what happened, where, and what to change. Wrong input is refused before any work.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["ConvergenceError", "InputError", "SuboctaveError", "suggest"]
+
+
+class SuboctaveError(Exception):
+    """Anything that this package refuses or cannot do."""
+
+
+class InputError(SuboctaveError, ValueError):
+    """Wrong input, refused before any work was done."""
+
+
+class ConvergenceError(SuboctaveError, ArithmeticError):
+    """An iteration that did not arrive; the message says where on the curve and what to change."""
+
+
+def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:
+    """The tail of a message on an unknown name: the closest known names, or else all of them (at most `limit`).
+
+    The text starts with a space, so that it can follow the message directly; it is empty when nothing is known.
+    """
+    names = sorted(set(known))
+    if not names:
+        return ""
+    lower = {candidate.lower(): candidate for candidate in names}
+    close = difflib.get_close_matches(str(name).lower(), list(lower), n=3, cutoff=0.6)
+    if close:
+        return f" (did you mean {' or '.join(repr(lower[match]) for match in close)}?)"
+    listed = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")
+    return f"; known: {listed}"

@@ -1,0 +1,1 @@
+"""What is seen: figures drawn from labelled datasets."""

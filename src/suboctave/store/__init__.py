@@ -1,0 +1,1 @@
+"""What lasts: labelled datasets of computed curves."""
