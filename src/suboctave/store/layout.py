@@ -1,0 +1,225 @@
+"""How a computed curve is laid out as a labelled dataset: the one form that figures, files and tables share.
+
+Dimensions
+
+    point        the points of the curve, in the order in which it was followed
+    event        the located bifurcations, in the order in which the curve meets them
+    parameter    the system's parameters, by name
+    multiplier   the Floquet multipliers over the response period
+
+Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, `error`, `residual`, `multipliers`,
+`parameters` (point x parameter). A free parameter other than omega is a coordinate under its own name as well, unless
+the layout already uses that name. Variables on `event` carry the prefix `event_`; `event_after` is the index of the
+point after which the event lies, so that the curve with its events is one line: point `i`, the events with
+`event_after == i` in their order, point `i + 1`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError, suggest
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import xarray
+    from numpy.typing import ArrayLike
+
+__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate"]
+
+LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
+UNKNOWN = -1  # in event_stable_after
+RESERVED = frozenset(
+    {"point", "event", "parameter", "multiplier", "omega", "amplitude", "stable", "harmonics", "error", "residual"}
+    | {"multipliers", "parameters"}
+)
+
+
+@dataclass(frozen=True)
+class EventRow:
+    """One located bifurcation, as a row of the dataset.
+
+    `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
+    the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known).
+    """
+
+    kind: str
+    after: int
+    omega: float
+    amplitude: float
+    residual: float = np.nan
+    multiplier: complex = complex(np.nan, np.nan)
+    criticality: str | None = None
+    stable_after: bool | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+def branch_dataset(
+    omega: ArrayLike,
+    amplitude: ArrayLike,
+    *,
+    stable: ArrayLike | None = None,
+    harmonics: ArrayLike | None = None,
+    error: ArrayLike | None = None,
+    residual: ArrayLike | None = None,
+    multipliers: ArrayLike | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    free: str = "omega",
+    events: Sequence[EventRow] = (),
+    system: str = "",
+    ended: str = "",
+    closed: bool = False,
+    period: int = 1,
+    observed_dof: int = 0,
+    dofs: int = 1,
+    options: Mapping[str, str | int | float] | None = None,
+) -> xarray.Dataset:
+    """A curve of periodic motions as a labelled dataset; the layout is described at the top of this module.
+
+    Shapes: `omega`, `amplitude`, `stable`, `harmonics`, `error`, `residual` (points,); `multipliers` (points, m),
+    complex; each of `parameters` a number, or (points,) where it varies along the curve. `omega` is in rad per unit
+    time, `amplitude` is max |x| over one response period at `observed_dof`, in the system's unit of length; `period`
+    counts the forcing periods in one response period; `free` names the parameter that the curve was followed in.
+    `options` are further numbers or texts that tell how the curve was computed.
+
+    Raises InputError where lengths disagree or `free` is not a parameter.
+    """
+    import xarray
+
+    frequency = _points("omega", omega, None)
+    count = frequency.size
+    values = {
+        name: np.broadcast_to(np.asarray(value, dtype=float), (count,))
+        if np.ndim(value) == 0
+        else _points(name, value, count)
+        for name, value in (parameters or {}).items()
+    }
+    if free != "omega" and free not in values:
+        raise InputError(f"the free parameter {free!r} is not a parameter of the curve{suggest(free, values)}")
+    for row in events:
+        if not 0 <= row.after < count:
+            raise InputError(f"event {row.kind} lies after point {row.after} of a curve of {count} points")
+
+    described = _Described(count)
+    described.add("amplitude", amplitude, "max |x| over one response period")
+    described.add("stable", stable, "all Floquet multipliers inside the unit circle", bool)
+    described.add("harmonics", harmonics, "harmonics kept, up to harmonics * omega", int)
+    described.add("error", error, "relative size of the neglected harmonics of the force")
+    described.add("residual", residual, "residual of the harmonic balance, relative")
+    variables: dict[str, Any] = described.variables
+    names = list(values)
+    variables["parameters"] = (
+        ("point", "parameter"),
+        np.column_stack([values[name] for name in names]) if names else np.empty((count, 0)),
+    )
+    if multipliers is not None:
+        table = np.asarray(multipliers, dtype=complex)
+        if table.ndim != 2 or table.shape[0] != count:
+            raise InputError(f"multipliers: expected one row for each of the {count} points, got shape {table.shape}")
+        variables["multipliers"] = (
+            ("point", "multiplier"),
+            table,
+            {"long_name": "Floquet multipliers over the response period"},
+        )
+    variables |= _event_variables(events, names, values)
+
+    coords: dict[str, Any] = {
+        "omega": ("point", frequency, {"long_name": "circular forcing frequency", "units": "rad per unit time"}),
+        "parameter": ("parameter", np.array(names, dtype=object)),
+    }
+    if free not in RESERVED and not free.startswith("event_"):
+        coords[free] = ("point", values[free].copy())
+    attributes: dict[str, Any] = {
+        "layout": LAYOUT,
+        "suboctave": __version__,
+        "system": system,
+        "free": free,
+        "ended": ended,
+        "closed": int(closed),
+        "period": period,
+        "observed_dof": observed_dof,
+        "dofs": dofs,
+    }
+    for name, value in (options or {}).items():
+        if name in attributes:
+            raise InputError(f"option {name!r} would overwrite an attribute of the layout")
+        attributes[name] = value
+    return xarray.Dataset(variables, coords, attributes)
+
+
+def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """The values of `omega` or of a named parameter, at the points (points,) and at the events (events,).
+
+    Raises InputError, with a suggestion, for a name that the dataset does not have.
+    """
+    if name == "omega":
+        return dataset["omega"].to_numpy(), dataset["event_omega"].to_numpy()
+    names = [str(known) for known in dataset["parameter"].to_numpy()]
+    if name not in names:
+        raise InputError(f"the curve has no parameter {name!r}{suggest(name, [*names, 'omega'])}")
+    column = names.index(name)
+    return dataset["parameters"].to_numpy()[:, column], dataset["event_parameters"].to_numpy()[:, column]
+
+
+def check_layout(dataset: xarray.Dataset) -> None:
+    """Raises InputError when the dataset is not one that `branch_dataset` of this version lays out."""
+    found = dataset.attrs.get("layout")
+    if found is None:
+        raise InputError("this dataset was not laid out by suboctave: it has no attribute 'layout'")
+    if int(found) > LAYOUT:
+        raise InputError(
+            f"this dataset has layout {found}, newer than {LAYOUT}: it was written by suboctave "
+            f"{dataset.attrs.get('suboctave', '(unknown version)')}; update suboctave"
+        )
+
+
+class _Described:
+    """Collects the variables on `point`, each with its length checked and its meaning attached."""
+
+    def __init__(self, count: int):
+        self.count = count
+        self.variables: dict[str, Any] = {}
+
+    def add(self, name: str, values: ArrayLike | None, meaning: str, kind: type = float) -> None:
+        if values is not None:
+            checked = _points(name, values, self.count, kind)
+            self.variables[name] = ("point", checked, {"long_name": meaning})
+
+
+def _points(name: str, values: ArrayLike, count: int | None, kind: type = float) -> np.ndarray:
+    array = np.asarray(values, dtype=kind)
+    if array.ndim != 1 or (count is not None and array.size != count):
+        wanted = "a one-dimensional array" if count is None else f"{count} values, one for each point"
+        raise InputError(f"{name}: expected {wanted}, got shape {array.shape}")
+    return array
+
+
+def _event_variables(
+    events: Sequence[EventRow], names: Sequence[str], values: Mapping[str, np.ndarray]
+) -> dict[str, Any]:
+    table = np.array(
+        [[row.parameters.get(name, values[name][row.after]) for name in names] for row in events], dtype=float
+    ).reshape(len(events), len(names))
+    return {
+        "event_kind": ("event", np.array([row.kind for row in events], dtype=object)),
+        "event_after": ("event", np.array([row.after for row in events], dtype=int)),
+        "event_omega": ("event", np.array([row.omega for row in events], dtype=float)),
+        "event_amplitude": ("event", np.array([row.amplitude for row in events], dtype=float)),
+        "event_residual": ("event", np.array([row.residual for row in events], dtype=float)),
+        "event_multiplier": (
+            "event",
+            np.array([row.multiplier for row in events], dtype=complex),
+            {"long_name": "the multiplier that crosses the unit circle"},
+        ),
+        "event_criticality": ("event", np.array([row.criticality or "" for row in events], dtype=object)),
+        "event_stable_after": (
+            "event",
+            np.array([UNKNOWN if row.stable_after is None else int(row.stable_after) for row in events], dtype=np.int8),
+            {"long_name": "motions right after it are stable: 1, unstable: 0, not known: -1"},
+        ),
+        "event_parameters": (("event", "parameter"), table),
+    }
