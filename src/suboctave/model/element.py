@@ -1,0 +1,163 @@
+"""The contract of an element: a force `f(u, v; c)` along one direction of the structure.
+
+An element acts on the relative displacement `u = d . x` and velocity `v = d . x'` with the force `d f(u, v; c)` on the left-hand
+side of the equation of motion. Its coefficients `c` are numbers or expressions in the system's parameters. A new element
+is a subclass that passes its coefficients to `Element.__init__` and provides the laws below as pure functions of arrays;
+`check_derivatives` compares them with finite differences.
+"""
+
+from __future__ import annotations
+
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from suboctave.errors import InputError
+from suboctave.model.expression import Coefficient, coefficient
+from suboctave.model.sampling import Sampling
+
+__all__ = ["Array", "Dof", "Element", "Place"]
+
+Array: TypeAlias = NDArray[np.float64]
+Dof: TypeAlias = int | Sequence[int]
+
+
+class Place:
+    """Where something acts: `dof=i` along `e_i`, `dof=(i, j)` along `e_i - e_j`, or any `direction` vector."""
+
+    def __init__(self, owner: str, dof: Dof | None, direction: ArrayLike | None) -> None:
+        self.owner = owner
+        if (dof is None) == (direction is None):
+            raise InputError(f"{owner} needs either dof= (one index, or a pair) or direction= (a vector), not both")
+        self.dofs: tuple[int, ...] = () if dof is None else self._read_dofs(dof)
+        self.vector: Array | None = None if direction is None else self._read_vector(direction)
+
+    def _read_dofs(self, dof: Dof) -> tuple[int, ...]:
+        entries = tuple(dof) if isinstance(dof, Sequence | np.ndarray) and not isinstance(dof, str) else (dof,)
+        try:
+            dofs = tuple(operator.index(entry) for entry in entries)  # type: ignore[arg-type]
+        except TypeError:
+            raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}") from None
+        if len(dofs) not in (1, 2) or any(isinstance(entry, bool) for entry in entries):
+            raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}")
+        if min(dofs) < 0:
+            raise InputError(f"{self.owner}: dof {min(dofs)} is negative; degrees of freedom count from 0")
+        if len(set(dofs)) < len(dofs):
+            raise InputError(f"{self.owner}: dof={dofs} couples a degree of freedom with itself")
+        return dofs
+
+    def _read_vector(self, direction: ArrayLike) -> Array:
+        vector = np.array(direction, dtype=float)
+        if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
+            raise InputError(f"{self.owner}: direction must be a vector of finite numbers, not all zero")
+        vector.setflags(write=False)
+        return vector
+
+    def direction(self, n: int) -> Array:
+        """The direction (n,) in a structure of n degrees of freedom; an `InputError` if it does not fit."""
+        if self.vector is not None:
+            if len(self.vector) != n:
+                raise InputError(f"{self.owner}: direction has {len(self.vector)} entries, the structure {n} DOFs")
+            return self.vector.copy()
+        if max(self.dofs) >= n:
+            raise InputError(f"{self.owner}: dof {max(self.dofs)} does not exist; the structure has DOFs 0 to {n - 1}")
+        result = np.zeros(n)
+        for dof, sign in zip(self.dofs, (1.0, -1.0), strict=False):
+            result[dof] = sign
+        return result
+
+    def __str__(self) -> str:
+        if self.vector is not None:
+            shown = ", ".join(f"{entry:g}" for entry in self.vector[:4]) + (", ..." if len(self.vector) > 4 else "")
+            return f"direction=[{shown}]"
+        return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
+
+
+class Element(ABC):
+    """A nonlinear force along one direction. Subclasses are immutable by convention.
+
+    A subclass sets `coefficient_names` (on the class, or on the object before `Element.__init__`) and, if its force
+    depends on velocity, `depends_on_velocity = True`. Below, `u`, `v` are arrays (N,) and `c` is (nc,).
+    """
+
+    coefficient_names: tuple[str, ...] = ()
+    depends_on_velocity: bool = False
+
+    def __init__(
+        self,
+        dof: Dof | None = None,
+        coefficients: Sequence[float | str | Coefficient] = (),
+        *,
+        direction: ArrayLike | None = None,
+    ) -> None:
+        kind = type(self).__name__
+        self.place = Place(kind, dof, direction)
+        if len(coefficients) != len(self.coefficient_names):
+            raise InputError(f"{kind} takes {len(self.coefficient_names)} coefficients, got {len(coefficients)}")
+        read = []
+        for name, source in zip(self.coefficient_names, coefficients, strict=True):
+            try:
+                read.append(coefficient(source))
+            except InputError as error:
+                raise InputError(f"{kind}({self.place}), {name}: {error}") from None
+        self.coefficients: tuple[Coefficient, ...] = tuple(read)
+        self._constant = np.array([c.value({}) if c.constant else np.nan for c in read])
+        self._varying = tuple((i, c) for i, c in enumerate(read) if not c.constant)
+
+    @property
+    def label(self) -> str:
+        """How messages name this element."""
+        return f"{type(self).__name__}({self.place})"
+
+    def direction(self, n: int) -> Array:
+        """The vector (n,) with `u = direction . x`."""
+        return self.place.direction(n)
+
+    def coefficient_values(self, values: Mapping[str, float]) -> Array:
+        """The coefficients (nc,) at these values of the parameters."""
+        c = self._constant.copy()
+        for i, source in self._varying:
+            c[i] = source.value(values)
+        return c
+
+    def check(self, values: Mapping[str, float]) -> None:  # noqa: B027 - most elements have nothing to refuse
+        """Refuse coefficients that make no sense at a system's parameters (called once, when a system is made)."""
+
+    @abstractmethod
+    def sampling(self, c: Array) -> Sampling:
+        """How smooth the law is at these coefficients."""
+
+    @abstractmethod
+    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array | None]:
+        """`(f, f_u, f_v)`, (N,) each; `f_v` is None for a law without velocity."""
+
+    @abstractmethod
+    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array | None, Array | None]:
+        """`(f_uu, f_uv, f_vv)`, (N,) each; the last two are None for a law without velocity."""
+
+    @abstractmethod
+    def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array | None]:
+        """`(f_c, f_uc, f_vc)`, (nc, N) each; `f_vc` is None for a law without velocity."""
+
+    @abstractmethod
+    def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
+        """`f_cc`, (nc, nc, N)."""
+
+    def __repr__(self) -> str:
+        shown = [str(self.place)]
+        shown += [f"{name}={c.text}" for name, c in zip(self.coefficient_names, self.coefficients, strict=True)]
+        return f"{type(self).__name__}({', '.join(shown + self._options())})"
+
+    def _options(self) -> list[str]:
+        return []
+
+
+def required(owner: str, **given: Any) -> None:
+    """Refuse arguments that were left out (they follow the optional `dof`, so Python cannot)."""
+    missing = [name for name, value in given.items() if value is None]
+    if missing:
+        raise InputError(f"{owner} needs {' and '.join(missing)}")

@@ -1,0 +1,126 @@
+"""Periodic loads: `amplitude cos(harmonic omega t + phase)` on the right-hand side of the equation of motion."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError
+from suboctave.model.element import Array, Dof, Place, required
+from suboctave.model.expression import ZERO, Coefficient, coefficient
+
+__all__ = ["HarmonicLoad", "LoadComponent"]
+
+Number = float | str | Coefficient
+
+
+@dataclass(frozen=True, eq=False)
+class LoadComponent:
+    """One cosine: `direction * amplitude * cos(harmonic * omega * t + phase)`, direction (n,), phase in radians."""
+
+    direction: Array
+    harmonic: int
+    amplitude: Coefficient
+    phase: Coefficient
+
+
+class HarmonicLoad:
+    """`amplitude cos(harmonic omega t + phase)` at `dof` (an index, a pair `(i, j)` for `e_i - e_j`) or along `direction`.
+
+    `amplitude`, `harmonic` and `phase` may be sequences of equal length: a sum of cosines; a single phase serves all of
+    them. `static` is a constant force. Amplitudes and phases may contain `omega` (unbalance: `"m*e*omega**2"`).
+    """
+
+    def __init__(
+        self,
+        dof: Dof | None = None,
+        amplitude: Number | Sequence[Number] | None = None,
+        harmonic: int | Sequence[int] = 1,
+        phase: Number | Sequence[Number] = 0.0,
+        static: Number = 0.0,
+        *,
+        direction: ArrayLike | None = None,
+    ) -> None:
+        self.place = Place("HarmonicLoad", dof, direction)
+        required(self.label, amplitude=amplitude)
+        amplitudes, harmonics, phases = (_listed(given) for given in (amplitude, harmonic, phase))
+        count = max(len(amplitudes), len(harmonics))
+        if len(phases) == 1 < count:
+            phases *= count
+        if not len(amplitudes) == len(harmonics) == len(phases):
+            raise InputError(
+                f"{self.label}: {len(amplitudes)} amplitudes, {len(harmonics)} harmonics and {len(phases)} phases; "
+                f"give as many of each (one phase serves all)"
+            )
+        self.amplitudes = tuple(self._read("amplitude", given) for given in amplitudes)
+        self.harmonics = tuple(self._read_harmonic(given) for given in harmonics)
+        self.phases = tuple(self._read("phase", given) for given in phases)
+        self.static = self._read("static", static)
+
+    @property
+    def label(self) -> str:
+        """How messages name this load."""
+        return f"HarmonicLoad({self.place})"
+
+    def _read(self, what: str, source: Any) -> Coefficient:
+        try:
+            return coefficient(source)
+        except InputError as error:
+            raise InputError(f"{self.label}, {what}: {error}") from None
+
+    def _read_harmonic(self, given: Any) -> int:
+        try:
+            harmonic = operator.index(given)
+        except TypeError:
+            harmonic = -1
+        if harmonic < 0 or isinstance(given, bool):
+            raise InputError(f"{self.label}: harmonic must be an integer from 0 on, not {given!r}")
+        return harmonic
+
+    @property
+    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
+        """Every expression of this load, with what it is."""
+        pairs = [("amplitude", c) for c in self.amplitudes] + [("phase", c) for c in self.phases]
+        return (*pairs, ("static", self.static))
+
+    def direction(self, n: int) -> Array:
+        """The vector (n,) along which the load acts."""
+        return self.place.direction(n)
+
+    def components(self, n: int) -> tuple[LoadComponent, ...]:
+        """The cosines of this load, the static part last (harmonic 0)."""
+        direction = self.direction(n)
+        direction.setflags(write=False)
+        cosines = [
+            LoadComponent(direction, harmonic, amplitude, phase)
+            for amplitude, harmonic, phase in zip(self.amplitudes, self.harmonics, self.phases, strict=True)
+        ]
+        if not (self.static.constant and self.static.value({}) == 0.0):
+            cosines.append(LoadComponent(direction, 0, self.static, ZERO))
+        return tuple(cosines)
+
+    def __repr__(self) -> str:
+        shown = [str(self.place), f"amplitude={_shown(self.amplitudes)}"]
+        if self.harmonics != (1,):
+            shown.append(f"harmonic={_shown(self.harmonics)}")
+        if any(not phase.constant or phase.value({}) != 0.0 for phase in self.phases):
+            shown.append(f"phase={_shown(self.phases)}")
+        if not self.static.constant or self.static.value({}) != 0.0:
+            shown.append(f"static={self.static.text}")
+        return f"HarmonicLoad({', '.join(shown)})"
+
+
+def _listed(given: Any) -> list[Any]:
+    if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and np.ndim(given) == 1:
+        return list(given)
+    return [given]
+
+
+def _shown(items: Sequence[Any]) -> str:
+    texts = [item.text if isinstance(item, Coefficient) else str(item) for item in items]
+    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"

@@ -1,0 +1,50 @@
+"""What an element tells about the smoothness of its law, so that whoever integrates it along a motion need not guess."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+__all__ = ["AdaptiveSampling", "PiecewiseLinear", "Piece", "PolynomialSampling", "Sampling", "SharpSampling"]
+
+
+@dataclass(frozen=True)
+class PolynomialSampling:
+    """A polynomial in `(u, v)` of this total degree: a uniform grid of enough samples integrates it exactly."""
+
+    degree: int
+
+
+@dataclass(frozen=True)
+class SharpSampling:
+    """Analytic on the real axis, with complex singularities at `u = points[i] +- 1j * widths[i]` (unit: length)."""
+
+    points: tuple[float, ...]
+    widths: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One half-line of a piecewise-linear law: indices of its stiffness and gap among the element's coefficients.
+
+    Its force is `c[stiffness] * (u - c[gap])` where `side * (u - c[gap]) > 0` and zero elsewhere.
+    """
+
+    stiffness: int
+    gap: int
+    side: int
+
+
+@dataclass(frozen=True)
+class PiecewiseLinear:
+    """The law is the sum of its pieces and nothing else, so that it can be integrated in closed form."""
+
+    pieces: tuple[Piece, ...]
+
+
+@dataclass(frozen=True)
+class AdaptiveSampling:
+    """Nothing is known: samples are added until force and tangent stop moving."""
+
+
+Sampling: TypeAlias = PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling

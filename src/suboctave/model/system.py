@@ -1,0 +1,285 @@
+"""What vibrates: `M x'' + C x' + K x + sum_e d_e f_e(d_e.x, d_e.x'; parameters) = p(t)`."""
+
+from __future__ import annotations
+
+import keyword
+import math
+import numbers
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError, suggest
+from suboctave.model.element import Array, Element
+from suboctave.model.expression import RESERVED, Coefficient
+from suboctave.model.loads import HarmonicLoad, LoadComponent
+from suboctave.model.mass_check import check_mass
+from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
+
+__all__ = ["System"]
+
+
+class System:
+    """Mass, damping, stiffness, elements, loads and named parameters. Immutable.
+
+    `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
+    numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite at
+    the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the left-hand side.
+    `loads`: a sequence of `HarmonicLoad`, on the right-hand side. `parameters`: `{name: number}`, every one of them
+    used somewhere. Units are the user's own, if they are consistent; frequencies are circular.
+
+    Raises `InputError` for anything that does not fit, before any work.
+    """
+
+    mass: MatrixCoefficient
+    damping: MatrixCoefficient
+    stiffness: MatrixCoefficient
+    elements: tuple[Element, ...]
+    loads: tuple[HarmonicLoad, ...]
+    parameters: Mapping[str, float]
+    name: str
+    n: int
+    _components: tuple[LoadComponent, ...]
+
+    def __init__(
+        self,
+        mass: Any,
+        damping: Any,
+        stiffness: Any,
+        elements: Iterable[Element] = (),
+        loads: Iterable[HarmonicLoad] = (),
+        parameters: Mapping[str, float] | None = None,
+        name: str = "",
+    ) -> None:
+        read = matrix_coefficient(mass, None, "mass")
+        self._fill(
+            read,
+            matrix_coefficient(damping, read.n, "damping"),
+            matrix_coefficient(stiffness, read.n, "stiffness"),
+            _several(elements, Element, "elements"),
+            _several(loads, HarmonicLoad, "loads"),
+            _read_parameters(parameters),
+            str(name),
+        )
+        self._check_names()
+        self._check_values(self.parameters)
+        for element in self.elements:
+            element.check(self.parameters)
+
+    def _fill(
+        self,
+        mass: MatrixCoefficient,
+        damping: MatrixCoefficient,
+        stiffness: MatrixCoefficient,
+        elements: tuple[Element, ...],
+        loads: tuple[HarmonicLoad, ...],
+        parameters: Mapping[str, float],
+        name: str,
+    ) -> None:
+        n = mass.n
+        for element in elements:
+            element.direction(n)
+        components = tuple(component for load in loads for component in load.components(n))
+        fields = {
+            "mass": mass,
+            "damping": damping,
+            "stiffness": stiffness,
+            "elements": elements,
+            "loads": loads,
+            "parameters": MappingProxyType(dict(parameters)),
+            "name": name,
+            "n": n,
+            "_components": components,
+        }
+        for field, value in fields.items():
+            object.__setattr__(self, field, value)
+
+    # ------------------------------------------------------------------------------------------------- parameters
+    def with_parameters(self, changes: Mapping[str, float] | None = None, /, **more: float) -> System:
+        """The same system with other values of some parameters; the sides of its stops stay as they are."""
+        changed = {**(changes or {}), **more}
+        for name, value in changed.items():
+            self.check_parameter(name)
+            changed[name] = _number(name, value)
+        parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
+        result = _assemble(*parts, {**self.parameters, **changed}, self.name)
+        result._check_values(changed)
+        return result
+
+    def check_parameter(self, name: str) -> None:
+        """Raise `InputError`, with a suggestion, if there is no parameter of this name."""
+        if name not in self.parameters:
+            has = suggest(str(name), self.parameters) or "; it has none"
+            raise InputError(f"the system has no parameter {name!r}{has}")
+
+    def _expressions(self) -> Iterator[tuple[str, Coefficient]]:
+        for matrix in (self.mass, self.damping, self.stiffness):
+            for source in matrix.coefficients:
+                yield matrix.what, source
+        for element in self.elements:
+            for what, source in zip(element.coefficient_names, element.coefficients, strict=True):
+                yield f"{element.label}, {what}", source
+        for load in self.loads:
+            for what, source in load.coefficients:
+                yield f"{load.label}, {what}", source
+
+    def _check_names(self) -> None:
+        used: set[str] = set()
+        for where, source in self._expressions():
+            in_load = where.startswith("HarmonicLoad")
+            for name in sorted(source.names):
+                if name == "omega" and not in_load:
+                    raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
+                if name != "omega" and name not in self.parameters:
+                    known = suggest(name, self.parameters) or "; no parameters are given"
+                    raise InputError(f"{where}: unknown parameter {name!r} in the expression {source}{known}")
+            used |= source.names
+        unused = [name for name in self.parameters if name not in used]
+        if unused:
+            listed = ", ".join(repr(name) for name in unused)
+            what = "parameter" if len(unused) == 1 else "parameters"
+            raise InputError(f"{what} {listed} not used in any expression; remove or use it")
+
+    def _check_values(self, changed: Mapping[str, float]) -> None:
+        """Refuse values at which an expression has no number or the mass is not a mass."""
+        for where, source in self._expressions():
+            if "omega" in source.names:
+                continue
+            if source.names:
+                try:
+                    source.value(self.parameters)
+                except InputError as error:
+                    raise InputError(f"{where}: {error}") from None
+        if changed is self.parameters or self.mass.names.intersection(changed):
+            mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
+            check_mass(mass)
+
+    # --------------------------------------------------------------------------------------------------- matrices
+    def matrices(self, values: Mapping[str, float] | None = None) -> tuple[Array, Array, Array]:
+        """`(M, C, K)` as dense arrays (n, n), at `values` (all parameters; default: the system's own)."""
+        at = self.parameters if values is None else values
+        return self.mass.value(at), self.damping.value(at), self.stiffness.value(at)
+
+    def matrix_derivatives(
+        self, *names: str, values: Mapping[str, float] | None = None
+    ) -> tuple[Array | None, Array | None, Array | None]:
+        """Derivatives of `(M, C, K)` by one or two parameters (two: the mixed second one); None where identically zero."""
+        if len(names) not in (1, 2):
+            raise InputError(f"matrix_derivatives takes one or two names of parameters, got {len(names)}")
+        for name in names:
+            if name != "omega":
+                self.check_parameter(name)
+        at = self.parameters if values is None else values
+
+        def differentiated(matrix: MatrixCoefficient | None) -> Array | None:
+            for name in names:
+                if matrix is not None:
+                    matrix = matrix.derivative(name)
+            return None if matrix is None else matrix.value(at)
+
+        return differentiated(self.mass), differentiated(self.damping), differentiated(self.stiffness)
+
+    # ------------------------------------------------------------------------------------------------------ loads
+    def load_components(self) -> tuple[LoadComponent, ...]:
+        """Every cosine of every load; static parts are components of harmonic 0."""
+        return self._components
+
+    def force_time(self, t: ArrayLike, omega: float, values: Mapping[str, float] | None = None) -> Array:
+        """The external force `p(t)`: (n,) for one instant, (n, len(t)) for several."""
+        at = {**(self.parameters if values is None else values), "omega": float(omega)}
+        times = np.asarray(t, dtype=float)
+        force = np.zeros((self.n, *times.shape))
+        for component in self._components:
+            wave = np.cos(component.harmonic * omega * times + component.phase.value(at))
+            force += np.multiply.outer(component.direction, component.amplitude.value(at) * wave)
+        return force
+
+    @property
+    def observed_dof(self) -> int:
+        """The degree of freedom that is watched by default: where the first load acts most (a non-static one if any)."""
+        for component in (*(c for c in self._components if c.harmonic > 0), *self._components):
+            return int(np.argmax(np.abs(component.direction)))
+        return 0
+
+    # ------------------------------------------------------------------------------------------------------ object
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError("a System does not change; with_parameters() gives one with other parameters")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError("a System does not change")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
+        return _assemble, (*parts, dict(self.parameters), self.name)
+
+    def __repr__(self) -> str:
+        title = f"System {self.name!r}" if self.name else "System"
+        lines = [f"{title}: {self.n} {'degree' if self.n == 1 else 'degrees'} of freedom"]
+        for kind, items in (("elements", self.elements), ("loads", self.loads)):
+            shown = [repr(item) for item in items[:6]] + (["..."] if len(items) > 6 else [])
+            lines += [f"  {kind if not i else '':<10} {text}" for i, text in enumerate(shown)]
+        if self.parameters:
+            values = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items())
+            lines.append(f"  parameters {values}")
+        return "\n".join(lines)
+
+
+def _assemble(
+    mass: MatrixCoefficient,
+    damping: MatrixCoefficient,
+    stiffness: MatrixCoefficient,
+    elements: tuple[Element, ...],
+    loads: tuple[HarmonicLoad, ...],
+    parameters: Mapping[str, float],
+    name: str,
+) -> System:
+    """A system from parts that a system has already accepted."""
+    result = object.__new__(System)
+    result._fill(mass, damping, stiffness, elements, loads, parameters, name)
+    return result
+
+
+def _several(items: Any, kind: type, what: str) -> tuple[Any, ...]:
+    if isinstance(items, kind):
+        return (items,)
+    try:
+        listed = tuple(items)
+    except TypeError:
+        raise InputError(f"{what} must be a sequence of {kind.__name__}, not {items!r}") from None
+    for item in listed:
+        if not isinstance(item, kind):
+            raise InputError(f"{what} holds {item!r} ({type(item).__name__}), which is not a {kind.__name__}")
+    return listed
+
+
+def _read_parameters(parameters: Mapping[str, float] | None) -> dict[str, float]:
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise InputError(f"parameters must be a mapping {{name: number}}, not {parameters!r}")
+    return {_name(name): _number(name, value) for name, value in (parameters or {}).items()}
+
+
+def _name(name: Any) -> str:
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise InputError(
+            f"{name!r} cannot name a parameter: letters, digits and underscores, not a word of Python"
+            + (f"; for example {name + '_'!r}" if isinstance(name, str) and keyword.iskeyword(name) else "")
+        )
+    if name in RESERVED:
+        raise InputError(f"{name!r} cannot name a parameter: it already has a meaning in expressions")
+    plain = unicodedata.normalize("NFKC", name)
+    if plain != name:  # Python reads names in this form, so an expression would never find it
+        raise InputError(f"{name!r} cannot name a parameter; write it with plain letters: {plain!r}")
+    return name
+
+
+def _number(name: str, value: Any) -> float:
+    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+        raise InputError(f"parameter {name!r} must be a number, not {value!r}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise InputError(f"parameter {name!r} must be finite, not {number}")
+    return number
