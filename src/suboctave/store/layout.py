@@ -191,7 +191,7 @@ class _Described:
 
 
 def _points(name: str, values: ArrayLike, count: int | None, kind: type = float) -> np.ndarray:
-    array = np.asarray(values, dtype=kind)
+    array: np.ndarray = np.asarray(values, dtype=kind)
     if array.ndim != 1 or (count is not None and array.size != count):
         wanted = "a one-dimensional array" if count is None else f"{count} values, one for each point"
         raise InputError(f"{name}: expected {wanted}, got shape {array.shape}")

@@ -1,0 +1,50 @@
+"""A figure to a file: the suffix says the form, and a reader never meets half a file."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from suboctave.errors import InputError, suggest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["SUFFIXES", "save_figure"]
+
+SUFFIXES = (".png", ".svg", ".pdf")
+# No time stamps: the same curve gives the same file.
+_METADATA: dict[str, dict[str, Any]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+
+def save_figure(figure: Figure, path: str | Path, *, dpi: float = 200.0) -> Path:
+    """Writes the figure as PNG (at `dpi`), SVG or PDF, by the suffix of `path`; makes the folder where it is missing.
+
+    Written beside its place and renamed, so that an interruption leaves what was there before.
+    """
+    import matplotlib
+
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"cannot tell the form of {target.name!r} from its suffix{suggest(suffix, SUFFIXES)}")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=suffix, dir=target.parent)
+    os.close(handle)
+    try:
+        with matplotlib.rc_context({"svg.hashsalt": "suboctave"}):
+            figure.savefig(name, format=suffix[1:], dpi=dpi, metadata=_METADATA[suffix])
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return target
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,97 @@
+"""A response curve as strokes of one stability each, cut exactly where the bifurcations were located.
+
+The points of a curve and its events form one line: point i, the events that lie after it, point i + 1. A stroke ends at
+an event, not at the computed point nearest to it, so that a dash begins at the marker.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from suboctave.store.layout import coordinate
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["Stroke", "strokes"]
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A stretch of the curve, (vertices,) each, on which all motions are stable or none is (None: not computed)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    stable: bool | None
+
+
+def strokes(dataset: xarray.Dataset, x: str) -> list[Stroke]:
+    """The curve over parameter `x`, cut where stability changes.
+
+    A piece between two neighbours of the line is stable when both ends say so. An event takes the stability of the side
+    in question: that of the preceding point before it, of the following point after it. Between two events of the same
+    step only `event_stable_after` can tell; where it does not, and where stability changes with no located event,
+    the piece counts as unstable: a picture must not promise more than was found.
+    """
+    horizontal, event_horizontal = coordinate(dataset, x)
+    vertical = dataset["amplitude"].to_numpy()
+    event_vertical = dataset["event_amplitude"].to_numpy()
+    after = dataset["event_after"].to_numpy()
+    order = np.argsort(after, kind="stable")
+    # Position on the line: all points, each followed by its events.
+    position = np.searchsorted(after[order], np.arange(vertical.size)) + np.arange(vertical.size)
+    event_position = after[order] + 1 + np.arange(order.size)
+    line_x = np.empty(vertical.size + order.size)
+    line_y = np.empty_like(line_x)
+    line_x[position], line_y[position] = horizontal, vertical
+    line_x[event_position], line_y[event_position] = event_horizontal[order], event_vertical[order]
+
+    if "stable" not in dataset:
+        return [Stroke(line_x, line_y, None)]
+    verdict = _pieces(
+        dataset["stable"].to_numpy().astype(bool),
+        after[order],
+        dataset["event_stable_after"].to_numpy()[order],
+        position,
+        event_position,
+    )
+    if verdict.size == 0:
+        return [Stroke(line_x, line_y, bool(dataset["stable"].to_numpy().all()))]
+    cuts = [0, *(np.flatnonzero(np.diff(verdict)) + 1), verdict.size]
+    return [
+        Stroke(line_x[first : last + 1], line_y[first : last + 1], bool(verdict[first]))
+        for first, last in pairwise(cuts)
+    ]
+
+
+def _pieces(
+    stable: np.ndarray, after: np.ndarray, stable_after: np.ndarray, position: np.ndarray, event_position: np.ndarray
+) -> np.ndarray:
+    """(vertices - 1,) whether each piece of the line is stable."""
+    count = stable.size + after.size
+    is_event = np.zeros(count, dtype=bool)
+    is_event[event_position] = True
+    leaving = np.zeros(count, dtype=bool)  # what a vertex says about the piece after it
+    leaving[position] = stable
+    arriving = np.zeros(count, dtype=bool)  # what it says about the piece before it
+    arriving[position] = stable
+    told = np.zeros(count, dtype=bool)
+    leaving[event_position] = stable_after == 1
+    told[event_position] = stable_after >= 0
+
+    verdict = np.zeros(count - 1, dtype=bool)
+    for piece in range(count - 1):
+        first_event, last_event = is_event[piece], is_event[piece + 1]
+        if first_event and told[piece]:
+            verdict[piece] = leaving[piece]
+        elif first_event:
+            verdict[piece] = not last_event and arriving[piece + 1]
+        elif last_event:
+            verdict[piece] = leaving[piece]
+        else:
+            verdict[piece] = leaving[piece] and arriving[piece + 1]
+    return verdict

@@ -1,0 +1,104 @@
+"""A stroke changes where the bifurcation was located, not at the nearest computed point."""
+
+import numpy as np
+import pytest
+
+from suboctave.errors import InputError
+from suboctave.pictures.strokes import strokes
+from suboctave.store.layout import EventRow, branch_dataset
+
+X = np.arange(5.0)
+
+
+def curve(stable, events, **more):
+    return branch_dataset(X, X**2, stable=stable, events=events, **more)
+
+
+def described(dataset, x="omega"):
+    return [(list(stroke.x), stroke.stable) for stroke in strokes(dataset, x)]
+
+
+def test_dashes_begin_at_the_event():
+    rows = [EventRow("LP", 1, 1.25, 1.6), EventRow("LP", 3, 3.5, 12.0)]
+    assert described(curve([1, 1, 0, 0, 1], rows)) == [
+        ([0.0, 1.0, 1.25], True),
+        ([1.25, 2.0, 3.0, 3.5], False),
+        ([3.5, 4.0], True),
+    ]
+
+
+def test_every_stroke_begins_where_the_last_one_ended(duffing):
+    dataset = duffing()
+    assert dataset.sizes["event"] == 2
+    pieces = strokes(dataset, "omega")
+    assert [piece.stable for piece in pieces] == [True, False, True]
+    for before, after, event in zip(pieces[:-1], pieces[1:], range(2), strict=True):
+        here = (float(dataset["event_omega"][event]), float(dataset["event_amplitude"][event]))
+        assert (before.x[-1], before.y[-1]) == (after.x[0], after.y[0]) == here
+    assert sum(piece.x.size for piece in pieces) == dataset.sizes["point"] + 2 + 2  # cuts belong to both sides
+
+
+def test_the_order_in_which_events_are_listed_does_not_matter():
+    rows = [EventRow("PD", 3, 3.5, 12.0), EventRow("PD", 1, 1.5, 2.0)]
+    assert described(curve([1, 1, 0, 0, 1], rows)) == described(curve([1, 1, 0, 0, 1], rows[::-1]))
+
+
+def test_two_events_in_one_step():
+    def rows(told):
+        return [EventRow("PD", 1, 1.2, 1.4, stable_after=told), EventRow("PD", 1, 1.7, 2.9)]
+
+    between = [([0.0, 1.0, 1.2], True), ([1.2, 1.7], False), ([1.7, 2.0, 3.0, 4.0], True)]
+    assert described(curve([1] * 5, rows(None))) == between  # not told: a picture promises nothing
+    assert described(curve([1] * 5, rows(False))) == between
+    assert described(curve([0] * 5, rows(True))) == [
+        ([0.0, 1.0, 1.2], False),
+        ([1.2, 1.7], True),
+        ([1.7, 2.0, 3.0, 4.0], False),
+    ]
+
+
+def test_a_change_without_located_event_is_drawn_unstable():
+    assert described(curve([1, 1, 0, 0, 0], [])) == [([0.0, 1.0], True), ([1.0, 2.0, 3.0, 4.0], False)]
+
+
+def test_an_event_that_changes_nothing_cuts_nothing():
+    pieces = strokes(curve([0] * 5, [EventRow("BP", 2, 2.5, 6.0)]), "omega")
+    assert len(pieces) == 1
+    assert list(pieces[0].x) == [0.0, 1.0, 2.0, 2.5, 3.0, 4.0]
+
+
+def test_a_named_parameter_on_the_axis():
+    rows = [EventRow("LP", 1, 2.0, 1.5, parameters={"p": 0.15})]
+    dataset = branch_dataset(
+        np.full(5, 2.0), X, stable=[1, 1, 0, 0, 0], parameters={"p": X / 10, "j": 0.5}, free="p", events=rows
+    )
+    assert described(dataset, "p") == [([0.0, 0.1, 0.15], True), ([0.15, 0.2, 0.3, 0.4], False)]
+    assert list(dataset["p"].to_numpy()) == list(X / 10)
+    assert float(dataset["event_parameters"].sel(parameter="j")[0]) == 0.5
+    with pytest.raises(InputError, match="did you mean"):
+        strokes(dataset, "omga")
+
+
+def test_without_stability_there_is_one_stroke():
+    (stroke,) = strokes(curve(None, []), "omega")
+    assert stroke.stable is None
+
+
+def test_a_single_point():
+    dataset = branch_dataset([1.0], [2.0], stable=[True])
+    assert described(dataset) == [([1.0], True)]
+
+
+def test_wrong_lengths_are_refused():
+    with pytest.raises(InputError, match="stable: expected 5 values"):
+        curve([1, 0], [])
+    with pytest.raises(InputError, match="after point 9"):
+        curve(None, [EventRow("LP", 9, 1.0, 1.0)])
+    with pytest.raises(InputError, match="free parameter 'q'"):
+        branch_dataset(X, X, parameters={"p": 1.0}, free="q")
+
+
+def test_a_parameter_may_have_any_name():
+    dataset = branch_dataset(X, X, parameters={"amplitude": X, "error": 3.0}, free="amplitude")
+    assert list(dataset["amplitude"].to_numpy()) == list(X)
+    assert described(dataset, "error") == [([3.0] * 5, None)]
