@@ -1,4 +1,4 @@
-"""Are the derivatives of an element those of its force? A check by finite differences, for whoever writes an element."""
+"""Are the derivatives of an element those of its force? Finite differences answer, for whoever writes an element."""
 
 from __future__ import annotations
 
@@ -61,8 +61,9 @@ def check_derivatives(
 ) -> DerivativeReport:
     """Compare every derivative that an element provides with central differences of fourth order.
 
-    `u`, `v` (N,): where to look (default: around the gaps or sharp points, on both sides of each). Instants closer to a
-    corner of a piecewise-linear law than the step are left out. `parameters` gives the element's expressions their numbers.
+    `u`, `v` (N,): where to look (default: around the gaps or sharp points, on both sides of each). Those closer to
+    a corner of a piecewise-linear law than the step are left out. `parameters` gives the element's expressions their
+    numbers. Errors are relative to the largest value that the derivative takes there; `rtol` bounds them.
     """
     c = element.coefficient_values(parameters or {})
     points, widths = _features(element, c)
@@ -205,9 +206,7 @@ class _Check:
 
                 self._compare(f"f_cc[{other}, {name}]", f_cc[j, i], slope, step)
 
-    def _compare(
-        self, name: str, exact: Array, law: Callable[[float], Array], step: float, scale: float = 0.0
-    ) -> None:
+    def _compare(self, name: str, exact: Array, law: Callable[[float], Array], step: float, scale: float = 0.0) -> None:
         difference = (8.0 * (law(step) - law(-step)) - (law(2.0 * step) - law(-2.0 * step))) / (12.0 * step)
         size = max(float(np.max(np.abs(exact))), scale / step if scale else 0.0)
         noise = 1e-9 * float(np.max(np.abs(law(0.0)))) / step  # what differences of a constant would show

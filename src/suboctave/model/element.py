@@ -1,9 +1,9 @@
 """The contract of an element: a force `f(u, v; c)` along one direction of the structure.
 
-An element acts on the relative displacement `u = d . x` and velocity `v = d . x'` with the force `d f(u, v; c)` on the left-hand
-side of the equation of motion. Its coefficients `c` are numbers or expressions in the system's parameters. A new element
-is a subclass that passes its coefficients to `Element.__init__` and provides the laws below as pure functions of arrays;
-`check_derivatives` compares them with finite differences.
+An element acts on the relative displacement `u = d . x` and velocity `v = d . x'` with the force `d f(u, v; c)` on the
+left-hand side of the equation of motion. Its coefficients `c` are numbers or expressions in the system's parameters. A
+new element is a subclass that passes its coefficients to `Element.__init__` and provides the laws below as pure
+functions of arrays; `check_derivatives` compares them with finite differences.
 """
 
 from __future__ import annotations
@@ -37,9 +37,10 @@ class Place:
         self.vector: Array | None = None if direction is None else self._read_vector(direction)
 
     def _read_dofs(self, dof: Dof) -> tuple[int, ...]:
-        entries = tuple(dof) if isinstance(dof, Sequence | np.ndarray) and not isinstance(dof, str) else (dof,)
+        given: Any = dof
+        entries = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
         try:
-            dofs = tuple(operator.index(entry) for entry in entries)  # type: ignore[arg-type]
+            dofs = tuple(operator.index(entry) for entry in entries)
         except TypeError:
             raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}") from None
         if len(dofs) not in (1, 2) or any(isinstance(entry, bool) for entry in entries):

@@ -147,13 +147,13 @@ def _restore(text: str, by: tuple[str, ...]) -> Coefficient:
     return result
 
 
-def coefficient(source: float | int | str | Coefficient) -> Coefficient:
+def coefficient(source: Any) -> Coefficient:
     """A number, or a text such as `"2*zeta"`, as a `Coefficient`; an `InputError` that says what is not allowed."""
     if isinstance(source, Coefficient):
         return source
     if isinstance(source, str):
         return _parse(source)
-    if isinstance(source, numbers.Real) and not isinstance(source, bool):
+    if not isinstance(source, bool) and isinstance(source, numbers.Real):
         number = float(source)
         if not math.isfinite(number):
             raise InputError(f"a coefficient must be finite, not {number}")
@@ -318,9 +318,7 @@ def _scaled(factors: Mapping[str, float] | None, by: float) -> dict[str, float] 
     return None if factors is None else {name: by * factor for name, factor in factors.items()}
 
 
-def _operation(
-    operation: ast.operator, f: Evaluate, g: Evaluate, a: float | None, b: float | None
-) -> Evaluate | None:
+def _operation(operation: ast.operator, f: Evaluate, g: Evaluate, a: float | None, b: float | None) -> Evaluate | None:
     """The closure of a binary operation; a constant operand is bound into it."""
     match operation:
         case ast.Add():

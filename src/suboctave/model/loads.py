@@ -30,10 +30,11 @@ class LoadComponent:
 
 
 class HarmonicLoad:
-    """`amplitude cos(harmonic omega t + phase)` at `dof` (an index, a pair `(i, j)` for `e_i - e_j`) or along `direction`.
+    """A force `amplitude cos(harmonic omega t + phase)` on the right-hand side.
 
-    `amplitude`, `harmonic` and `phase` may be sequences of equal length: a sum of cosines; a single phase serves all of
-    them. `static` is a constant force. Amplitudes and phases may contain `omega` (unbalance: `"m*e*omega**2"`).
+    It acts at `dof` (an index, or a pair `(i, j)` for `e_i - e_j`) or along the vector `direction`. `amplitude`,
+    `harmonic` and `phase` may be sequences of equal length: a sum of cosines; a single phase serves all of them.
+    `static` is a constant force. Amplitudes and phases may contain `omega` (unbalance: `"m*e*omega**2"`).
     """
 
     def __init__(

@@ -15,9 +15,10 @@ _DENSE = 600  # degrees of freedom up to which eigenvalues are cheap
 
 
 def check_mass(mass: Any) -> None:
-    """Refuse a mass (n, n), dense or sparse, that is asymmetric, singular or indefinite, with the DOF at fault if one is.
+    """Refuse a mass (n, n), dense or sparse, that is asymmetric, singular or indefinite.
 
-    The matrix is judged after scaling its diagonal to one, so that degrees of freedom in other units do not matter.
+    The message names the degree of freedom at fault if one is. The matrix is judged after scaling its diagonal to one,
+    so that degrees of freedom in other units do not matter.
     """
     diagonal = np.asarray(mass.diagonal(), dtype=float)
     bad = np.flatnonzero(~(diagonal > 0.0))

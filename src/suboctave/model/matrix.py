@@ -83,7 +83,8 @@ def matrix_coefficient(source: Any, n: int | None = None, what: str = "matrix") 
     """Read a matrix: a number or an expression (n = 1), nested lists or an array mixing numbers and expressions, a
     sparse matrix, or a mapping `{expression: matrix}` for the sum of expression times matrix.
 
-    `n` is the size it must have, if that is known (the number 0 then stands for a matrix of zeros); `what` names it in messages.
+    `n` is the size it must have, if that is known (the number 0 then stands for a matrix of zeros); `what` names it in
+    messages.
     """
     if isinstance(source, MatrixCoefficient):
         result = source
@@ -100,6 +101,7 @@ def matrix_coefficient(source: Any, n: int | None = None, what: str = "matrix") 
 
 def _constant(source: Any, what: str) -> Any:
     """A square, finite matrix of numbers as a read-only float array, or in compressed-row form."""
+    matrix: Any
     if hasattr(source, "tocsr"):
         import scipy.sparse
 

@@ -1,11 +1,11 @@
-"""What an element tells about the smoothness of its law, so that whoever integrates it along a motion need not guess."""
+"""What an element tells about the smoothness of its law, so that whoever integrates it need not guess."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TypeAlias
 
-__all__ = ["AdaptiveSampling", "PiecewiseLinear", "Piece", "PolynomialSampling", "Sampling", "SharpSampling"]
+__all__ = ["AdaptiveSampling", "Piece", "PiecewiseLinear", "PolynomialSampling", "Sampling", "SharpSampling"]
 
 
 @dataclass(frozen=True)

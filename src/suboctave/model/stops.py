@@ -2,15 +2,15 @@
 
 Exact law of a right stop: `f = k (u - b)` for `u > b`, else 0; of a left stop: the same for `u < b`.
 
-Regularised (arctan) law with sharpness `s` (unit 1 / length), after Alcorta et al. 2019, Eq. (42), each stop with its own
-constant, so that its force at `u = 0` is that of the exact law. With `y = u - b` and
+Regularised (arctan) law with sharpness `s` (unit 1 / length), after Alcorta et al. 2019, Eq. (42), each stop with its
+own constant, so that its force at `u = 0` is that of the exact law. With `y = u - b` and
 
     phi(y) = y/2 + y atan(s y)/pi - ln(1 + s^2 y^2)/(2 pi s)
 
     right:  f = k [phi(y) - phi(-b) + max(-b, 0)]        left:  f = k [u - phi(y) + phi(-b) + min(-b, 0)]
 
-(the left law is the mirror image of the right one). At `b = 0` the constant has a corner as a function of `b`; its derivative
-is taken from the side where the stop is open at rest.
+(the left law is the mirror image of the right one). At `b = 0` the constant has a corner as a function of `b`; its
+derivative is taken from the side where the stop is open at rest.
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ _SIDES = {"right": 1, "left": -1}
 class ElasticStop(Element):
     """A one-sided spring: force `stiffness * (u - gap)` beyond the gap (`side="right"`: u > gap, `"left"`: u < gap).
 
-    With no `side`, a gap given as a negative number is a left stop; any other number, and every expression, a right stop.
-    The side is fixed here, so that a gap may move through zero (a preloaded stop). Exact by default; `regularization=s`
-    (1 / length) gives the arctan law of Alcorta et al. 2019, Eq. (42). Units: force / length, length.
+    With no `side`, a gap given as a negative number is a left stop; any other number, and every expression, a right
+    stop. The side is fixed here, so that a gap may move through zero (a preloaded stop). Exact by default;
+    `regularization=s` (1 / length) gives the arctan law of Alcorta et al. 2019, Eq. (42). Units: force / length,
+    length.
     """
 
-    coefficient_names = ("stiffness", "gap")
+    coefficient_names: tuple[str, ...] = ("stiffness", "gap")
 
     def __init__(
         self,
@@ -85,16 +86,18 @@ class ElasticStop(Element):
         if not self._side_given and gap.value(values) < 0.0:
             start = f"ElasticStop({self.place}, stiffness={self.coefficients[0].text}, gap={gap.text!r}"
             raise InputError(
-                f"{self.label}: the gap is {gap.value(values):g} at the system's parameters and no side is given. Write "
-                f'{start}, side="left") for a stop that acts below it, or {start}, side="right") for a preloaded stop '
-                f"that acts above it"
+                f"{self.label}: the gap is {gap.value(values):g} at the system's parameters and no side is given. "
+                f'Write {start}, side="left") for a stop that acts below it, or {start}, side="right") for a '
+                f"preloaded stop that acts above it"
             )
         if self.regularised:
             self._check_sharpness(self.coefficients[2].value(values))
 
     def _check_sharpness(self, s: float) -> None:
         if s <= 0.0:
-            raise InputError(f"{self.label}: regularization must be positive (1 / length; larger is sharper), not {s:g}")
+            raise InputError(
+                f"{self.label}: regularization must be positive (1 / length, larger is sharper), not {s:g}"
+            )
 
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gap with width 1/s."""

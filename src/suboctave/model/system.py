@@ -27,10 +27,10 @@ class System:
     """Mass, damping, stiffness, elements, loads and named parameters. Immutable.
 
     `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
-    numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite at
-    the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the left-hand side.
-    `loads`: a sequence of `HarmonicLoad`, on the right-hand side. `parameters`: `{name: number}`, every one of them
-    used somewhere. Units are the user's own, if they are consistent; frequencies are circular.
+    numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite
+    at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the
+    left-hand side. `loads`: a sequence of `HarmonicLoad`, on the right-hand side. `parameters`: `{name: number}`, every
+    one of them used somewhere. Units are the user's own, if they are consistent; frequencies are circular.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -167,7 +167,10 @@ class System:
     def matrix_derivatives(
         self, *names: str, values: Mapping[str, float] | None = None
     ) -> tuple[Array | None, Array | None, Array | None]:
-        """Derivatives of `(M, C, K)` by one or two parameters (two: the mixed second one); None where identically zero."""
+        """Derivatives of `(M, C, K)` by one parameter, or mixed ones by two; None where identically zero.
+
+        The other arguments and the shapes are those of `matrices`.
+        """
         if len(names) not in (1, 2):
             raise InputError(f"matrix_derivatives takes one or two names of parameters, got {len(names)}")
         for name in names:
@@ -200,7 +203,7 @@ class System:
 
     @property
     def observed_dof(self) -> int:
-        """The degree of freedom that is watched by default: where the first load acts most (a non-static one if any)."""
+        """The degree of freedom watched by default: where the first load acts most (a non-static one if any)."""
         for component in (*(c for c in self._components if c.harmonic > 0), *self._components):
             return int(np.argmax(np.abs(component.direction)))
         return 0
@@ -277,7 +280,7 @@ def _name(name: Any) -> str:
 
 
 def _number(name: str, value: Any) -> float:
-    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise InputError(f"parameter {name!r} must be a number, not {value!r}")
     number = float(value)
     if not math.isfinite(number):

@@ -1,0 +1,173 @@
+"""Systems from the literature, with the numbers of their sources: for examples, tests and comparisons.
+
+Every function returns a `System` whose parameters have the names of its arguments, so that each can be continued or
+tracked.
+"""
+
+from __future__ import annotations
+
+import math
+
+from suboctave.errors import InputError
+from suboctave.model.loads import HarmonicLoad
+from suboctave.model.springs import CubicSpring
+from suboctave.model.stops import ElasticStop
+from suboctave.model.system import System
+
+__all__ = [
+    "duffing",
+    "nltva",
+    "nondimensional",
+    "reference_oscillator",
+    "reference_oscillator_physical",
+    "two_mass_unilateral",
+]
+
+
+def reference_oscillator(
+    zeta: float = 0.03,
+    alpha: float = 0.16,
+    Kc: float = 4.7,
+    j: float = 0.0,
+    p: float = 0.55,
+    regularization: float | None = None,
+) -> System:
+    """A rattling oscillator between two stops, `x'' + 2 zeta x' + x + alpha x^3 + Fc(x) = p cos(omega t)`, no units.
+
+    `Fc = Kc [(x + 1) H(-x - 1) + (x - j) H(x - j)]`: the left gap is the unit of length, `j` the ratio of the gaps.
+    `regularization`: the sharpness of the arctan law (3000 in the source), None for the exact law. Source: Alcorta,
+    Baguet, Prabel, Piteau, Jacquet-Richardet, Nonlinear Dynamics 98 (2019), Eqs. (40) to (42), Table 1, with the sign
+    of the first Heaviside function mended.
+    """
+    return System(
+        mass=1.0,
+        damping="2*zeta",
+        stiffness=1.0,
+        elements=[
+            CubicSpring(dof=0, coefficient="alpha"),
+            ElasticStop(dof=0, stiffness="Kc", gap="j", side="right", regularization=regularization),
+            ElasticStop(dof=0, stiffness="Kc", gap=-1.0, regularization=regularization),
+        ],
+        loads=[HarmonicLoad(dof=0, amplitude="p")],
+        parameters={"zeta": zeta, "alpha": alpha, "Kc": Kc, "j": j, "p": p},
+        name="reference oscillator",
+    )
+
+
+def reference_oscillator_physical(
+    m: float,
+    c: float,
+    k: float,
+    alpha: float,
+    kc: float,
+    gap1: float,
+    gap2: float,
+    force: float,
+    regularization: float | None = None,
+) -> System:
+    """The reference oscillator in physical units, `m x'' + c x' + k x + alpha x^3 + Fc(x) = force cos(omega t)`.
+
+    Stops of stiffness `kc` at `x = -gap1` (left) and `x = gap2` (right). `regularization` in 1 / length. Source:
+    Alcorta et al. 2019, Eq. (38).
+    """
+    return System(
+        mass="m",
+        damping="c",
+        stiffness="k",
+        elements=[
+            CubicSpring(dof=0, coefficient="alpha"),
+            ElasticStop(dof=0, stiffness="kc", gap="gap2", side="right", regularization=regularization),
+            ElasticStop(dof=0, stiffness="kc", gap="-gap1", side="left", regularization=regularization),
+        ],
+        loads=[HarmonicLoad(dof=0, amplitude="force")],
+        parameters={
+            "m": m, "c": c, "k": k, "alpha": alpha, "kc": kc, "gap1": gap1, "gap2": gap2, "force": force,
+        },
+        name="reference oscillator (physical)",
+    )  # fmt: skip
+
+
+def nondimensional(
+    m: float,
+    c: float,
+    k: float,
+    alpha: float,
+    kc: float,
+    gap1: float,
+    gap2: float,
+    force: float,
+    regularization: float | None = None,
+) -> dict[str, float | None]:
+    """Arguments of `reference_oscillator` for the numbers of `reference_oscillator_physical`.
+
+    Lengths are measured in `gap1` (which must not be zero), frequencies in `sqrt(k/m)`: a motion `x(t)` of the physical
+    system at `omega` is `gap1` times the motion of the other one at `omega / sqrt(k/m)`. Source: Alcorta et al. 2019,
+    Eq. (39).
+    """
+    for name, value in (("m", m), ("k", k), ("gap1", gap1)):
+        if not value > 0.0:
+            raise InputError(f"{name} must be positive to serve as a unit, not {value}")
+    return {
+        "zeta": c / (2.0 * math.sqrt(k * m)),
+        "alpha": alpha * gap1**2 / k,
+        "Kc": kc / k,
+        "j": gap2 / gap1,
+        "p": force / (k * gap1),
+        "regularization": None if regularization is None else regularization * gap1,
+    }
+
+
+def duffing(c: float = 0.05, k: float = 1.0, alpha: float = 1.0, F: float = 1.0, m: float = 1.0) -> System:
+    """Duffing's oscillator, `m x'' + c x' + k x + alpha x^3 = F cos(omega t)`; softening if `alpha` is negative."""
+    return System(
+        mass="m",
+        damping="c",
+        stiffness="k",
+        elements=[CubicSpring(dof=0, coefficient="alpha")],
+        loads=[HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"m": m, "c": c, "k": k, "alpha": alpha, "F": F},
+        name="Duffing oscillator",
+    )
+
+
+def nltva(F: float = 0.11) -> System:
+    """A Duffing oscillator with a nonlinear tuned vibration absorber (DOF 1), forced at DOF 0.
+
+    The absorber is designed by the generalised equal-peak rule for a mass ratio of 5 %: Habib, Detroux, Viguié,
+    Kerschen, Mechanical Systems and Signal Processing 52-53 (2015); its response, quasi-periodic motions and isola:
+    Detroux, Habib, Masset, Kerschen, the same journal 60-61 (2015). No units.
+    """
+    return System(
+        mass=[["m1", 0.0], [0.0, "m2"]],
+        damping=[["c1 + c2", "-c2"], ["-c2", "c2"]],
+        stiffness=[["k1 + k2", "-k2"], ["-k2", "k2"]],
+        elements=[CubicSpring(dof=0, coefficient="knl1"), CubicSpring(dof=(0, 1), coefficient="knl2")],
+        loads=[HarmonicLoad(dof=0, amplitude="F")],
+        parameters={
+            "m1": 1.0, "c1": 0.002, "k1": 1.0, "knl1": 1.0,
+            "m2": 0.05, "c2": 0.0128, "k2": 0.0454, "knl2": 0.0042,
+            "F": F,
+        },
+        name="nonlinear tuned vibration absorber",
+    )  # fmt: skip
+
+
+def two_mass_unilateral(
+    F: float = 0.1, Kc: float = 100.0, gap: float = 1.0, damping: float = 0.03, regularization: float | None = None
+) -> System:
+    """Two unit masses in a row, one of them against a stiff one-sided spring.
+
+    DOF 0 hangs on DOF 1 by a unit spring, DOF 1 on the ground by another; both have a dashpot `damping`. A stop of
+    stiffness `Kc` limits DOF 0 to the right; `F cos(omega t)` acts on DOF 1. No units. Source: M. Krack, J. Gross,
+    Harmonic Balance for Nonlinear Vibration Problems, Springer 2019, and example 3 of its toolbox NLvib (omega from 0.5
+    to 0.8, with limit points, period doublings and Neimark-Sacker points).
+    """
+    return System(
+        mass=[[1.0, 0.0], [0.0, 1.0]],
+        damping=[["damping", "-damping"], ["-damping", "2*damping"]],
+        stiffness=[[1.0, -1.0], [-1.0, 2.0]],
+        elements=[ElasticStop(dof=0, stiffness="Kc", gap="gap", side="right", regularization=regularization)],
+        loads=[HarmonicLoad(dof=1, amplitude="F")],
+        parameters={"damping": damping, "Kc": Kc, "gap": gap, "F": F},
+        name="two masses with a one-sided stop",
+    )
