@@ -59,8 +59,8 @@ def response_panels(
 ) -> Figure:
     """Several frames side by side on the same axes, with one legend for all of them.
 
-    Each entry of `panels` is what `response_figure` takes; `labels` and `titles` have one entry for each panel. Saved to
-    `path` where one is given.
+    Each entry of `panels` is what `response_figure` takes; `labels` and `titles` have one entry for each panel. Saved
+    to `path` where one is given.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

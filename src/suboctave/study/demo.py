@@ -1,0 +1,97 @@
+"""The demonstration: response curves of an oscillator that rattles between two stops.
+
+`x'' + 2 zeta x' + x + alpha x^3 + Fc(x) = p cos(omega t)`, two stops at -1 and j, in the regularised form with
+s = 3000, for the three cases of Figs 6 and 7 of Alcorta, Baguet, Prabel, Piteau, Jacquet-Richardet, Nonlinear Dynamics
+98 (2019): weak forcing with equal gaps, weak forcing with one gap closed, strong forcing with one gap closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from suboctave.pictures import response_figure, response_panels
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["CASES", "OMEGA", "REGULARIZATION", "Case", "Curve", "compute", "draw", "event_lines"]
+
+OMEGA = (4.5, 1.25)
+REGULARIZATION = 3000.0
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One response curve of the demonstration: forcing amplitude `p`, right gap `j` (the left gap is 1)."""
+
+    title: str
+    p: float
+    j: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A case with its computed curve, laid out as a dataset, and the seconds that it took."""
+
+    case: Case
+    dataset: xarray.Dataset
+    seconds: float
+
+
+CASES = (
+    Case("weak forcing, equal gaps", 0.55, 1.0),
+    Case("weak forcing, one gap closed", 0.55, 0.0),
+    Case("strong forcing, one gap closed", 1.7, 0.0),
+)
+
+
+def compute(case: Case, progress: Progress | None = None) -> Curve:
+    """The response curve of one case, with stability and located bifurcations; `progress(fraction, text)` is called."""
+    from suboctave.analysis import frequency_response
+    from suboctave.model import library
+
+    begin = perf_counter()
+    system = library.reference_oscillator(p=case.p, j=case.j, regularization=REGULARIZATION)
+    branch = frequency_response(system, omega=OMEGA, progress=progress)
+    return Curve(case, branch.to_xarray(), perf_counter() - begin)
+
+
+def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:
+    """Two figures in `folder`, PNG: weak forcing with its two cases side by side, and strong forcing."""
+    weak = [curve for curve in curves if curve.case.p < 1.0]
+    strong = [curve for curve in curves if curve.case.p >= 1.0]
+    files: list[Path] = []
+    if weak:
+        titles = [
+            f"({letter}) $p = {c.case.p:g}$, $j = {c.case.j:g}$" for letter, c in zip("abcdef", weak, strict=False)
+        ]
+        files.append(folder / "weak_forcing.png")
+        response_panels([curve.dataset for curve in weak], files[-1], titles=titles)
+    if strong:
+        title = ", ".join(f"$p = {c.case.p:g}$, $j = {c.case.j:g}$" for c in strong)
+        files.append(folder / "strong_forcing.png")
+        response_figure([curve.dataset for curve in strong], files[-1], title=title)
+    return files
+
+
+def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]:
+    """The located bifurcations as text: kind, omega, max |x|, critical multiplier, residual."""
+    columns = (dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual"))
+    return [
+        (str(kind), f"{omega:.8f}", f"{amplitude:.7f}", _complex_text(complex(multiplier)), f"{residual:.0e}")
+        for kind, omega, amplitude, multiplier, residual in zip(*columns, strict=True)
+    ]
+
+
+def _complex_text(value: complex) -> str:
+    if value != value:  # not computed
+        return "-"
+    if abs(value.imag) < 5e-7 * abs(value):
+        return f"{value.real:+.6f}"
+    return f"{value.real:+.6f} ± {abs(value.imag):.6f}i"

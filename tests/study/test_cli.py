@@ -1,0 +1,106 @@
+"""The command line: what it prints, where it writes, and that a failure is one sentence."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import suboctave
+from suboctave.store.layout import EventRow, branch_dataset
+from suboctave.study import cli, demo
+
+
+def run(*arguments, check=0, cwd=None):
+    done = subprocess.run(
+        [sys.executable, "-m", "suboctave", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        cwd=cwd,
+    )
+    assert done.returncode == check, done.stdout + done.stderr
+    return done
+
+
+def curve_of(case):
+    omega = np.linspace(4.5, 1.25, 200)
+    rows = [
+        EventRow("PD", 30, 3.99, 0.2, 3e-13, -1.0 + 0j),
+        EventRow("NS", 60, 3.5, 0.3, 4e-14, complex(0.6, 0.8)),
+        EventRow("LP", 120, 2.5, 4.0 * case.p, 1e-12),
+    ]
+    dataset = branch_dataset(
+        omega,
+        1 / (1 + (omega - 2) ** 2) * case.p,
+        stable=omega < 3,
+        parameters={"p": case.p, "j": case.j},
+        events=rows,
+        ended="omega reached 1.25, the end of its range.",
+    )
+    return demo.Curve(case, dataset, 0.25)
+
+
+@pytest.fixture
+def computed(monkeypatch):
+    monkeypatch.setattr(demo, "compute", lambda case, progress=None: curve_of(case))
+
+
+def test_version():
+    assert run("--version").stdout.strip() == f"suboctave {suboctave.__version__}"
+
+
+def test_help_names_the_demo():
+    assert "demo" in run("--help").stdout
+
+
+def test_a_mistyped_command_is_one_message():
+    done = run("dmeo", check=2)
+    assert "dmeo" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_folder_that_cannot_be_made_is_known_before_the_work(tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    done = run("demo", "--out", str(tmp_path / "taken"), check=1)
+    assert done.stderr.startswith("suboctave: ")
+    assert "Traceback" not in done.stderr
+    assert not done.stdout
+
+
+def test_the_demo_prints_tables_of_80_columns_and_writes_figures(computed, tmp_path, capsys):
+    cli.run_demo(tmp_path / "new")
+    printed = capsys.readouterr()
+    assert not printed.err  # nobody watches: no bar
+    assert max(map(len, printed.out.splitlines()[:-2])) <= 80
+    assert len(re.findall(r"^ *PD +3\.99000000 +0\.2000000 +-1\.000000 +3e-13 *$", printed.out, re.MULTILINE)) == 3
+    assert len(re.findall(r"^ *NS .*\+0\.600000 ± 0\.800000i", printed.out, re.MULTILINE)) == 3
+    assert printed.out.count("omega reached 1.25, the end of its range.") == 3
+    for name in ("weak_forcing.png", "strong_forcing.png"):
+        assert (tmp_path / "new" / name).read_bytes().startswith(b"\x89PNG")
+        assert name in printed.out
+
+
+def test_an_error_of_ours_is_one_sentence(monkeypatch, capsys):
+    def refuse():
+        raise suboctave.ConvergenceError("no motion found at omega = 4.5; give a start")
+
+    monkeypatch.setattr(cli, "application", lambda: refuse)
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    assert stop.value.code == 1
+    assert capsys.readouterr().err == "suboctave: no motion found at omega = 4.5; give a start\n"
+
+
+def test_ctrl_c_has_the_status_a_shell_expects(monkeypatch, capsys):
+    def stop():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "application", lambda: stop)
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 130
