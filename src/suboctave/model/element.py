@@ -125,8 +125,11 @@ class Element(ABC):
             c[i] = source.value(values)
         return c
 
-    def check(self, values: Mapping[str, float]) -> None:  # noqa: B027 - most elements have nothing to refuse
-        """Refuse coefficients that make no sense at a system's parameters (called once, when a system is made)."""
+    def check(self, values: Mapping[str, float], first: bool) -> None:  # noqa: B027 - most have nothing to refuse
+        """Refuse coefficients that make no sense at a system's parameters.
+
+        Called with `first=True` when a system is made, with False when it is given other parameters.
+        """
 
     @abstractmethod
     def sampling(self, c: Array) -> Sampling:

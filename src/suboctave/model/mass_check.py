@@ -80,5 +80,6 @@ def _lowest(scaled: Any) -> float:
         )
     except RuntimeError:  # exactly singular
         return 0.0
-    pivots = factors.U.diagonal()
-    return float(pivots.min())
+    if np.any(factors.perm_r != factors.perm_c):  # a zero on the diagonal had to be avoided: indefinite
+        return -1.0
+    return float(factors.U.diagonal().min())

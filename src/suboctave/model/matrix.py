@@ -131,6 +131,8 @@ def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
     array = _object_array(source, what)
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
         raise InputError(f"{what} must be square, not of shape {array.shape}")
+    if array.dtype != object:
+        return MatrixCoefficient(_constant(array, what), (), what)
     base = np.zeros(array.shape)
     patterns: dict[Coefficient, Array] = {}
     for (i, j), entry in np.ndenumerate(array):

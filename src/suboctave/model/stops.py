@@ -15,6 +15,7 @@ derivative is taken from the side where the stop is open at rest.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -68,7 +69,6 @@ class ElasticStop(Element):
             side = "left" if negative else "right"
         self.side = side
         self._sign = _SIDES[side]
-        self._kernel: Callable[..., Any] | None = None
         if self.regularised and self.coefficients[2].constant:
             self._check_sharpness(self.coefficients[2].value({}))
 
@@ -80,10 +80,10 @@ class ElasticStop(Element):
     def _options(self) -> list[str]:
         return [f"side={self.side!r}"]
 
-    def check(self, values: Mapping[str, float]) -> None:
-        """Refuse an ambiguous side and a sharpness that is not positive."""
+    def check(self, values: Mapping[str, float], first: bool) -> None:
+        """Refuse a sharpness that is not positive and, when a system is made, an ambiguous side."""
         gap = self.coefficients[1]
-        if not self._side_given and gap.value(values) < 0.0:
+        if first and not self._side_given and gap.value(values) < 0.0:
             start = f"ElasticStop({self.place}, stiffness={self.coefficients[0].text}, gap={gap.text!r}"
             raise InputError(
                 f"{self.label}: the gap is {gap.value(values):g} at the system's parameters and no side is given. "
@@ -110,11 +110,8 @@ class ElasticStop(Element):
         if not self.regularised:
             slope = c[0] * self._contact(u, c)
             return slope * (u - c[1]), slope, None
-        if self._kernel is None:
-            from suboctave.model.stop_kernel import regularised_tangent
-
-            self._kernel = regularised_tangent
-        force, slope = self._kernel(u, c[0], c[1], c[2], self._sign, self._at_rest(c[1], c[2]))
+        k, b, s = c
+        force, slope = _kernel()(np.ascontiguousarray(u), k, b, s, self._sign, self._at_rest(b, s))
         return force, slope, None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
@@ -164,6 +161,13 @@ class ElasticStop(Element):
         sign = self._sign
         preloaded = 1.0 if sign * b < 0.0 else 0.0
         return sign * (_phi_y(-b, s) - _phi_y(y, s)) - preloaded
+
+
+@functools.cache
+def _kernel() -> Callable[..., tuple[Array, Array]]:
+    from suboctave.model.stop_kernel import regularised_tangent
+
+    return regularised_tangent
 
 
 def _phi(y: float, s: float) -> float:

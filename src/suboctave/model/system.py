@@ -67,8 +67,6 @@ class System:
         )
         self._check_names()
         self._check_values(self.parameters)
-        for element in self.elements:
-            element.check(self.parameters)
 
     def _fill(
         self,
@@ -154,7 +152,10 @@ class System:
                     source.value(self.parameters)
                 except InputError as error:
                     raise InputError(f"{where}: {error}") from None
-        if changed is self.parameters or self.mass.names.intersection(changed):
+        first = changed is self.parameters
+        for element in self.elements:
+            element.check(self.parameters, first)
+        if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
             check_mass(mass)
 
