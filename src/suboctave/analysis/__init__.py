@@ -1,0 +1,7 @@
+"""What a user calls: response curves, curves along any parameter, stability and verification of single motions."""
+
+from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.verbs import continue_branch, frequency_response
+from suboctave.analysis.verification import Verification, stability, verify
+
+__all__ = ["Branch", "BranchPoint", "Verification", "continue_branch", "frequency_response", "stability", "verify"]

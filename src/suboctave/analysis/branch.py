@@ -1,0 +1,177 @@
+"""A computed branch: its points, its bifurcations, and why it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation, BifurcationList
+from suboctave.continuation.problem import Array
+from suboctave.errors import InputError, suggest
+from suboctave.floquet import FloquetResult
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.system import System
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """One point of a branch: orbit, multipliers, position in scaled arclength, Newton iterations."""
+
+    orbit: PeriodicOrbit
+    floquet: FloquetResult
+    arclength: float
+    iterations: int
+
+
+class Branch:
+    """A curve of periodic motions along one free parameter.
+
+    Attributes
+    ----------
+    system, name
+        What vibrates, and the free parameter's name.
+    observe
+        DOF whose amplitude is reported.
+    bifurcations, events
+        Located bifurcations, and the user's events, in the order met.
+    closed, ended
+        Whether the curve closed on itself, and a sentence saying why it ended.
+    options
+        Everything it was computed with.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        name: str,
+        points: list[BranchPoint],
+        bifurcations: list[Bifurcation],
+        events: list[Bifurcation],
+        closed: bool,
+        ended: str,
+        observe: int,
+        options: Mapping[str, Any],
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        self.system = system
+        self.name = name
+        self.points = tuple(points)
+        self.bifurcations = BifurcationList(bifurcations)
+        self.events = BifurcationList(events, tuple({e.kind for e in events}))
+        self.closed = closed
+        self.ended = ended
+        self.observe = observe
+        self.options = dict(options)
+        self.warnings = warnings
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def orbits(self) -> list[PeriodicOrbit]:
+        """The motions, in the order they were computed."""
+        return [p.orbit for p in self.points]
+
+    @cached_property
+    def omega(self) -> Array:
+        """Circular frequency of the load, shape (len,)."""
+        return np.array([p.orbit.omega for p in self.points])
+
+    def parameter(self, name: str) -> Array:
+        """Values of omega or a parameter along the branch, shape (len,).
+
+        Raises
+        ------
+        InputError
+            If there is no parameter of that name.
+        """
+        if name == "omega":
+            return self.omega
+        if name not in self.system.parameters:
+            raise InputError(f"unknown parameter {name!r}{suggest(name, ['omega', *self.system.parameters])}")
+        return np.array([p.orbit.values[name] for p in self.points])
+
+    @cached_property
+    def amplitude(self) -> Array:
+        """Largest |x| of the observed DOF over one response period, shape (len,)."""
+        return np.array([p.orbit.amplitude(self.observe) for p in self.points])
+
+    def harmonic(self, k: float, dof: int | None = None) -> ComplexArray:
+        """Complex amplitude of the component at `k omega` (of the observed DOF unless told), shape (len,)."""
+        where = self.observe if dof is None else dof
+        return np.array([p.orbit.harmonic(k, where) for p in self.points])
+
+    @cached_property
+    def stable(self) -> np.ndarray:
+        """Whether each motion is stable, shape (len,), bool."""
+        return np.array([p.floquet.stable for p in self.points])
+
+    @cached_property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers over the response period, by descending modulus, shape (len, 2 n)."""
+        return np.array([p.floquet.multipliers for p in self.points])
+
+    @cached_property
+    def arclength(self) -> Array:
+        """Distance along the branch in scaled arclength, shape (len,)."""
+        return np.array([p.arclength for p in self.points])
+
+    @cached_property
+    def truncation(self) -> Array:
+        """Estimated size of the neglected harmonics relative to the motion, shape (len,)."""
+        return np.array([p.orbit.truncation for p in self.points])
+
+    @cached_property
+    def harmonics(self) -> np.ndarray:
+        """Highest multiple of the base frequency used at each point, shape (len,), int."""
+        return np.array([p.orbit.basis.harmonics for p in self.points])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The branch as a labelled dataset: points, events, and what produced them."""
+        from suboctave.store.layout import branch_dataset
+
+        return branch_dataset(self)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: parameters, amplitude, stability, leading multiplier, errors."""
+        import pandas as pd
+
+        leading = self.multipliers[:, 0]
+        columns: dict[str, Any] = {"omega": self.omega}
+        if self.name != "omega":
+            columns[self.name] = self.parameter(self.name)
+        columns |= {
+            "amplitude": self.amplitude,
+            "stable": self.stable,
+            "multiplier_real": leading.real,
+            "multiplier_imag": leading.imag,
+            "arclength": self.arclength,
+            "harmonics": self.harmonics,
+            "truncation": self.truncation,
+            "residual": [p.orbit.residual for p in self.points],
+        }
+        return pd.DataFrame(columns)
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given."""
+        from suboctave.pictures import plot_response
+
+        return plot_response(self.to_xarray(), path=path, **options)
+
+    def __repr__(self) -> str:
+        values = self.parameter(self.name)
+        span = f"{self.name} from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
+        unstable = int(np.count_nonzero(~self.stable)) if len(self) else 0
+        text = f"Branch: {len(self)} points ({unstable} unstable), {span}; {self.ended}."
+        for warning in self.warnings:
+            text += f"\n  note: {warning}"
+        return text + "\n" + repr(self.bifurcations)

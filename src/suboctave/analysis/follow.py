@@ -1,0 +1,268 @@
+"""Following a response curve: points, stability, located bifurcations and events, until it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from suboctave.analysis.branch import BranchPoint
+from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
+from suboctave.bifurcation import ALL_KINDS, Bifurcation, Sample
+from suboctave.bifurcation.finder import Located, locate
+from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
+from suboctave.continuation.events import locate_zero
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError
+from suboctave.floquet import floquet_multipliers
+from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.selection import choose_harmonics, neglected_motion, truncation
+
+#: two changes in one step are separated by halving it, down to this distance in scaled arclength
+_SEPARATE = 2e-3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a curve is followed and what is reported."""
+
+    newton: NewtonOptions
+    stepping: SteppingOptions
+    events: Sequence[Event] = ()
+    observe: int = 0
+    report: Callable[[float, str], None] | None = None
+    context: object = None
+
+
+@dataclass
+class Trace:
+    """What following a curve in one direction gave."""
+
+    points: list[BranchPoint] = field(default_factory=list)
+    bifurcations: list[Bifurcation] = field(default_factory=list)
+    events: list[Bifurcation] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    closed: bool = False
+    ended: str = ""
+
+    def reversed_before(self, other: Trace) -> Trace:
+        """This trace walked backwards, then `other`, which started from the same point."""
+        length = self.points[-1].arclength
+        back = [replace(p, arclength=length - p.arclength) for p in reversed(self.points)]
+        on = [replace(p, arclength=length + p.arclength) for p in other.points[1:]]
+
+        def joined(first: list[Bifurcation], second: list[Bifurcation]) -> list[Bifurcation]:
+            flipped = [replace(b, arclength=length - b.arclength) for b in reversed(first)]
+            return flipped + [replace(b, arclength=length + b.arclength) for b in second]
+
+        return Trace(
+            back + on,
+            joined(self.bifurcations, other.bifurcations),
+            joined(self.events, other.events),
+            self.warnings + other.warnings,
+            other.closed,
+            other.ended if self.ended == other.ended else f"{self.ended} in one direction, {other.ended} in the other",
+        )
+
+
+def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> Trace:
+    """Follow a response curve from a solved start; KeyboardInterrupt ends it politely."""
+    return _Follower(start, direction, bounds, settings).run()
+
+
+class _Follower:
+    def __init__(self, start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> None:
+        self.settings = settings
+        self.bounds = bounds
+        self.direction = direction
+        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._separated)
+        self.trace = Trace()
+        self.previous: Sample | None = None
+        self._candidate: Sample | None = None
+
+    def run(self) -> Trace:
+        trace = self.trace
+        try:
+            for point in self.march:
+                self._accept(point)
+            trace.closed, trace.ended = self.march.closed, self.march.ended
+        except KeyboardInterrupt:
+            where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
+            trace.ended = f"interrupted at {where}; what was computed is kept"
+        if trace.closed:
+            _drop_seam(trace.bifurcations)
+            _drop_seam(trace.events)
+        return trace
+
+    def _sample(self, point: CurvePoint) -> Sample:
+        candidate = self._candidate
+        if candidate is not None and candidate.point is point:
+            return candidate
+        assert isinstance(point.evaluation, ResponseEvaluation)
+        return Sample(point, point.evaluation.state)
+
+    def _separated(self, a: CurvePoint, b: CurvePoint) -> bool:
+        """True if at most one test changes in a step, or the step is short already."""
+        self._candidate = new = self._sample(b)
+        if self.previous is None or b.arclength - a.arclength < _SEPARATE:
+            return True
+        changes = sum(kind.changed(self.previous, new) for kind in ALL_KINDS)
+        return changes <= 1 and abs(self.previous.floquet.unstable - new.floquet.unstable) <= 2
+
+    def _accept(self, point: CurvePoint) -> None:
+        sample = self._sample(point)
+        if self.previous is not None:
+            self._search(self.previous, sample)
+        self.trace.points.append(
+            BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations)
+        )
+        self.previous = sample
+        report = self.settings.report
+        if report is not None:
+            low, high = self.bounds
+            share = (point.parameter - low) / (high - low)
+            report(min(1.0, max(0.0, share if self.direction > 0 else 1.0 - share)), point.curve.where(point.u))
+
+    def _orbit(self, sample: Sample) -> PeriodicOrbit:
+        evaluation = sample.point.evaluation
+        assert isinstance(evaluation, ResponseEvaluation)
+        state = sample.state
+        return PeriodicOrbit(
+            state.balance, state.x.copy(), state.omega, dict(state.values), evaluation.error, evaluation.truncation
+        )
+
+    def _search(self, a: Sample, b: Sample) -> None:
+        found: list[tuple[float, Bifurcation]] = []
+        branch_point = None
+        for kind in ALL_KINDS:
+            if not kind.changed(a, b):
+                continue
+            if kind.name == "LP" and branch_point is not None:
+                # at a pitchfork the bifurcating branch turns back exactly at the branch point
+                continue
+            located = locate(kind, a, b, self.settings.newton, self._sample, _guess)
+            if located is None:
+                continue
+            item = self._bifurcation(located, a, b)
+            found.append((located.fraction, item))
+            if kind.name == "BP":
+                branch_point = item
+        self._check_count(a, b, [item for _, item in found])
+        self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
+        for event in self.settings.events:
+            crossed = self._event(event, a, b)
+            if crossed is not None:
+                self.trace.events.append(crossed)
+
+    def _check_count(self, a: Sample, b: Sample, found: list[Bifurcation]) -> None:
+        """The number of unstable multipliers must have changed by what the bifurcations explain."""
+        if not (a.floquet.decided and b.floquet.decided):
+            return
+        odd = sum(item.kind in ("LP", "PD", "BP") for item in found)
+        pairs = sum(item.kind == "NS" for item in found)
+        change = abs(b.floquet.unstable - a.floquet.unstable)
+        if change > odd + 2 * pairs or (change - odd) % 2:
+            where = f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)}"
+            names = ", ".join(item.kind for item in found) or "none"
+            self.trace.warnings.append(
+                f"{where} the number of unstable multipliers changes from {a.floquet.unstable} to {b.floquet.unstable}, "
+                f"which the bifurcations located there ({names}) do not explain; a smaller max_step may resolve it"
+            )
+
+    def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
+        arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
+        curve = b.point.curve
+        assert isinstance(curve, ResponseCurve)
+        if located.solution is None:
+            orbit = self._orbit(located.sample)
+            self.trace.warnings.append(
+                f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, to +- {located.width:.1e}: "
+                "the motion probably grazes a contact there"
+            )
+            return Bifurcation(
+                located.kind.name, orbit, located.sample.floquet, orbit.residual, orbit.amplitude(self.settings.observe),
+                curve.name, uncertainty=located.width, arclength=arclength, context=self.settings.context,
+            )
+        solution = self._refined(located, located.solution, curve)
+        state = solution.state
+        neglected = truncation(state, neglected_motion(state))
+        orbit = PeriodicOrbit(state.balance, state.x.copy(), state.omega, dict(state.values), solution.residual, neglected)
+        return Bifurcation(
+            located.kind.name, orbit, floquet_multipliers(state), solution.residual,
+            orbit.amplitude(self.settings.observe), curve.name, solution.vectors, solution.kappa,
+            arclength=arclength, context=self.settings.context,
+        )
+
+    def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
+        """Solved again with the harmonics that the tolerance for events asks for."""
+        adaptive = curve.adaptive
+        if adaptive is None:
+            return solution
+        for _ in range(8):
+            state = solution.state
+            basis = choose_harmonics(state, neglected_motion(state), adaptive, adaptive.event_tolerance)
+            if basis.harmonics <= state.basis.harmonics:
+                break
+            finer = curve.with_basis(basis)
+            x = state.basis.resized(state.x, basis)
+            guess = Guess(finer.balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)
+            try:
+                better = located.kind.solve(guess)
+            except ConvergenceError as failure:
+                self.trace.warnings.append(
+                    f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} harmonics; "
+                    f"with {basis.harmonics} it was not found again ({failure})"
+                )
+                break
+            moved = abs(better.state.omega - state.omega) / state.omega
+            if moved > 0.05:
+                self.trace.warnings.append(
+                    f"{located.kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
+                    "harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
+                )
+                break
+            solution = better
+        return solution
+
+    def _event(self, event: Event, a: Sample, b: Sample) -> Bifurcation | None:
+        value_a, value_b = event.function(self._orbit(a)), event.function(self._orbit(b))
+        if not (value_a == 0.0 and a.point.arclength == 0.0) and not value_a * value_b < 0.0 and value_b != 0.0:
+            return None
+        try:
+            point = locate_zero(
+                a.point, b.point, value_a, value_b, lambda p: event.function(self._orbit(self._sample(p))), self.settings.newton
+            )
+        except ConvergenceError as failure:
+            self.trace.warnings.append(f"event {event.name!r}: {failure}")
+            return None
+        sample = self._sample(point)
+        orbit = self._orbit(sample)
+        curve = point.curve
+        assert isinstance(curve, ResponseCurve)
+        return Bifurcation(
+            event.name, orbit, sample.floquet, orbit.residual, orbit.amplitude(self.settings.observe), curve.name,
+            arclength=point.arclength, context=self.settings.context,
+        )
+
+
+def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
+    curve = point.curve
+    assert isinstance(curve, ResponseCurve)
+    x, omega, values = curve.split(u)
+    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
+
+
+def _drop_seam(items: list[Bifurcation]) -> None:
+    """A bifurcation on the seam of a closed curve is met at both ends: keep the first."""
+    if len(items) < 2:
+        return
+    first, last = items[0], items[-1]
+    same = first.kind == last.kind and np.isclose(first.omega, last.omega, rtol=1e-9)
+    if same and np.isclose(first.amplitude, last.amplitude, rtol=1e-6):
+        items.pop()
+
+
+__all__ = ["BalanceState", "Settings", "Trace", "follow"]

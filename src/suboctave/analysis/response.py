@@ -1,0 +1,176 @@
+"""Response curves of a system as curves for the continuation engine: unknowns `u = (X, free parameter)`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, neglected_motion, truncation
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseEvaluation:
+    """Harmonic balance and its derivatives at one u."""
+
+    state: BalanceState
+    name: str
+
+    @property
+    def residual(self) -> Array:
+        """R, shape (N,)."""
+        return self.state.residual
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """`[R_X, R_parameter]`, shape (N, N + 1)."""
+        jacobian = self.state.jacobian
+        out = np.empty((jacobian.shape[0], jacobian.shape[0] + 1))
+        out[:, :-1] = jacobian
+        out[:, -1] = self.state.residual_by(self.name)
+        return out
+
+    @cached_property
+    def error(self) -> float:
+        """Residual in units of the forces that balance."""
+        state = self.state
+        weight = state.balance.scales()[1]
+        size = float(np.linalg.norm(state.residual.reshape(state.x.shape) * weight))
+        return size / max(state.force_scale(), np.finfo(float).tiny)
+
+    @cached_property
+    def neglected(self) -> Array:
+        """Sizes of the harmonics of the motion that the basis neglects, shape (H + 1,)."""
+        return neglected_motion(self.state)
+
+    @property
+    def truncation(self) -> float:
+        """Estimated size of the neglected harmonics relative to the motion."""
+        return truncation(self.state, self.neglected)
+
+
+class ResponseCurve:
+    """Periodic motions of a system along one free parameter, "omega" or a parameter by name.
+
+    Parameters
+    ----------
+    balance
+        Equations in the present basis.
+    name
+        Free parameter.
+    omega
+        Frequency, where it is not the free parameter.
+    span
+        Width of the free parameter's range.
+    adaptive
+        Rule for the number of harmonics, None to keep it.
+    reference
+        A size of the motion met before the branch begins (the linear response), so that a branch can start from rest.
+    """
+
+    def __init__(
+        self,
+        balance: HarmonicBalance,
+        name: str,
+        omega: float,
+        span: float,
+        adaptive: AdaptiveHarmonics | None,
+        reference: float = 0.0,
+        cache: dict[HarmonicBasis, HarmonicBalance] | None = None,
+    ) -> None:
+        self.balance = balance
+        self.name = name
+        self.omega = omega
+        self.span = span
+        self.adaptive = adaptive
+        self.reference = reference
+        self._cache = {balance.basis: balance} if cache is None else cache
+        self._weight = np.tile(balance.scales()[0], balance.basis.size)
+
+    @property
+    def parameter(self) -> int:
+        """Index of the free parameter in u: the last."""
+        return self.balance.dimension
+
+    def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
+        """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
+        x = u[:-1].reshape(self.balance.basis.size, self.balance.size)
+        if self.name == "omega":
+            return x, float(u[-1]), self.balance.values
+        return x, self.omega, {**self.balance.values, self.name: float(u[-1])}
+
+    def join(self, x: Array, value: float) -> Array:
+        """The vector u of coefficients and a value of the free parameter."""
+        return np.append(np.ravel(x), value)
+
+    def evaluate(self, u: Array) -> ResponseEvaluation:
+        """See `Curve.evaluate`."""
+        x, omega, values = self.split(u)
+        if not omega > 0.0:
+            raise ConvergenceError("omega is not positive")
+        return ResponseEvaluation(self.balance.at(x, omega, values), self.name)
+
+    def size(self, u: Array) -> float:
+        """Norm of the coefficients, weighted by the square roots of the masses."""
+        return float(np.linalg.norm(self._weight * u[:-1]))
+
+    def weights(self, u: Array, largest: float) -> Array:
+        """See `Curve.weights`."""
+        size = max(self.size(u), 0.01 * max(largest, self.reference), np.finfo(float).tiny)
+        return np.append(self._weight / size, 1.0 / self.span)
+
+    def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
+        """The curve with the number of harmonics (and blind samples) that this point needs."""
+        assert isinstance(evaluation, ResponseEvaluation)
+        basis = self.balance.basis
+        if self.adaptive is not None:
+            basis = choose_harmonics(evaluation.state, evaluation.neglected, self.adaptive, self.adaptive.tolerance)
+        balance = self._in_basis(basis)
+        x, omega, values = self.split(u)
+        balance = balance.settle(self.balance.basis.resized(x, basis), omega, values)
+        return self if balance is self.balance else self.with_balance(balance)
+
+    def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
+        if basis not in self._cache:
+            self._cache[basis] = self.balance.with_basis(basis)
+        return self._cache[basis]
+
+    def with_balance(self, balance: HarmonicBalance) -> ResponseCurve:
+        """The same curve with other equations (basis, samples)."""
+        self._cache[balance.basis] = balance
+        return ResponseCurve(balance, self.name, self.omega, self.span, self.adaptive, self.reference, self._cache)
+
+    def with_basis(self, basis: HarmonicBasis) -> ResponseCurve:
+        """The same curve in another basis."""
+        return self if basis == self.balance.basis else self.with_balance(self._in_basis(basis))
+
+    def transfer(self, u: Array, origin: Curve) -> Array:
+        """See `Curve.transfer`."""
+        assert isinstance(origin, ResponseCurve)
+        if origin.balance.basis == self.balance.basis:
+            return u
+        x = u[:-1].reshape(origin.balance.basis.size, -1)
+        return self.join(origin.balance.basis.resized(x, self.balance.basis), u[-1])
+
+    def images(self, u: Array) -> list[Array]:
+        """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""
+        basis = self.balance.basis
+        x = u[:-1].reshape(basis.size, -1)
+        shifted = []
+        for shift in range(basis.nu):
+            angle = 2.0 * np.pi * shift * np.arange(1, basis.harmonics + 1)[:, None] / basis.nu
+            y = x.copy()
+            y[1::2] = np.cos(angle) * x[1::2] + np.sin(angle) * x[2::2]
+            y[2::2] = np.cos(angle) * x[2::2] - np.sin(angle) * x[1::2]
+            shifted.append(self.join(y, u[-1]))
+        return shifted
+
+    def where(self, u: Array) -> str:
+        """The free parameter's value in words."""
+        return f"{self.name} = {u[-1]:.6g}"

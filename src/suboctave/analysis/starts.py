@@ -1,0 +1,241 @@
+"""The first point of a branch.
+
+From a given motion, or, without one: Newton's method from the linear response; where that fails (it can cycle for ever on a contact
+that is closed at rest), a homotopy that switches the element forces on from 0 to 1 by continuation; where that fails, a short
+time integration from rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.response import ResponseCurve
+from suboctave.continuation.march import CurvePoint, March, SteppingOptions, make_point, solve_at
+from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.balance import BalanceState, HarmonicBalance, apply_blocks
+from suboctave.harmonic.basis import spectrum_to_real
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.model.system import System
+from suboctave.timedomain import integrate
+
+_SETTLING = 200
+
+
+def linear_response(curve: ResponseCurve, value: float) -> Array:
+    """u of the response without elements, at a value of the free parameter."""
+    balance = curve.balance
+    zero = np.zeros((balance.basis.size, balance.size))
+    x, omega, values = curve.split(curve.join(zero, value))
+    state = balance.at(x, omega, values)
+    load = balance.load(values, omega)
+    if state.compliance is not None:
+        load = apply_blocks(state.compliance, load)
+    try:
+        inverse = np.linalg.inv(state.blocks)
+    except np.linalg.LinAlgError:
+        # a free body or an undamped resonance: the least motion that balances what can be balanced
+        inverse = np.linalg.pinv(state.blocks)
+    return curve.join(apply_blocks(inverse, load), value)
+
+
+def start_point(
+    curve: ResponseCurve, value: float, given: Any, newton: NewtonOptions, largest: float = 0.0
+) -> CurvePoint:
+    """A solved point of the curve at a value of the free parameter, in a basis that suits it.
+
+    Parameters
+    ----------
+    given
+        None, a `PeriodicOrbit`, coefficients (2 H + 1, n), or a state `(x, dx/dt)` of shape (2 n,) from which time integration
+        leads to the motion.
+
+    Raises
+    ------
+    ConvergenceError
+        If no motion is found; says what was tried.
+    """
+    tried = []
+    if given is not None:
+        guess = _from_given(curve, value, given)
+        try:
+            return _settled(curve, guess, newton, largest)
+        except ConvergenceError as failure:
+            raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
+    linear = linear_response(curve, value)
+    size = curve.size(linear)
+    curve.reference = max(curve.reference, size)
+    patient = NewtonOptions(newton.tolerance, newton.correction, max(newton.iterations, 20))
+    for name, attempt in (
+        ("linear response", lambda: linear),
+        ("homotopy in the element forces", lambda: _homotopy(curve, linear, value, newton)),
+        ("time integration from rest", lambda: _integrated(curve, value, None)),
+    ):
+        try:
+            return _settled(curve, attempt(), patient, largest)
+        except ConvergenceError as failure:
+            tried.append(f"{name}: {failure}")
+    raise ConvergenceError(
+        f"no motion found to start from at {curve.where(linear)}. Tried " + "; ".join(tried) + ". "
+        "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
+    )
+
+
+def _settled(curve: ResponseCurve, u: Array, newton: NewtonOptions, largest: float) -> CurvePoint:
+    """Solve at the guess's parameter value, again with more harmonics while the motion asks for them."""
+    for _ in range(12):
+        x, omega, values = curve.split(u)
+        settled = curve.balance.settle(x, omega, values)
+        if settled is not curve.balance:
+            curve = curve.with_balance(settled)
+        solved = solve_at(curve, u, largest, newton)
+        adapted = curve.adapted(solved.u, solved.evaluation)
+        if adapted is curve:
+            break
+        u = adapted.transfer(solved.u, curve)
+        assert isinstance(adapted, ResponseCurve)
+        curve = adapted
+    return make_point(solved, curve, None, 0.0)
+
+
+def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
+    balance = curve.balance
+    basis, size = balance.basis, balance.size
+    if isinstance(given, PeriodicOrbit):
+        if given.coefficients.shape[1] != size:
+            raise InputError(f"start has {given.coefficients.shape[1]} DOFs, the system has {size}")
+        return curve.join(given.basis.resized(given.coefficients, basis), value)
+    array = np.asarray(given, dtype=float)
+    if not np.isfinite(array).all():
+        raise InputError("start contains numbers that are not finite")
+    if array.ndim == 1 and array.size == 2 * size:
+        return _integrated(curve, value, array)
+    if array.ndim == 1 and size == 1:
+        array = array[:, None]
+    if array.ndim == 2 and array.shape[1] == size and array.shape[0] % 2 == 1:
+        from suboctave.harmonic.basis import HarmonicBasis
+
+        own = HarmonicBasis(max(1, array.shape[0] // 2), basis.nu)
+        padded = np.zeros((own.size, size))
+        padded[: array.shape[0]] = array
+        return curve.join(own.resized(padded, basis), value)
+    raise InputError(
+        f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * size}, or coefficients of shape (2 H + 1, {size}); "
+        f"got an array of shape {array.shape}"
+    )
+
+
+def _integrated(curve: ResponseCurve, value: float, state: Array | None) -> Array:
+    """Harmonics of the motion that time integration settles on: from a state for one period, from rest until it repeats."""
+    balance = curve.balance
+    if not isinstance(balance.system, System):
+        raise ConvergenceError("time integration needs the full system")
+    x, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
+    period = 2.0 * math.pi * balance.basis.nu / omega
+    current = np.zeros(2 * balance.system.n) if state is None else state
+    rounds = _SETTLING if state is None else 1
+    samples = 8 * balance.basis.harmonics + 8
+    times = np.arange(samples + 1) * period / samples
+    for _ in range(rounds):
+        trajectory = integrate(balance.system, current, times, omega, values, rtol=1e-6)
+        displacement = np.asarray(trajectory.x).reshape(balance.system.n, -1)
+        velocity = np.asarray(trajectory.v).reshape(balance.system.n, -1)
+        new = np.concatenate((displacement[:, -1], velocity[:, -1] ))
+        change = np.abs(new - current).max()
+        current = new
+        if change <= 1e-5 * max(np.abs(current).max(), 1e-300):
+            break
+    spectrum = np.fft.rfft(displacement[:, :-1], axis=1).T / samples
+    return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
+
+
+@dataclass(frozen=True, eq=False)
+class _HomotopyEvaluation:
+    state: BalanceState
+    share: float
+
+    @cached_property
+    def residual(self) -> Array:
+        """`A X + B (share F - P)`."""
+        return self.state.residual - (1.0 - self.share) * self._force
+
+    @cached_property
+    def _force(self) -> Array:
+        force = self.state.force
+        if self.state.compliance is not None:
+            force = apply_blocks(self.state.compliance, force)
+        return force.ravel()
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivatives by X and by the share of the element forces."""
+        full = self.state.jacobian
+        linear = BalanceState._with_linear(np.zeros_like(full), self.state.blocks, None, mean=True)
+        return np.column_stack((linear + self.share * (full - linear), self._force))
+
+    @cached_property
+    def error(self) -> float:
+        """Residual in units of the forces that balance."""
+        state = self.state
+        weight = state.balance.scales()[1]
+        size = float(np.linalg.norm(self.residual.reshape(state.x.shape) * weight))
+        return size / max(state.force_scale(), np.finfo(float).tiny)
+
+
+class _Homotopy:
+    """Motions with a share of the element forces, from none (linear) to all."""
+
+    def __init__(self, curve: ResponseCurve, value: float) -> None:
+        self.curve = curve
+        self.value = value
+
+    @property
+    def parameter(self) -> int:
+        return self.curve.parameter
+
+    def evaluate(self, u: Array) -> Evaluation:
+        x, omega, values = self.curve.split(self.curve.join(u[:-1], self.value))
+        return _HomotopyEvaluation(self.curve.balance.at(x, omega, values), float(u[-1]))
+
+    def size(self, u: Array) -> float:
+        return self.curve.size(u)
+
+    def weights(self, u: Array, largest: float) -> Array:
+        weights = self.curve.weights(u, largest)
+        weights[-1] = 1.0
+        return weights
+
+    def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
+        return self
+
+    def transfer(self, u: Array, origin: Curve) -> Array:
+        return u
+
+    def images(self, u: Array) -> list[Array]:
+        return [u]
+
+    def where(self, u: Array) -> str:
+        return f"{u[-1]:.1%} of the element forces at {self.curve.name} = {self.value:.6g}"
+
+
+def _homotopy(curve: ResponseCurve, linear: Array, value: float, newton: NewtonOptions) -> Array:
+    """u with all element forces, followed from the linear response."""
+    problem = _Homotopy(curve, value)
+    first = linear.copy()
+    first[-1] = 0.0
+    point = make_point(solve_at(problem, first, curve.size(linear), newton), problem, None, 0.0)
+    stepping = SteppingOptions(max_step=0.2, initial_step=0.02, max_points=2000)
+    march = March(point, 1.0, (0.0, 1.0), newton, stepping)
+    last = point
+    for last in march:
+        pass
+    if abs(last.parameter - 1.0) > 1e-12:
+        raise ConvergenceError(march.ended)
+    return curve.join(last.u[:-1], value)

@@ -1,0 +1,103 @@
+"""Calls on single motions: their stability, and what the time domain says of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.analysis.branch import BranchPoint
+from suboctave.bifurcation import Bifurcation
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.timedomain import PeriodicSolution, shoot
+
+
+def stability(orbit: PeriodicOrbit | BranchPoint | Bifurcation) -> FloquetResult:
+    """Floquet multipliers of a motion with error estimates and the verdict (`stable`, `decided`)."""
+    return floquet_multipliers(_orbit(orbit).state())
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """A harmonic-balance motion held against shooting.
+
+    distance
+        Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement, velocities by
+        the largest velocity).
+    multiplier_error
+        Largest difference between multipliers, paired.
+    agrees
+        Whether shooting arrives at the same motion and gives the same verdict on its stability.
+    solution
+        The motion found by shooting, None if it found none (`reason` says why).
+    """
+
+    distance: float
+    multiplier_error: float
+    stable: bool | None
+    agrees: bool
+    solution: PeriodicSolution | None
+    reason: str
+
+    def __repr__(self) -> str:
+        verdict = "agrees" if self.agrees else "DISAGREES"
+        return f"Verification: {verdict}; distance {self.distance:.1e}, multipliers {self.multiplier_error:.1e}. {self.reason}"
+
+
+def verify(orbit: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3) -> Verification:
+    """Contradict a motion by shooting from its state at t = 0.
+
+    Parameters
+    ----------
+    tolerance
+        Relative distance up to which two motions count as the same.
+
+    Raises
+    ------
+    InputError
+        If the orbit's unknowns are not all DOFs of its system (a condensed model has no state to shoot from).
+    """
+    motion = _orbit(orbit)
+    system = motion.system
+    if motion.coefficients.shape[1] != system.n:
+        raise InputError("only motions with all DOFs of the system can be verified by shooting")
+    floquet = floquet_multipliers(motion.state())
+    start = motion.start()
+    try:
+        solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
+    except ConvergenceError as failure:
+        return Verification(math.inf, math.inf, None, False, None, f"shooting found no motion from here: {failure}")
+    t = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
+    sizes = np.repeat([np.abs(motion.displacement(t)).max(), np.abs(motion.velocity(t)).max()], system.n)
+    distance = float(np.max(np.abs(solution.state - start) / sizes))
+    error = _pairing(floquet.multipliers, solution.multipliers)
+    same = floquet.stable == solution.stable
+    close = distance <= tolerance
+    reason = "the same motion, the same verdict"
+    if not close:
+        reason = f"shooting arrives at another motion (relative distance {distance:.1e})"
+    elif not same:
+        reason = f"shooting calls it {'stable' if solution.stable else 'unstable'}, harmonic balance the opposite"
+        if not floquet.decided:
+            reason += ": a multiplier lies within its error of the unit circle"
+    return Verification(distance, error, solution.stable, close and same, solution, reason)
+
+
+def _pairing(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest distance between two sets of multipliers under the best pairing."""
+    from scipy.optimize import linear_sum_assignment
+
+    cost = np.abs(a[:, None] - b[None, :])
+    rows, columns = linear_sum_assignment(cost)
+    return float(cost[rows, columns].max())
+
+
+def _orbit(what: PeriodicOrbit | BranchPoint | Bifurcation) -> PeriodicOrbit:
+    if isinstance(what, PeriodicOrbit):
+        return what
+    if isinstance(what, BranchPoint | Bifurcation):
+        return what.orbit
+    raise InputError(f"expected a PeriodicOrbit, a point of a branch or a Bifurcation, not {type(what).__name__}")

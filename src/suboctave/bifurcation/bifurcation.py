@@ -1,0 +1,149 @@
+"""A located bifurcation, and lists of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, overload
+
+from suboctave.errors import InputError, suggest
+from suboctave.floquet import FloquetResult
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.orbit import PeriodicOrbit
+
+#: what the kinds mean
+KINDS = {
+    "LP": "limit point",
+    "BP": "branch point",
+    "PD": "period doubling",
+    "NS": "Neimark-Sacker",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """A motion at which the response changes its nature.
+
+    Attributes
+    ----------
+    kind
+        "LP", "BP", "PD", "NS", or the name of a user's event.
+    orbit
+        The motion, with its own number of harmonics.
+    floquet
+        Multipliers there, with error estimates.
+    residual
+        Dimensionless residual of the whole bifurcation system (equations of motion and singularity).
+    amplitude
+        Largest |x| of the observed DOF over one response period.
+    null_vectors
+        Right and left null vectors of the singular operator (weighted by masses), None for user events.
+    kappa
+        Frequency of the perturbation at an NS, rad per unit time; else 0.
+    uncertainty
+        Half-width in the free parameter if the point could only be bracketed, else 0.
+    criticality
+        "supercritical", "subcritical" or None where it has not been computed.
+    arclength
+        Position on the branch in scaled arclength; `context` is what the point was found with.
+    """
+
+    kind: str
+    orbit: PeriodicOrbit
+    floquet: FloquetResult
+    residual: float
+    amplitude: float
+    parameter_name: str
+    null_vectors: Any = None
+    kappa: float = 0.0
+    uncertainty: float = 0.0
+    criticality: str | None = None
+    arclength: float = 0.0
+    context: Any = field(default=None, repr=False)
+
+    @property
+    def omega(self) -> float:
+        """Circular frequency of the load."""
+        return self.orbit.omega
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All parameters of the system by name."""
+        return self.orbit.values
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers over the motion's own period, shape (2 n,)."""
+        return self.floquet.multipliers
+
+    def parameter(self, name: str) -> float:
+        """omega or a parameter by name."""
+        if name == "omega":
+            return self.omega
+        if name not in self.parameters:
+            raise InputError(f"unknown parameter {name!r}{suggest(name, ['omega', *self.parameters])}")
+        return self.parameters[name]
+
+    def critical_multiplier(self) -> complex:
+        """The multiplier on the unit circle that makes the bifurcation (closest to +1, -1 or exp(i kappa T))."""
+        import cmath
+
+        target = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(self.kind)
+        if target is None and self.kind == "NS":
+            target = cmath.exp(1j * self.kappa * self.orbit.period)  # type: ignore[assignment]
+        mu = self.multipliers
+        if target is None:
+            return complex(mu[0])
+        return complex(min(mu, key=lambda m: abs(m - target)))
+
+    def __repr__(self) -> str:
+        free = (
+            ""
+            if self.parameter_name == "omega"
+            else f", {self.parameter_name}={self.parameter(self.parameter_name):.9g}"
+        )
+        doubt = f" +- {self.uncertainty:.1e}" if self.uncertainty else ""
+        return f"<{self.kind} at omega={self.omega:.9g}{free}{doubt}, amplitude={self.amplitude:.7g}>"
+
+
+class BifurcationList:
+    """Located bifurcations in the order met; `["PD"]` gives those of a kind, `[0]` one by position."""
+
+    def __init__(self, items: list[Bifurcation], names: tuple[str, ...] = ()) -> None:
+        self._items = list(items)
+        self._known = tuple(KINDS) + names
+
+    def __iter__(self) -> Iterator[Bifurcation]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @overload
+    def __getitem__(self, key: str) -> list[Bifurcation]: ...
+    @overload
+    def __getitem__(self, key: int) -> Bifurcation: ...
+
+    def __getitem__(self, key: str | int) -> list[Bifurcation] | Bifurcation:
+        if isinstance(key, str):
+            if key not in self._known:
+                raise InputError(f"unknown kind of bifurcation {key!r}{suggest(key, list(self._known))}")
+            return [item for item in self._items if item.kind == key]
+        return self._items[key]
+
+    def __repr__(self) -> str:
+        if not self._items:
+            return "no bifurcations"
+        free = next((b.parameter_name for b in self._items if b.parameter_name != "omega"), None)
+        head = (
+            f"{'kind':<6}{'omega':>14}"
+            + (f"{free:>14}" if free else "")
+            + f"{'amplitude':>14}{'multiplier':>24}{'residual':>11}"
+        )
+        rows = [head]
+        for b in self._items:
+            mu = b.critical_multiplier()
+            text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
+            extra = f"{b.parameter(free):>14.8g}" if free else ""
+            rows.append(f"{b.kind:<6}{b.omega:>14.9g}{extra}{b.amplitude:>14.7g}{text:>24}{b.residual:>11.1e}")
+        return "\n".join(rows)

@@ -1,0 +1,127 @@
+"""One bordered system for every bifurcation of a periodic motion.
+
+With J = J_kappa(X, omega, parameters), bordered by vectors b, c,
+
+    [J b; c^H 0] [v; g] = [0; 1],     [J b; c^H 0]^H [u; .] = [0; 1],
+
+g vanishes exactly where J is singular; v and u are then its right and left null vectors, and the gradient of g is
+`g_p = -u^H J_p v` (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 4). The minimally augmented system is
+
+    [R; g] = 0            limit point (kappa = 0), period doubling (kappa = w0 / 2)
+    [R; Re g; Im g] = 0   Neimark-Sacker (kappa free, one unknown more)
+
+Rows and columns are weighted by the square roots of the masses, so that b, c, and g (in 1/time^2) do not depend on the units of single DOFs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.continuation.linear import Factor
+from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
+
+
+@dataclass(frozen=True)
+class NullVectors:
+    """Null vectors of a (nearly) singular operator with its mass weights: right `v`, left `u`, unit length in weighted form."""
+
+    right: np.ndarray
+    left: np.ndarray
+
+
+@dataclass(frozen=True)
+class Bordered:
+    """The scalar g of an operator at one motion, with what its gradient needs."""
+
+    state: BalanceState
+    kind: Kind
+    kappa: float
+    g: complex
+    right: np.ndarray
+    left: np.ndarray
+    factor: Factor
+    scale: np.ndarray
+
+    def gradient(self, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
+        """Derivatives of g by the coefficients (dimension,), by names, by kappa."""
+        slope = bilinear_gradient(self.state, self.kind, self.left, self.right, names, self.kappa)
+        return -slope.x.ravel(), {k: -r for k, r in slope.rates.items()}, -slope.kappa
+
+    @property
+    def vectors(self) -> NullVectors:
+        """Bordering vectors for the next iteration: the present null vectors, weighted and of unit length."""
+        v, u = self.right / self.scale, self.left / self.scale
+        return NullVectors(v / np.linalg.norm(v), u / np.linalg.norm(u))
+
+    @property
+    def relative(self) -> float:
+        """|g| in units of omega^2: dimensionless."""
+        return abs(self.g) / self.state.omega**2
+
+
+def weighted_operator(state: BalanceState, kind: Kind, kappa: float) -> tuple[np.ndarray, np.ndarray]:
+    """J_kappa with rows and columns weighted by 1/sqrt(mass), and these weights."""
+    matrix = operator(state, kind, kappa)
+    scale = np.tile(state.balance.scales()[1], matrix.shape[0] // state.balance.size)
+    return matrix * np.multiply.outer(scale, scale), scale
+
+
+def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations: int = 4) -> NullVectors:
+    """Singular vectors of the smallest singular value of the weighted operator, by inverse iteration."""
+    matrix, _ = weighted_operator(state, kind, kappa)
+    factor = Factor.of(matrix)
+    if factor.singular:
+        return _by_svd(matrix)
+    # a start with a component along everything, the same in every run
+    n = matrix.shape[0]
+    left = (np.cos(np.arange(n) * 1.7 + 0.3) / (1.0 + np.arange(n) / 8.0)).astype(matrix.dtype)
+    right = left
+    for _ in range(iterations):
+        right = factor.solve(left / np.linalg.norm(left))
+        left = factor.solve(right / np.linalg.norm(right), adjoint=True)
+    if not (np.isfinite(left).all() and np.isfinite(right).all()):
+        return _by_svd(matrix)
+    return NullVectors(right / np.linalg.norm(right), left / np.linalg.norm(left))
+
+
+def _by_svd(matrix: np.ndarray) -> NullVectors:
+    u, _, vh = np.linalg.svd(matrix)
+    return NullVectors(vh[-1].conj(), u[:, -1])
+
+
+def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:
+    """Evaluate g and the vectors of its gradient, bordered by `borders` (b = left, c = right)."""
+    matrix, scale = weighted_operator(state, kind, kappa)
+    n = matrix.shape[0]
+    extended = np.zeros((n + 1, n + 1), dtype=matrix.dtype, order="F")
+    extended[:n, :n] = matrix
+    extended[:n, n] = borders.left
+    extended[n, :n] = borders.right.conj()
+    # the operator's own size balances the bordering rows
+    size = state.omega**2
+    extended[:n, n] *= size
+    extended[n, :n] *= size
+    factor = Factor.of(extended)
+    rhs = np.zeros(n + 1, dtype=matrix.dtype)
+    rhs[n] = size
+    v = factor.solve(rhs)
+    u = factor.solve(rhs, adjoint=True)
+    # with b and c scaled by omega^2 the unknown multiplying b is g / omega^2
+    return Bordered(state, kind, kappa, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, factor, scale)
+
+
+def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:
+    """omega and parameter values with the free one, "omega" or a parameter, set."""
+    if name == "omega":
+        return value, values
+    return omega, {**values, name: value}
+
+
+def residual_scale(state: BalanceState) -> Array:
+    """Weights of residual entries, shape (dimension,): 1/sqrt(mass) per DOF."""
+    return np.tile(state.balance.scales()[1], state.basis.size)

@@ -1,0 +1,64 @@
+"""Branch points: two branches of motions cross (a symmetry breaks, or by design).
+
+At a branch point `R_X` is singular with left null vector psi and `R_omega` lies in its range, `psi . R_omega = 0`. In one
+parameter that is one condition too many, so the equations are unfolded: `[R + beta b; g; u . R_omega] = 0` in (X, omega, beta). It converges
+as well where a broken symmetry leaves only the ghost of a branch point: then beta is not zero, and the point is none.
+With `[J b; c^T 0] [w; .] = [R_omega; 0]`, the gradient of the last equation is `u . R_omega,p - u . J_p w`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from suboctave.bifurcation.bordered import Bordered, bordered, null_vectors
+from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
+
+#: unfolding, in units of the forces that balance, above which a located point is no branch point
+_UNFOLDING = 1e-8
+
+
+def locate_branch_point(guess: Guess) -> Singular:
+    """Locate a branch point in the free parameter.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method fails, or converges to a point whose unfolding is not zero: an imperfect (broken) branch point.
+    """
+    borders = null_vectors(guess.state(), Kind.INTEGER)
+    start = guess.state()
+    rows = 1.0 / np.tile(start.balance.scales()[1], start.basis.size)
+    force = start.force_scale()
+    last: list[Bordered] = []
+
+    def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
+        nonlocal borders
+        b = bordered(state, Kind.INTEGER, borders)
+        column = force * borders.left * rows
+        borders = b.vectors
+        last[:] = [b]
+        gx, rates, _ = b.gradient((guess.name,))
+        size = state.omega**2
+        extras = [Extra(b.g.real, gx.real, rates[guess.name].real, (0.0,), size)]
+        # w with J w + b (.) = R_name, c . w = 0, in weighted variables
+        slope = state.residual_by(guess.name)
+        rhs = np.append(slope * b.scale, 0.0)
+        w = b.factor.solve(rhs)[:-1] * b.scale
+        first = parameter_gradient(state, b.left, guess.name, (guess.name,))
+        second = bilinear_gradient(state, Kind.INTEGER, b.left, w, (guess.name,))
+        value = float(b.left @ slope)
+        size = force / guess.span
+        by = float((first.rates[guess.name] - second.rates[guess.name]).real)
+        extras.append(Extra(value, (first.x - second.x).real.ravel(), by, (0.0,), size))
+        return extras, extra[0] * column, [column]
+
+    state, extra, residual, iterations = newton(guess, np.zeros(1), np.ones(1), augmentation)
+    if abs(extra[0]) > _UNFOLDING:
+        raise ConvergenceError(
+            f"no branch point: its unfolding is {extra[0]:.1e} (a broken symmetry leaves a ghost here)"
+        )
+    return Singular(state, last[0].vectors, 0.0, residual, iterations)

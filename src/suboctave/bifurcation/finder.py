@@ -1,0 +1,127 @@
+"""From a change of a test function between two neighbours to a located bifurcation.
+
+First the bordered system from an interpolated start; where it does not converge into the step, the step is bisected on the test
+function and the solver tries again from a nearer point. If it never converges (at a grazing contact the equations are not smooth
+enough), the bracket itself is the answer, with its width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.bifurcation.kinds import BifurcationKind, Sample
+from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.continuation.march import CurvePoint, between, point_between
+from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError
+
+_BISECTIONS = 34
+
+
+@dataclass(frozen=True)
+class Located:
+    """A bifurcation between two neighbours: solved (`solution`), or only bracketed (`sample`, with the bracket's width)."""
+
+    kind: BifurcationKind
+    fraction: float
+    sample: Sample
+    solution: Singular | None
+    width: float
+
+
+def locate(
+    kind: BifurcationKind,
+    a: Sample,
+    b: Sample,
+    newton: NewtonOptions,
+    make_sample: Callable[[CurvePoint], Sample],
+    make_guess: Callable[[Array, CurvePoint, float], Guess],
+) -> Located | None:
+    """Locate a bifurcation of a kind whose test changed between two neighbours.
+
+    Parameters
+    ----------
+    make_sample
+        Turns a solved curve point into a sample.
+    make_guess
+        Turns a vector u in the discretisation of a curve point, and kappa, into a start of the bordered system.
+
+    Returns
+    -------
+    None if the change of the test turns out to be no bifurcation of this kind.
+    """
+    low, high = 0.0, 1.0
+    at_low, at_high = a, b
+    for depth in range(_BISECTIONS):
+        share = kind.fraction(at_low, at_high)
+        fraction = low + share * (high - low)
+        nearer = at_low if share < 0.5 else at_high
+        if depth % 3 == 0:
+            found = _try(kind, a, b, low, high, between(a.point, b.point, fraction), nearer, make_guess)
+            if found is not None:
+                return Located(kind, found[1], nearer, found[0], 0.0)
+        middle = None
+        for part in (0.5, 0.4, 0.65):
+            try:
+                at = low + part * (high - low)
+                middle = make_sample(point_between(a.point, b.point, at, newton))
+                break
+            except ConvergenceError:
+                continue
+        if middle is None:
+            break
+        if kind.changed(at_low, middle):
+            high, at_high = at, middle
+        elif kind.changed(middle, at_high):
+            low, at_low = at, middle
+        else:
+            return None
+    names = abs(at_high.point.parameter - at_low.point.parameter)
+    return Located(kind, 0.5 * (low + high), at_high, None, 0.5 * names)
+
+
+def _try(
+    kind: BifurcationKind,
+    a: Sample,
+    b: Sample,
+    low: float,
+    high: float,
+    u: Array,
+    nearer: Sample,
+    make_guess: Callable[[Array, CurvePoint, float], Guess],
+) -> tuple[Singular, float] | None:
+    try:
+        guess = make_guess(u, b.point, kind.kappa(nearer))
+        found = kind.solve(guess)
+    except ConvergenceError:
+        return None
+    if not kind.genuine(found, guess):
+        return None
+    solution = np.append(
+        found.state.x.ravel(), found.state.omega if guess.name == "omega" else found.state.values[guess.name]
+    )
+    fraction = position(a.point, b.point, solution)
+    margin = 0.05 * (high - low) + 1e-9
+    if fraction is None or not low - margin <= fraction <= high + margin:
+        return None
+    return found, fraction
+
+
+def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
+    """Where between two neighbours a point u (in the discretisation of b) lies on the curve, or None if it lies elsewhere."""
+    ua = b.curve.transfer(a.u, a.curve)
+    chord = b.weights * (b.u - ua)
+    length = float(np.linalg.norm(chord))
+    if length == 0.0:
+        return None
+    fraction = float((b.weights * (u - ua)) @ chord) / length**2
+    for _ in range(3):
+        # the interpolating cubic runs at uneven speed along the chord
+        rest = float((b.weights * (u - between(a, b, fraction))) @ chord) / length**2
+        fraction += rest
+    away = float(np.linalg.norm(b.weights * (u - between(a, b, min(1.0, max(0.0, fraction))))))
+    return fraction if away <= 0.1 * length + 1e-7 else None

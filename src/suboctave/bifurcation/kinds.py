@@ -1,0 +1,190 @@
+"""What each kind of bifurcation is: its test function, where to start, and the system that locates it.
+
+A new kind is one class here (or in a file of its own) with four answers: how often it may have happened between two neighbours, where in
+between, how to solve for it, and whether a solution is one.
+
+- LP: the component of the tangent along the free parameter changes sign;
+- BP: the bordered determinant `det [R_X R_omega; t]` changes sign, the branch going straight on;
+- PD: det J_half changes sign;
+- NS: the number of multipliers outside the unit circle changes by pairs that no LP, BP or PD accounts for. Two real
+  multipliers with product one (a neutral saddle) never cross the circle and are not counted.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from suboctave.bifurcation.branch import locate_branch_point
+from suboctave.bifurcation.solve import Guess, Singular, locate_singular
+from suboctave.continuation.linear import Factor
+from suboctave.continuation.march import CurvePoint
+from suboctave.errors import ConvergenceError
+from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.perturbation import Kind
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A point of a response curve with what the tests ask of it."""
+
+    point: CurvePoint
+    state: BalanceState
+
+    @cached_property
+    def floquet(self) -> FloquetResult:
+        """Multipliers and their errors."""
+        return floquet_multipliers(self.state)
+
+    @cached_property
+    def half_sign(self) -> float:
+        """Sign of det J_half."""
+        return Factor.of(self.state.half_jacobian).sign
+
+    @property
+    def slope(self) -> float:
+        """Component of the tangent along the free parameter."""
+        return float(self.point.tangent[self.point.curve.parameter])
+
+
+class BifurcationKind(ABC):
+    """One kind of bifurcation of periodic motions."""
+
+    name: str
+    operator: Kind
+
+    @abstractmethod
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """True if the test function differs in sign between two neighbours."""
+
+    @abstractmethod
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """A guess of where in between, 0 at a and 1 at b."""
+
+    def kappa(self, sample: Sample) -> float:
+        """Start for the frequency of the perturbation."""
+        return 0.0
+
+    def solve(self, guess: Guess) -> Singular:
+        """Solve the bifurcation's system from a guess."""
+        return locate_singular(guess, self.operator)
+
+    def genuine(self, found: Singular, guess: Guess) -> bool:
+        """Whether a solution of the system really is of this kind."""
+        return True
+
+
+class LimitPoint(BifurcationKind):
+    """LP: the branch turns back in its free parameter; a multiplier is +1."""
+
+    name = "LP"
+    operator = Kind.INTEGER
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """See `BifurcationKind.changed`."""
+        return (a.slope > 0.0) != (b.slope > 0.0)
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        return _zero(a.slope, b.slope)
+
+
+class BranchPoint(BifurcationKind):
+    """BP: two branches cross; a multiplier is +1."""
+
+    name = "BP"
+    operator = Kind.INTEGER
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """See `BifurcationKind.changed`."""
+        return a.point.orientation * b.point.orientation < 0.0
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        return _zero(_nearest(a, 1.0), _nearest(b, 1.0))
+
+    def solve(self, guess: Guess) -> Singular:
+        """See `BifurcationKind.solve`."""
+        return locate_branch_point(guess)
+
+
+class PeriodDoubling(BifurcationKind):
+    """PD: motions of twice the period branch off; a multiplier is -1."""
+
+    name = "PD"
+    operator = Kind.HALF
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """See `BifurcationKind.changed`."""
+        return a.half_sign * b.half_sign < 0.0
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        return _zero(_nearest(a, -1.0), _nearest(b, -1.0))
+
+
+class NeimarkSacker(BifurcationKind):
+    """NS: a torus branches off; a complex pair of multipliers crosses the unit circle."""
+
+    name = "NS"
+    operator = Kind.FREE
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """Count of unstable multipliers changed by more than LP, BP and PD account for."""
+        real = (a.slope > 0.0) != (b.slope > 0.0)
+        real_doubling = a.half_sign * b.half_sign < 0.0
+        branch = a.point.orientation * b.point.orientation < 0.0
+        accounted = int(real != branch or (real and branch)) + int(real_doubling)
+        return abs(a.floquet.unstable - b.floquet.unstable) > accounted and self._pair(a, b) is not None
+
+    @staticmethod
+    def _pair(a: Sample, b: Sample) -> tuple[complex, complex] | None:
+        """The complex pair of multipliers that crosses: its members at a and b."""
+        best = None
+        for mu in a.floquet.multipliers:
+            if mu.imag <= 1e-9 * abs(mu):
+                continue
+            other = min(b.floquet.multipliers, key=lambda m: abs(m - mu))
+            if (abs(mu) > 1.0) != (abs(other) > 1.0) and (best is None or abs(abs(mu) - 1.0) < abs(abs(best[0]) - 1.0)):
+                best = (complex(mu), complex(other))
+        return best
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        pair = self._pair(a, b)
+        return 0.5 if pair is None else _zero(abs(pair[0]) - 1.0, abs(pair[1]) - 1.0)
+
+    def kappa(self, sample: Sample) -> float:
+        """From the complex multiplier closest to the unit circle: `mu = exp(i kappa T)`."""
+        pairs = [mu for mu in sample.floquet.multipliers if mu.imag > 1e-9 * abs(mu)]
+        if not pairs:
+            raise ConvergenceError("no complex pair of multipliers here")
+        mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
+        return float(np.angle(mu)) * sample.state.rate / (2.0 * np.pi)
+
+    def genuine(self, found: Singular, guess: Guess) -> bool:
+        """At kappa = 0 or w0/2 every LP and PD solves the system as well: those are none."""
+        share = found.kappa / found.state.rate
+        return 1e-3 < share < 0.5 - 1e-3
+
+
+#: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork
+ALL_KINDS: tuple[BifurcationKind, ...] = (BranchPoint(), LimitPoint(), PeriodDoubling(), NeimarkSacker())
+
+
+def _zero(a: float, b: float) -> float:
+    """Zero of the line through (0, a), (1, b), kept inside the interval; the middle if there is none."""
+    if a * b >= 0.0 or not np.isfinite(a * b):
+        return 0.5
+    return min(0.98, max(0.02, a / (a - b)))
+
+
+def _nearest(sample: Sample, target: float) -> float:
+    """Distance of the real multiplier nearest to a target from it, signed; nan if there is none."""
+    mu = sample.floquet.multipliers
+    real = mu[np.abs(mu.imag) < 1e-7 * np.abs(mu)].real
+    return float(real[np.argmin(np.abs(real - target))] - target) if real.size else float("nan")

@@ -1,0 +1,185 @@
+"""Newton's method on the minimally augmented systems, for one free parameter: a bifurcation located to rounding.
+
+The bordering vectors are renewed at every iteration. Unknowns are weighted as in the continuation, so that convergence means
+the same in any units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.bifurcation.bordered import Bordered, NullVectors, at_values, bordered, null_vectors, residual_scale
+from suboctave.continuation.linear import Factor
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.selection import motion_size
+
+_TOLERANCE = 1e-10
+_STEP = 1e-9
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter, kappa."""
+
+    balance: HarmonicBalance
+    x: Array
+    omega: float
+    values: Mapping[str, float]
+    name: str
+    span: float
+    kappa: float = 0.0
+
+    def state(self) -> BalanceState:
+        """The equations at the guess."""
+        return self.balance.at(self.x, self.omega, self.values)
+
+    @property
+    def parameter(self) -> float:
+        """Value of the free parameter."""
+        return self.omega if self.name == "omega" else self.values[self.name]
+
+
+@dataclass(frozen=True)
+class Singular:
+    """A located singular motion: state, borders' null vectors, kappa, and the dimensionless residual of the whole system."""
+
+    state: BalanceState
+    vectors: NullVectors
+    kappa: float
+    residual: float
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Extra:
+    """One scalar equation beside R = 0 with its derivatives by X, by the free parameter and by the extra unknowns."""
+
+    value: float
+    x: Array
+    parameter: float
+    unknowns: tuple[float, ...]
+    size: float
+
+
+#: An augmentation evaluates at a state with extra unknowns and gives the equations, what to add to R, and its columns.
+Augmentation = Callable[[BalanceState, Array], tuple[list[Extra], Array | None, list[Array]]]
+
+
+def newton(
+    guess: Guess, unknowns: Array, spans: Array, augmentation: Augmentation, iterations: int = 15
+) -> tuple[BalanceState, Array, float, int]:
+    """Solve `[R + columns . unknowns; extras] = 0` in (X, parameter, unknowns).
+
+    Parameters
+    ----------
+    unknowns, spans
+        Start and natural size of the extra unknowns, shape (q,); one more equation than unknowns is needed.
+
+    Returns
+    -------
+    State, unknowns, dimensionless residual, iterations.
+
+    Raises
+    ------
+    ConvergenceError
+        If the iteration leaves the neighbourhood of the guess or does not converge.
+    """
+    balance, n = guess.balance, guess.balance.dimension
+    x, parameter, extra = guess.x.ravel().copy(), guess.parameter, unknowns.astype(float).copy()
+    weight = np.tile(balance.scales()[0], balance.basis.size)
+    rows = residual_scale(guess.state())
+    previous = np.inf
+    for iteration in range(iterations + 1):
+        omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
+        if omega <= 0.0:
+            raise ConvergenceError("omega left the positive axis")
+        state = balance.at(x, omega, values)
+        equations, addition, columns = augmentation(state, extra)
+        residual = state.residual if addition is None else state.residual + addition
+        force = max(state.force_scale(), np.finfo(float).tiny)
+        error = float(np.linalg.norm(residual * rows)) / force
+        error = max([error] + [abs(e.value) / e.size for e in equations])
+        if not np.isfinite(error):
+            raise ConvergenceError("the bordered system is not finite")
+        if error <= _TOLERANCE and previous <= 1e-5:
+            if previous <= _STEP or error <= 1e-3 * _TOLERANCE:
+                return state, extra, error, iteration
+        if iteration == iterations:
+            break
+        q = len(extra)
+        matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
+        size = max(motion_size(state), np.finfo(float).tiny)
+        scale_x = size / weight
+        matrix[:n, :n] = state.jacobian * (rows / force)[:, None] * scale_x
+        matrix[:n, n] = state.residual_by(guess.name) * (rows / force) * guess.span
+        for j, column in enumerate(columns):
+            matrix[:n, n + 1 + j] = column * (rows / force) * spans[j]
+        rhs = np.empty(n + 1 + q)
+        rhs[:n] = residual * (rows / force)
+        for i, e in enumerate(equations):
+            matrix[n + i, :n] = e.x * scale_x / e.size
+            matrix[n + i, n] = e.parameter * guess.span / e.size
+            for j, value in enumerate(e.unknowns):
+                matrix[n + i, n + 1 + j] = value * spans[j] / e.size
+            rhs[n + i] = e.value / e.size
+        factor = Factor.of(matrix, overwrite=True)
+        if factor.singular:
+            raise ConvergenceError("the bordered system is singular")
+        step = factor.solve(rhs)
+        length = float(np.linalg.norm(step))
+        if not np.isfinite(length):
+            raise ConvergenceError("the bordered system is singular")
+        if iteration > 3 and length > 0.5 * previous and previous > 1e-6:
+            raise ConvergenceError("the bordered system does not contract")
+        damp = min(1.0, 0.5 / length) if length > 0.0 else 1.0
+        x -= damp * step[:n] * scale_x
+        parameter -= damp * step[n] * guess.span
+        extra -= damp * step[n + 1 :] * spans
+        if length <= 1e-12 and error <= _TOLERANCE:
+            return state, extra, error, iteration
+        previous = length
+    raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
+
+
+def locate_singular(guess: Guess, kind: Kind) -> Singular:
+    """Locate a motion at which J_kappa is singular, kappa = 0, w0/2, or free (starting from `guess.kappa`).
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not converge from the guess.
+    """
+    borders = null_vectors(guess.state(), kind, guess.kappa)
+    last: list[Bordered] = []
+
+    def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
+        nonlocal borders
+        kappa = float(extra[0]) if kind is Kind.FREE else 0.0
+        b = bordered(state, kind, borders, kappa)
+        borders = b.vectors
+        last[:] = [b]
+        gx, rates, g_kappa = b.gradient((guess.name,))
+        size = state.omega**2
+        by = rates[guess.name]
+        if kind is not Kind.FREE:
+            return [Extra(b.g.real, gx.real, by.real, (), size)], None, []
+        return (
+            [
+                Extra(b.g.real, gx.real, by.real, (g_kappa.real,), size),
+                Extra(b.g.imag, gx.imag, by.imag, (g_kappa.imag,), size),
+            ],
+            None,
+            [np.zeros(guess.balance.dimension)],
+        )
+
+    start = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(0)
+    spans = np.full(len(start), guess.omega / guess.balance.basis.nu)
+    state, extra, residual, iterations = newton(guess, start, spans, augmentation)
+    kappa = float(extra[0]) if kind is Kind.FREE else 0.0
+    return Singular(state, last[0].vectors, kappa, residual, iterations)

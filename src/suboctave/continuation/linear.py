@@ -1,0 +1,49 @@
+"""One LU factorisation serves a Newton step, the tangent, and the sign of a determinant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """LU factors of a square real or complex matrix (`lapack.?getrf`)."""
+
+    lu: NDArray[Any]
+    pivots: NDArray[Any]
+    singular: bool
+
+    @classmethod
+    def of(cls, matrix: NDArray[Any], overwrite: bool = False) -> Factor:
+        """Factorise; an exactly singular matrix is marked, not refused."""
+        getrf = lapack.zgetrf if np.iscomplexobj(matrix) else lapack.dgetrf
+        lu, pivots, info = getrf(matrix, overwrite_a=overwrite)
+        return cls(lu, pivots, info > 0)
+
+    def solve(self, rhs: NDArray[Any], adjoint: bool = False) -> NDArray[Any]:
+        """Solve with the matrix, or with its conjugate transpose."""
+        if np.iscomplexobj(self.lu):
+            return lapack.zgetrs(self.lu, self.pivots, rhs, trans=2 if adjoint else 0)[0]
+        return lapack.dgetrs(self.lu, self.pivots, rhs, trans=1 if adjoint else 0)[0]
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant of a real matrix; 0 if singular."""
+        if self.singular:
+            return 0.0
+        swaps = np.count_nonzero(self.pivots != np.arange(len(self.pivots)))
+        negative = np.count_nonzero(self.lu.diagonal() < 0.0)
+        return -1.0 if (swaps + negative) % 2 else 1.0
+
+    @property
+    def log_determinant(self) -> float:
+        """Natural logarithm of the determinant's modulus."""
+        with np.errstate(divide="ignore"):
+            return float(np.log(np.abs(self.lu.diagonal())).sum())

@@ -1,0 +1,317 @@
+"""Predictor-corrector continuation with scaled arclength.
+
+Predictor: tangent and curvature from the last two tangents. Corrector: Newton's method in the hyperplane orthogonal to the tangent.
+Step length: from the distance between prediction and solution, the angle between tangents and the rate at which Newton's method
+contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The engine hands out the points one by one; what is
+looked for along the curve is the caller's business.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.continuation.newton import NewtonOptions, Solved, bordered, correct, tangent
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError, InputError
+
+
+@dataclass(frozen=True)
+class SteppingOptions:
+    """How far the engine steps.
+
+    max_step
+        Largest distance between neighbours in scaled arclength: parameters in units of their range, the solution in units of its
+        own current size (or of 1 % of the largest met so far, if that is larger).
+    initial_step, min_step
+        First step, and the step below which the curve ends with a reason.
+    deviation
+        Aim for the distance between prediction and solution.
+    angle
+        Aim for the angle between successive tangents, radians.
+    max_points
+        Points after which the curve ends with a reason.
+    """
+
+    max_step: float = 0.1
+    initial_step: float = 0.01
+    min_step: float = 1e-7
+    deviation: float = 0.01
+    angle: float = 0.3
+    max_points: int = 20000
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.min_step <= self.initial_step:
+            raise InputError(
+                f"initial_step={self.initial_step:g} must be positive and not below min_step={self.min_step:g}"
+            )
+        if not self.min_step < self.max_step < math.inf:
+            raise InputError(f"max_step={self.max_step:g} must lie above min_step={self.min_step:g}")
+        if self.deviation <= 0.0 or not 0.0 < self.angle < 1.6 or self.max_points < 2:
+            raise InputError(f"SteppingOptions out of range: {self}")
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point of a curve with its tangent (in u, unit length in scaled arclength)."""
+
+    curve: Curve
+    u: Array
+    tangent: Array
+    weights: Array
+    evaluation: Evaluation
+    orientation: float
+    arclength: float
+    iterations: int
+
+    @property
+    def parameter(self) -> float:
+        """Value of the curve's free parameter."""
+        return float(self.u[self.curve.parameter])
+
+
+def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
+    """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
+    t = tangent(solved)
+    if along is not None and (solved.weights * t) @ (solved.weights * along) < 0.0:
+        t = -t
+    # sign of det [F_u; t]: changes at a branch point that the curve passes straight on
+    sign = bordered(solved.evaluation, solved.weights * t, solved.weights).sign
+    return CurvePoint(curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations)
+
+
+def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
+    """Solve at the guess's own parameter value."""
+    row = np.zeros(len(guess))
+    row[curve.parameter] = 1.0
+    return correct(curve, guess, row, curve.weights(guess, largest), newton)
+
+
+def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
+    """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
+    ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
+    h = float(np.linalg.norm(b.weights * (b.u - ua)))
+    s = fraction
+    return (
+        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * ua
+        + s * (1.0 - s) ** 2 * h * ta
+        + s**2 * (3.0 - 2.0 * s) * b.u
+        + s**2 * (s - 1.0) * h * b.tangent
+    )
+
+
+def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonOptions) -> CurvePoint:
+    """The point of the curve at a fraction of the way between two neighbours.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not converge there.
+    """
+    guess = between(a, b, fraction)
+    chord = b.u - b.curve.transfer(a.u, a.curve)
+    row = b.weights * chord
+    length = float(np.linalg.norm(row))
+    solved = correct(b.curve, guess, row / length, b.weights, newton)
+    return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
+
+
+class March:
+    """Follows a curve from a start point; iterate over it for the points, then read `ended` and `closed`.
+
+    Parameters
+    ----------
+    start
+        Solved start with its parameter inside the bounds.
+    direction
+        +1 to set out towards larger values of the parameter, -1 towards smaller ones.
+    bounds
+        (low, high) of the parameter; the curve ends exactly on them.
+    inspect
+        Called with two neighbours before the second is accepted; returning False has the step halved (unless it is shorter than
+        `min_step` already).
+    """
+
+    def __init__(
+        self,
+        start: CurvePoint,
+        direction: float,
+        bounds: tuple[float, float],
+        newton: NewtonOptions,
+        stepping: SteppingOptions,
+        inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None,
+    ) -> None:
+        self.start = start
+        self.bounds = bounds
+        self.newton = newton
+        self.stepping = stepping
+        self.inspect = inspect
+        self.closed = False
+        self.ended = "not started"
+        self._direction = direction
+
+    def __iter__(self) -> Iterator[CurvePoint]:
+        """Points in order, the start first."""
+        options = self.stepping
+        point = self._set_out()
+        first = point
+        yield point
+        largest = point.curve.size(point.u)
+        step = min(options.initial_step, options.max_step)
+        bend: Array | None = None
+        count = 1
+        while True:
+            if count >= options.max_points:
+                self.ended = (
+                    f"{options.max_points} points computed at {point.curve.where(point.u)}; raise max_points to go on"
+                )
+                return
+            point = self._rescaled(point, largest)
+            try:
+                new, step, deviation = self._advance(point, step, bend)
+            except ConvergenceError as failure:
+                self.ended = (
+                    f"step size fell below {options.min_step:.0e} at {point.curve.where(point.u)}: {failure}. "
+                    "Try more harmonics, a smoother law, or a smaller min_step"
+                )
+                return
+            largest = max(largest, new.curve.size(new.u))
+            end = self._bound_passed(point, new)
+            back = None if count < 3 else self._returns(first, point, new)
+            if back is not None:
+                self.closed, self.ended = True, "the curve closed on itself"
+                yield back
+                return
+            if end is not None:
+                landed = self._land(point, new, end)
+                if landed is not None:
+                    self.ended = f"reached the end of the range at {landed.curve.where(landed.u)}"
+                    yield landed
+                    return
+            taken = new.arclength - point.arclength
+            yield new
+            count += 1
+            old = point.tangent if new.curve is point.curve else new.curve.transfer(point.tangent, point.curve)
+            bend = (new.tangent - old) / taken
+            step = self._next_step(point, new, taken, deviation)
+            adapted = new.curve.adapted(new.u, new.evaluation)
+            if adapted is not new.curve:
+                u, t = adapted.transfer(new.u, new.curve), adapted.transfer(new.tangent, new.curve)
+                bend = adapted.transfer(bend, new.curve)
+                weights = adapted.weights(u, largest)
+                point = replace(new, curve=adapted, u=u, tangent=t, weights=weights)
+            else:
+                point = new
+
+    def _set_out(self) -> CurvePoint:
+        """The start with its tangent pointing in the wanted direction."""
+        point = self.start
+        if point.tangent[point.curve.parameter] * self._direction < 0.0:
+            flipped = -point.tangent
+            sign = bordered(point.evaluation, point.weights * flipped, point.weights).sign
+            point = replace(point, tangent=flipped, orientation=sign)
+        return point
+
+    @staticmethod
+    def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
+        """The same point with scaling and tangent length of the present amplitude."""
+        weights = point.curve.weights(point.u, largest)
+        return replace(point, weights=weights, tangent=point.tangent / np.linalg.norm(weights * point.tangent))
+
+    def _advance(self, point: CurvePoint, step: float, bend: Array | None) -> tuple[CurvePoint, float, float]:
+        """One accepted step: new point, step length used, distance between prediction and solution."""
+        while True:
+            try:
+                guess = point.u + step * point.tangent
+                if bend is not None:
+                    guess += 0.5 * step**2 * bend
+                row = point.weights * point.tangent
+                solved = correct(point.curve, guess, row, point.weights, self.newton)
+                taken = float(np.linalg.norm(point.weights * (solved.u - point.u)))
+                new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
+                turn = self._angle(point, new)
+                fine = (
+                    turn < 2.5 * self.stepping.angle and solved.distance < 10.0 * self.stepping.deviation + 0.3 * step
+                )
+                fine = fine and taken <= 1.000001 * self.stepping.max_step
+                if step <= self.stepping.min_step or (fine and (self.inspect is None or self.inspect(point, new))):
+                    return new, step, solved.distance
+                failure = ConvergenceError("the curve turns too sharply")
+            except ConvergenceError as error:
+                failure = error
+            if step <= self.stepping.min_step:
+                raise failure
+            step = max(0.5 * step, self.stepping.min_step)
+
+    @staticmethod
+    def _angle(a: CurvePoint, b: CurvePoint) -> float:
+        ta, tb = b.weights * a.tangent, b.weights * b.tangent
+        cosine = float(ta @ tb / (np.linalg.norm(ta) * np.linalg.norm(tb)))
+        return math.acos(min(1.0, max(-1.0, cosine)))
+
+    def _next_step(self, point: CurvePoint, new: CurvePoint, step: float, deviation: float) -> float:
+        options = self.stepping
+        factor = min(
+            (options.deviation / max(deviation, 1e-12)) ** (1.0 / 3.0),
+            options.angle / max(self._angle(point, new), 1e-9),
+            2.0 if new.iterations <= 4 else 4.0 / new.iterations,
+        )
+        step = step * min(2.0, max(0.3, factor))
+        # the predictor's curvature may carry a step a little beyond its length: keep the distance below the largest allowed
+        return min(0.98 * options.max_step, max(step, options.min_step))
+
+    def _bound_passed(self, point: CurvePoint, new: CurvePoint) -> float | None:
+        low, high = self.bounds
+        if new.parameter >= high and point.parameter < high:
+            return high
+        if new.parameter <= low and point.parameter > low:
+            return low
+        if not low <= new.parameter <= high:
+            return high if new.parameter > high else low
+        return None
+
+    def _land(self, point: CurvePoint, new: CurvePoint, bound: float) -> CurvePoint | None:
+        """The point on the bound between two neighbours."""
+        index = point.curve.parameter
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            beyond = (between(point, new, middle)[index] - bound) * (new.parameter - bound) > 0.0
+            low, high = (low, middle) if beyond else (middle, high)
+        guess = between(point, new, high)
+        guess[index] = bound
+        row = np.zeros(len(guess))
+        row[index] = 1.0
+        try:
+            solved = correct(new.curve, guess, row, new.weights, self.newton)
+        except ConvergenceError:
+            return None
+        u = solved.u
+        u[index] = bound
+        length = point.arclength + float(np.linalg.norm(new.weights * (u - point.u)))
+        return make_point(solved, new.curve, new.tangent, length)
+
+    def _returns(self, first: CurvePoint, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """The start point again, if the step from `point` to `new` passes it in the same direction."""
+        origin = new.curve.transfer(first.u, first.curve)
+        heading = new.curve.transfer(first.tangent, first.curve)
+        w = new.weights
+        step = float(np.linalg.norm(w * (new.u - point.u)))
+        for image, leaving in zip(new.curve.images(origin), new.curve.images(heading), strict=True):
+            from_point, to_new = w * (image - point.u), w * (new.u - image)
+            if np.linalg.norm(from_point) > 1.5 * step or np.linalg.norm(to_new) > 1.5 * step:
+                continue
+            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
+            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * np.linalg.norm(w * leaving)
+            if not (ahead and same_way):
+                continue
+            fraction = float(np.linalg.norm(from_point)) / (
+                float(np.linalg.norm(from_point)) + float(np.linalg.norm(to_new))
+            )
+            miss = float(np.linalg.norm(w * (between(point, new, fraction) - image)))
+            if miss < 0.05 * step + 1e-6:
+                return replace(first, arclength=point.arclength + float(np.linalg.norm(from_point)))
+        return None

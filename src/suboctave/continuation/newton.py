@@ -1,0 +1,116 @@
+"""Newton's method for a point of a curve: the equations plus one scalar row.
+
+The row is either the hyperplane through a predicted point orthogonal to the tangent (arclength) or a fixed parameter.
+Convergence is judged on the residual (dimensionless) and on the correction (in scaled arclength), both at the final point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.continuation.linear import Factor
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError, InputError
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """How a point is solved for.
+
+    tolerance
+        Residual in units of the forces that balance, at most.
+    correction
+        Last correction in scaled arclength, at most (with the convergence rate seen).
+    iterations
+        Corrections before a step is given up and shortened.
+    """
+
+    tolerance: float = 1e-10
+    correction: float = 1e-7
+    iterations: int = 8
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.tolerance < 1e-2 and 0.0 < self.correction < 1.0 and self.iterations >= 1):
+            raise InputError(
+                f"NewtonOptions out of range: {self}; tolerance in (0, 1e-2), correction in (0, 1), iterations >= 1"
+            )
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`."""
+
+    u: Array
+    evaluation: Evaluation
+    weights: Array
+    factor: Factor
+    iterations: int
+    distance: float
+    contraction: float
+
+
+def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
+    """Factorise `[F_u; row]` with columns scaled to arclength."""
+    jacobian = evaluation.jacobian
+    matrix = np.empty((len(row), len(row)), order="F")
+    np.divide(jacobian, weights, out=matrix[:-1])
+    matrix[-1] = row
+    return Factor.of(matrix, overwrite=True)
+
+
+def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions) -> Solved:
+    """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
+
+    Parameters
+    ----------
+    row
+        Scaled row, shape (N + 1,): the unit tangent in scaled variables, or a unit vector to keep a parameter.
+
+    Raises
+    ------
+    ConvergenceError
+        If the iterations do not contract or run out.
+    """
+    u = guess.copy()
+    previous = np.inf
+    contraction = 0.0
+    first = 0.0
+    for iteration in range(options.iterations + 1):
+        evaluation = curve.evaluate(u)
+        error = evaluation.error
+        if not np.isfinite(error):
+            raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
+        factor = bordered(evaluation, row, weights)
+        # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
+        settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
+        if error <= options.tolerance and (settled or iteration == 0):
+            distance = float(np.linalg.norm(weights * (u - guess)))
+            return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
+        if iteration == options.iterations or factor.singular:
+            break
+        rhs = np.empty(len(u))
+        rhs[:-1] = evaluation.residual
+        rhs[-1] = row @ (weights * (u - guess))
+        step = factor.solve(rhs)
+        length = float(np.linalg.norm(step))
+        if iteration == 0:
+            first = length
+        else:
+            contraction = length / previous if previous > 0.0 else 0.0
+            if contraction > 2.0 and length > first:
+                break
+        u = u - step / weights
+        previous = length
+    raise ConvergenceError(
+        f"Newton's method did not converge near {curve.where(guess)} (residual {error:.1e} after {iteration} iterations)"
+    )
+
+
+def tangent(solved: Solved) -> Array:
+    """Unit tangent in u, normalised in scaled arclength, oriented along the row the point was solved with."""
+    rhs = np.zeros(len(solved.u))
+    rhs[-1] = 1.0
+    direction = solved.factor.solve(rhs)
+    return direction / np.linalg.norm(direction) / solved.weights

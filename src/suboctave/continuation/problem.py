@@ -1,0 +1,62 @@
+"""The contract between a curve and the engine that follows it.
+
+A curve is the solution set of `F(u) = 0` with `dim u = dim F + 1` (or `dim F + p` while p - 1 rows are added by the engine). The
+engine knows nothing of vibration: frequency responses, amplitude sweeps and tracked bifurcations are all curves to it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Evaluation(Protocol):
+    """The equations at one u."""
+
+    @property
+    def residual(self) -> Array:
+        """F, shape (N,)."""
+
+    @property
+    def jacobian(self) -> Array:
+        """dF/du, shape (N, N + 1)."""
+
+    @property
+    def error(self) -> float:
+        """Dimensionless size of the residual: 1 means as large as the terms that should balance."""
+
+
+class Curve(Protocol):
+    """A curve as the engine sees it. `parameter` is the index in u of the parameter that bounds and directions refer to."""
+
+    @property
+    def parameter(self) -> int:
+        """Index of the free parameter in u."""
+
+    def evaluate(self, u: Array) -> Evaluation:
+        """Equations and derivatives at u. May raise ConvergenceError where they do not exist."""
+
+    def weights(self, u: Array, largest: float) -> Array:
+        """Scaled arclength: `|du| = norm(weights * du)`. `largest` is the largest `size` met on the branch so far."""
+
+    def size(self, u: Array) -> float:
+        """Size of the solution part of u (its amplitude), for the scaling of later steps."""
+
+    def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
+        """The same curve, discretised as this point needs it (frozen until the next step); often simply itself."""
+
+    def transfer(self, u: Array, origin: Curve) -> Array:
+        """A point or tangent of `origin`, another discretisation of this curve, in this one."""
+
+    def images(self, u: Array) -> list[Array]:
+        """All vectors that stand for the same solution as u (u itself, and shifts in time where there are any)."""
+
+    def where(self, u: Array) -> str:
+        """A place on the curve in words, for messages: 'omega = 2.31'."""
+
+
+__all__ = ["Any", "Array", "Curve", "Evaluation"]

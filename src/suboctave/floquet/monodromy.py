@@ -1,0 +1,212 @@
+"""Stability of a periodic motion from its monodromy matrix.
+
+The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 0` is propagated over one period by
+products of matrix exponentials (`floquet.kernels`). Steps follow the law: the exact contact instants of piecewise-linear elements are
+their ends (between contacts A is constant and the exponential exact), panels are graded towards the passage of a sharp law, and
+everything else is covered by uniform steps. The run with every step halved gives the multipliers, its distance from the
+first run their error estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.floquet import kernels
+from suboctave.harmonic import kernels as harmonic_kernels
+from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.local_force import LocalMotion
+from suboctave.model.sampling import PiecewiseLinear, SharpSampling
+
+_GAUSS = np.array([-1.0, 1.0]) / math.sqrt(3.0)
+_RATIO = 2.5
+_DEPTH = 24
+
+
+@dataclass(frozen=True)
+class FloquetResult:
+    """Floquet multipliers of a motion over its own period.
+
+    multipliers
+        Shape (2 n,), complex, by descending modulus.
+    error
+        Estimated error of the leading multiplier's modulus and of any that lie near the unit circle.
+    margin
+        Largest modulus minus one.
+    """
+
+    multipliers: ComplexArray
+    errors: Array
+
+    @property
+    def error(self) -> float:
+        """Largest error estimate among the multipliers that decide (modulus above one half)."""
+        deciding = np.abs(self.multipliers) > 0.5
+        return float(self.errors[deciding].max()) if deciding.any() else float(self.errors.max())
+
+    @property
+    def margin(self) -> float:
+        """Largest modulus minus one: negative if stable."""
+        return float(np.abs(self.multipliers).max() - 1.0)
+
+    @property
+    def stable(self) -> bool:
+        """True if all multipliers lie inside the unit circle."""
+        return self.margin < 0.0
+
+    @property
+    def decided(self) -> bool:
+        """True if no multiplier is closer to the unit circle than its error estimate."""
+        return bool(np.all(np.abs(np.abs(self.multipliers) - 1.0) > self.errors))
+
+    @property
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return int(np.count_nonzero(np.abs(self.multipliers) > 1.0))
+
+    @property
+    def unstable_pairs(self) -> int:
+        """Number of complex-conjugate pairs outside the unit circle."""
+        mu = self.multipliers[np.abs(self.multipliers) > 1.0]
+        return int(np.count_nonzero(mu.imag > 0.0))
+
+
+def floquet_multipliers(state: BalanceState) -> FloquetResult:
+    """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
+    mass, damping, stiffness = state.linear.equation_of_motion()
+    linearised = _Linearisation(state)
+    edges = linearised.edges()
+    coarse = _monodromy(linearised, mass, damping, stiffness, edges)
+    if linearised.constant:
+        fine, change = coarse, np.zeros_like(coarse)
+    else:
+        halved = np.sort(np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))))
+        fine = _monodromy(linearised, mass, damping, stiffness, halved)
+        change = (fine - coarse) / 15.0
+    return _result(fine + change, change)
+
+
+def _result(phi: Array, change: Array) -> FloquetResult:
+    mu, vectors = np.linalg.eig(phi)
+    with np.errstate(all="ignore"):
+        try:
+            shift = np.abs(np.einsum("ij,jk,ki->i", np.linalg.inv(vectors), change, vectors))
+        except np.linalg.LinAlgError:
+            shift = np.full(len(mu), math.sqrt(float(np.abs(change).max())))
+    # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
+    size = float(np.linalg.norm(change)) + 1e-15 * float(np.linalg.norm(phi))
+    shift = np.minimum(np.nan_to_num(shift, nan=np.inf), math.sqrt(size * max(1.0, float(np.abs(mu).max())))) + 1e-14
+    order = np.argsort(-np.abs(mu), kind="stable")
+    return FloquetResult(mu.astype(complex)[order], shift[order])
+
+
+class _Linearisation:
+    """The elements' tangents along a motion, at any instant, and the steps they ask for."""
+
+    def __init__(self, state: BalanceState) -> None:
+        self.state = state
+        self.locals = state.local_motions
+        self.kinds = [local.element.sampling(local.coefficients) for local in self.locals]
+        self.constant = all(isinstance(kind, PiecewiseLinear) for kind in self.kinds)
+        self._contacts = {
+            i: local.contacts() for i, local in enumerate(self.locals) if isinstance(self.kinds[i], PiecewiseLinear)
+        }
+
+    def edges(self) -> Array:
+        """Ends of the steps in tau, from 0 to 2 pi, ascending."""
+        parts = [np.array([0.0, 2.0 * math.pi])]
+        for contacts in self._contacts.values():
+            parts += [contact.instants for contact in contacts]
+        if not self.constant:
+            parts.append(np.linspace(0.0, 2.0 * math.pi, self._uniform() + 1))
+        for local, kind in zip(self.locals, self.kinds, strict=True):
+            if isinstance(kind, SharpSampling):
+                parts.append(_panel_edges(local, kind))
+        edges = np.unique(np.concatenate(parts))
+        kept = np.append(True, np.diff(edges) > 1e-12)
+        edges = edges[kept]
+        edges[0], edges[-1] = 0.0, 2.0 * math.pi
+        return edges
+
+    def _uniform(self) -> int:
+        """Uniform steps: enough for the highest harmonic that matters and for the natural frequencies met on the way."""
+        basis = self.state.basis
+        sizes = np.abs(self.state.x).max(axis=1)
+        sizes = np.concatenate((sizes[:1], np.maximum(sizes[1::2], sizes[2::2])))
+        relevant = np.flatnonzero(sizes > 1e-3 * sizes.max())
+        top = int(relevant[-1]) if relevant.size else 1
+        return max(16 * basis.nu, 8 * top + 8)
+
+    def tangents(self, tau: Array) -> tuple[Array, Array]:
+        """f_u and f_v of every element at instants tau (N,): shape (E, N) each."""
+        count = len(self.locals)
+        stiffness = np.zeros((count, len(tau)))
+        damping = np.zeros((count, len(tau)))
+        zr, zi = np.cos(tau), np.sin(tau)
+        motions: dict[bytes, Array] = {}
+        for i, local in enumerate(self.locals):
+            if i in self._contacts:
+                # the state of each contact between its instants, not a comparison at the instant itself
+                for contact in self._contacts[i]:
+                    stiffness[i] += local.coefficients[contact.stiffness] * contact.active(tau)
+                continue
+            key = local.motion.tobytes()
+            if key not in motions:
+                motions[key] = harmonic_kernels.motion(local.motion, zr, zi)
+            x, rate = motions[key]
+            _, f_u, f_v = local.element.tangent(x, local.rate * rate, local.coefficients)
+            stiffness[i] = f_u
+            if f_v is not None:
+                damping[i] = f_v
+        return stiffness, damping
+
+
+def _panel_edges(local: LocalMotion, kind: SharpSampling) -> Array:
+    """Ends of panels graded towards the passages of a sharp law."""
+    weights = harmonic_kernels.sharp_nodes(
+        local.motion,
+        np.asarray(kind.points, float),
+        np.asarray(kind.widths, float),
+        np.zeros(1),
+        np.full(1, 2.0),
+        8,
+        _RATIO,
+        _DEPTH,
+    )[2]
+    return np.minimum(np.append(0.0, np.cumsum(weights)), 2.0 * math.pi)
+
+
+def _monodromy(
+    linearised: _Linearisation, mass: Array, damping: Array, stiffness: Array, edges: Array
+) -> NDArray[np.float64]:
+    """State-transition matrix of (y, y') over the period, by steps between `edges`."""
+    state = linearised.state
+    half = 0.5 * np.diff(edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    tau = (middle[:, None] + half[:, None] * _GAUSS).ravel()
+    k, c = linearised.tangents(tau)
+    h = 2.0 * half / state.rate
+    n = state.balance.size
+    directions = [state.linear.retain(local.element.direction(state.balance.system.n)) for local in linearised.locals]
+    if n == 1:
+        m = mass[0, 0]
+        squares = np.array([d[0] ** 2 / m for d in directions])
+        k_total = stiffness[0, 0] / m + squares @ k
+        c_total = damping[0, 0] / m + squares @ c
+        return kernels.propagate_single(k_total.reshape(-1, 2), c_total.reshape(-1, 2), h)
+    inverse = np.linalg.inv(mass)
+    shapes = np.zeros((len(directions), 2, n))
+    for i, d in enumerate(directions):
+        shapes[i, 0], shapes[i, 1] = inverse @ d, d
+    return kernels.propagate(
+        np.ascontiguousarray(inverse @ stiffness),
+        np.ascontiguousarray(inverse @ damping),
+        shapes,
+        np.ascontiguousarray(k.reshape(len(directions), -1, 2)),
+        np.ascontiguousarray(c.reshape(len(directions), -1, 2)),
+        h,
+    )

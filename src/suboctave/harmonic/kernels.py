@@ -1,0 +1,446 @@
+"""Compiled inner loops of the alternating frequency/time method. Arrays in, arrays out.
+
+Points on the unit circle are handed over as `z = exp(i tau)`, split into real and imaginary part: powers of `z` replace
+trigonometric functions. Kernels receive arrays only, never functions, so that Numba can keep them in its cache.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+_FAST = {"reassoc", "contract", "nsz"}
+
+
+@njit(cache=True, fastmath=_FAST)
+def motion(c, zr, zi):
+    """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
+    n = zr.shape[0]
+    out = np.empty((2, n))
+    top = c.shape[0] - 1
+    pr = np.empty(n)
+    pi = np.empty(n)
+    dr = np.empty(n)
+    di = np.empty(n)
+    for j in range(n):
+        pr[j] = c[top].real
+        pi[j] = c[top].imag
+        dr[j] = top * c[top].real
+        di[j] = top * c[top].imag
+    for k in range(top - 1, -1, -1):
+        a = c[k].real
+        b = c[k].imag
+        for j in range(n):
+            t = pr[j] * zr[j] - pi[j] * zi[j] + a
+            pi[j] = pr[j] * zi[j] + pi[j] * zr[j] + b
+            pr[j] = t
+            t = dr[j] * zr[j] - di[j] * zi[j] + k * a
+            di[j] = dr[j] * zi[j] + di[j] * zr[j] + k * b
+            dr[j] = t
+    for j in range(n):
+        out[0, j] = pr[j]
+        out[1, j] = -di[j]
+    return out
+
+
+@njit(cache=True, fastmath=_FAST)
+def spectra(values, zr, zi, top):
+    """Fourier coefficients `1/(2 pi) sum_j values[r, j] z_j^-q`, q = 0 .. top (weights already in `values`); shape (R, top + 1)."""
+    rows, n = values.shape
+    out = np.empty((rows, top + 1), dtype=np.complex128)
+    pr = np.ones(n)
+    pi = np.zeros(n)
+    scale = 1.0 / (2.0 * math.pi)
+    for q in range(top + 1):
+        for r in range(rows):
+            sr = 0.0
+            si = 0.0
+            for j in range(n):
+                sr += values[r, j] * pr[j]
+                si += values[r, j] * pi[j]
+            out[r, q] = complex(sr * scale, -si * scale)
+        if q < top:
+            for j in range(n):
+                t = pr[j] * zr[j] - pi[j] * zi[j]
+                pi[j] = pr[j] * zi[j] + pi[j] * zr[j]
+                pr[j] = t
+    return out
+
+
+@njit(cache=True)
+def _jet(c, zr, zi):
+    """Value, first and second derivative of `Re sum_k c_k z^k` with respect to tau at one point."""
+    pr = pi = dr = di = sr = 0.0
+    si = 0.0
+    for k in range(c.shape[0] - 1, -1, -1):
+        a = c[k].real
+        b = c[k].imag
+        t = pr * zr - pi * zi + a
+        pi = pr * zi + pi * zr + b
+        pr = t
+        t = dr * zr - di * zi + k * a
+        di = dr * zi + di * zr + k * b
+        dr = t
+        t = sr * zr - si * zi + k * k * a
+        si = sr * zi + si * zr + k * k * b
+        sr = t
+    return pr, -di, -sr
+
+
+@njit(cache=True)
+def _nearest(x, d, s, point, width):
+    """Distance from here to the nearest complex time at which the motion (value x, derivatives d, s) equals point +- i width."""
+    target = complex(x - point, -width)
+    if abs(s) * abs(target) < 1e-6 * d * d:
+        return abs(target) / abs(d)
+    root = np.sqrt(d * d - 2.0 * s * target)
+    q = -(d + root) if (root.real * d >= 0.0) else -(d - root)
+    if abs(q) == 0.0:
+        return math.sqrt(2.0 * abs(target) / abs(s)) if s != 0.0 else np.inf
+    first = abs(q / s) if s != 0.0 else np.inf
+    return min(first, abs(2.0 * target / q))
+
+
+@njit(cache=True)
+def sharp_nodes(c, points, widths, nodes, weights, panels, ratio, depth):
+    """Composite Gauss-Legendre nodes on a period, graded towards the instants at which a sharp law is passed.
+
+    A panel is halved until the nearest complex instant at which the motion meets a singularity of the law (point +- i width)
+    lies at least `ratio` half-lengths from its centre; the rule then converges geometrically on it.
+    Returns z (real, imaginary part) and weights, which add up to 2 pi.
+    """
+    order = nodes.shape[0]
+    # half a panel of every level, and its nodes, as points on the circle
+    cr = np.empty((depth + 1, order))
+    ci = np.empty((depth + 1, order))
+    hr = np.empty(depth + 1)
+    hi = np.empty(depth + 1)
+    half = math.pi / panels
+    for level in range(depth + 1):
+        h = half * 0.5**level
+        hr[level] = math.cos(0.5 * h)
+        hi[level] = math.sin(0.5 * h)
+        for j in range(order):
+            cr[level, j] = math.cos(h * nodes[j])
+            ci[level, j] = math.sin(h * nodes[j])
+    capacity = order * panels * 4
+    zr = np.empty(capacity)
+    zi = np.empty(capacity)
+    w = np.empty(capacity)
+    count = 0
+    stack_r = np.empty(depth + 2)
+    stack_i = np.empty(depth + 2)
+    stack_level = np.empty(depth + 2, dtype=np.int64)
+    for p in range(panels):
+        centre = (2 * p + 1) * half
+        stack_r[0] = math.cos(centre)
+        stack_i[0] = math.sin(centre)
+        stack_level[0] = 0
+        size = 1
+        while size > 0:
+            size -= 1
+            ar = stack_r[size]
+            ai = stack_i[size]
+            level = stack_level[size]
+            h = half * 0.5**level
+            split = False
+            if level < depth:
+                x, d, s = _jet(c, ar, ai)
+                for m in range(points.shape[0]):
+                    if _nearest(x, d, s, points[m], widths[m]) < ratio * h:
+                        split = True
+                        break
+            if split:
+                br = hr[level]
+                bi = hi[level]
+                stack_r[size] = ar * br - ai * bi
+                stack_i[size] = ar * bi + ai * br
+                stack_level[size] = level + 1
+                stack_r[size + 1] = ar * br + ai * bi
+                stack_i[size + 1] = ai * br - ar * bi
+                stack_level[size + 1] = level + 1
+                size += 2
+                continue
+            if count + order > capacity:
+                capacity *= 2
+                zr = np.concatenate((zr, np.empty(capacity - zr.shape[0])))
+                zi = np.concatenate((zi, np.empty(capacity - zi.shape[0])))
+                w = np.concatenate((w, np.empty(capacity - w.shape[0])))
+            for j in range(order):
+                zr[count] = ar * cr[level, j] - ai * ci[level, j]
+                zi[count] = ar * ci[level, j] + ai * cr[level, j]
+                w[count] = h * weights[j]
+                count += 1
+    return zr[:count], zi[:count], w[:count]
+
+
+@njit(cache=True)
+def _refine(c, lo, hi, flo, level):
+    """A root of the motion minus `level` in the bracket (lo, hi), by Newton's method kept inside the bracket."""
+    tau = 0.5 * (lo + hi)
+    for _ in range(100):
+        x, d, _s = _jet(c, math.cos(tau), math.sin(tau))
+        f = x - level
+        if f == 0.0:
+            return tau
+        if (f > 0.0) == (flo > 0.0):
+            lo = tau
+        else:
+            hi = tau
+        step = -f / d if d != 0.0 else np.inf
+        new = tau + step
+        if not (lo < new < hi):
+            new = 0.5 * (lo + hi)
+        if abs(new - tau) < 1e-15 * max(1.0, abs(tau)) or hi - lo < 4e-16 * max(1.0, abs(tau)):
+            return new
+        tau = new
+    return tau
+
+
+@njit(cache=True)
+def crossings(c, level, zr, zi):
+    """Instants tau in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
+
+    Sampled on the uniform grid z; a pair hidden between two samples is looked for at every extremum near the level
+    (whose parabola comes within half its own rise of it). Exact up to rounding.
+    """
+    n = zr.shape[0]
+    h = 2.0 * math.pi / n
+    values = motion(c, zr, zi)
+    found = np.empty(4 * n)
+    count = 0
+    for j in range(n):
+        f0 = values[0, j] - level
+        f1 = values[0, (j + 1) % n] - level
+        d0 = values[1, j]
+        d1 = values[1, (j + 1) % n]
+        if (f0 > 0.0) != (f1 > 0.0):
+            found[count] = _refine(c, j * h, (j + 1) * h, f0, level)
+            count += 1
+        elif (f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0):
+            # an extremum towards the level lies in between: does it reach across?
+            if min(abs(f0), abs(f1)) > h * (abs(d0) + abs(d1)):
+                continue
+            lo, hi = j * h, (j + 1) * h
+            tau = lo + h * d0 / (d0 - d1)
+            for _ in range(60):
+                x, d, s = _jet(c, math.cos(tau), math.sin(tau))
+                if (x - level > 0.0) != (f0 > 0.0):
+                    break
+                if (d > 0.0) == (d0 > 0.0):
+                    lo = tau
+                else:
+                    hi = tau
+                new = tau - d / s if s != 0.0 else 0.5 * (lo + hi)
+                if not (lo < new < hi):
+                    new = 0.5 * (lo + hi)
+                if abs(new - tau) < 1e-14:
+                    break
+                tau = new
+            x, d, s = _jet(c, math.cos(tau), math.sin(tau))
+            if (x - level > 0.0) != (f0 > 0.0):
+                found[count] = _refine(c, j * h, tau, f0, level)
+                found[count + 1] = _refine(c, tau, (j + 1) * h, x - level, level)
+                count += 2
+    return found[:count], values[0, 0] - level > 0.0
+
+
+@njit(cache=True)
+def contact_spectrum(tau, above, side, top):
+    """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
+
+    chi_q = 1/(2 pi) int chi exp(-i q tau): sums of exp(-i q tau_i) / q over the ends of the contact intervals.
+    """
+    out = np.zeros(top + 1, dtype=np.complex128)
+    active = above == (side > 0)
+    n = tau.shape[0]
+    if n == 0:
+        out[0] = 1.0 if active else 0.0
+        return out
+    scale = 1.0 / (2.0 * math.pi)
+    length = 2.0 * math.pi if active else 0.0
+    state = active
+    for i in range(n):
+        sign = 1.0 if state else -1.0  # +1: a contact ends here, -1: one begins
+        length += sign * tau[i]
+        zr = math.cos(tau[i])
+        zi = -math.sin(tau[i])
+        pr = zr
+        pi = zi
+        for q in range(1, top + 1):
+            f = sign * scale / q
+            out[q] += complex(-f * pi, f * pr)  # i/q * exp(-i q tau), the antiderivative at an end
+            t = pr * zr - pi * zi
+            pi = pr * zi + pi * zr
+            pr = t
+        state = not state
+    out[0] = length * scale
+    return out
+
+
+@njit(cache=True)
+def product_spectrum(c, shift, chi, top):
+    """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top + H."""
+    out = np.empty(top + 1, dtype=np.complex128)
+    high = c.shape[0] - 1
+    for k in range(top + 1):
+        s = (c[0].real - shift) * chi[k]
+        for m in range(1, high + 1):
+            # x_m = c_m / 2 and x_-m its conjugate
+            low = k - m
+            left = chi[low] if low >= 0 else chi[-low].conjugate()
+            s += 0.5 * (c[m] * left + c[m].conjugate() * chi[k + m])
+        out[k] = s
+    return out
+
+
+@njit(cache=True)
+def galerkin(stiffness, damping, rate, rows, cols, rows_mean, cols_mean):
+    """Galerkin matrix `T(f_x) + T(f_v) d/dt` between two real bases.
+
+    rows, cols: twice the frequencies of the basis functions in units of the base frequency (even: integer basis, odd: half-odd
+    basis), one entry per harmonic; the mean, if any, comes first. `rate` is the base frequency. Spectra must reach
+    the largest sum of two frequencies.
+    """
+    nr = 2 * rows.shape[0] - (1 if rows_mean else 0)
+    nc = 2 * cols.shape[0] - (1 if cols_mean else 0)
+    out = np.empty((nr, nc))
+    moving = damping.shape[0] > 0
+    for i in range(rows.shape[0]):
+        row_mean = rows_mean and i == 0
+        rc = 0 if row_mean else (2 * i - 1 if rows_mean else 2 * i)
+        for j in range(cols.shape[0]):
+            col_mean = cols_mean and j == 0
+            cc = 0 if col_mean else (2 * j - 1 if cols_mean else 2 * j)
+            low = (rows[i] - cols[j]) // 2
+            top = (rows[i] + cols[j]) // 2
+            g = stiffness[low] if low >= 0 else stiffness[-low].conjugate()
+            p = stiffness[top]
+            # C_q = 2 Re g_q, S_q = -2 Im g_q
+            a = g.real + p.real
+            b = g.imag - p.imag
+            e = -g.imag - p.imag
+            d = g.real - p.real
+            if moving:
+                w = 0.5 * cols[j] * rate
+                g = damping[low] if low >= 0 else damping[-low].conjugate()
+                p = damping[top]
+                # d/dt turns cos into -w sin and sin into w cos
+                a -= w * (g.imag - p.imag)
+                b += w * (g.real + p.real)
+                e -= w * (g.real - p.real)
+                d += w * (-g.imag - p.imag)
+            if row_mean:
+                out[0, cc] = 0.5 * a
+                if not col_mean:
+                    out[0, cc + 1] = 0.5 * b
+            else:
+                out[rc, cc] = a
+                out[rc + 1, cc] = e
+                if not col_mean:
+                    out[rc, cc + 1] = b
+                    out[rc + 1, cc + 1] = d
+    return out
+
+
+@njit(cache=True)
+def polynomial(coefficients, zr, zi):
+    """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
+    rows, count = coefficients.shape
+    n = zr.shape[0]
+    out = np.empty((rows, n), dtype=np.complex128)
+    for r in range(rows):
+        for j in range(n):
+            z = complex(zr[j], zi[j])
+            s = coefficients[r, count - 1]
+            for k in range(count - 2, -1, -1):
+                s = s * z + coefficients[r, k]
+            out[r, j] = s
+    return out
+
+
+@njit(cache=True)
+def add_linear(out, blocks, mean):
+    """Write complex blocks (one per harmonic, (h, n, n)) onto the block diagonal of a real matrix of the sine/cosine basis.
+
+    A complex amplitude `a - i b` stands for `a cos + b sin`: the block of a matrix `P + i Q` is [[P, Q], [-Q, P]].
+    """
+    n = blocks.shape[1]
+    for h in range(blocks.shape[0]):
+        if mean and h == 0:
+            for i in range(n):
+                for j in range(n):
+                    out[i, j] += blocks[0, i, j].real
+            continue
+        at = (2 * h - 1 if mean else 2 * h) * n
+        for i in range(n):
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                out[at + i, at + j] += p
+                out[at + n + i, at + n + j] += p
+                out[at + i, at + n + j] += q
+                out[at + n + i, at + j] -= q
+
+
+@njit(cache=True)
+def add_element(out, matrix, rows, row_values, cols, col_values, n):
+    """Add `matrix` (per basis function) times the outer product of two sparse shapes over the DOFs to a real or complex matrix."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            for p in range(rows.shape[0]):
+                for q in range(cols.shape[0]):
+                    out[i * n + rows[p], j * n + cols[q]] += matrix[i, j] * row_values[p] * col_values[q]
+
+
+@njit(cache=True)
+def peak(c, samples):
+    """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
+
+    Every sample interval that may hold an extremum large enough is searched by Newton's method on the derivative.
+    """
+    n = samples
+    h = 2.0 * math.pi / n
+    x = np.empty(n)
+    d = np.empty(n)
+    s = np.empty(n)
+    best = -1.0
+    for j in range(n):
+        x[j], d[j], s[j] = _jet(c, math.cos(j * h), math.sin(j * h))
+        if abs(x[j]) > best:
+            best = abs(x[j])
+            where = j * h
+            value = x[j]
+    floor = best
+    for j in range(n):
+        m = (j + 1) % n
+        if (d[j] > 0.0) == (d[m] > 0.0):
+            continue
+        # within the interval x rises at most by h |d| above its ends
+        if max(abs(x[j]), abs(x[m])) + h * (abs(d[j]) + abs(d[m])) < floor:
+            continue
+        lo = j * h
+        hi = (j + 1) * h
+        sign = d[j] > 0.0
+        tau = lo + h * d[j] / (d[j] - d[m])
+        for _ in range(60):
+            v, g, b = _jet(c, math.cos(tau), math.sin(tau))
+            if (g > 0.0) == sign:
+                lo = tau
+            else:
+                hi = tau
+            new = tau - g / b if b != 0.0 else 0.5 * (lo + hi)
+            if not (lo <= new <= hi):
+                new = 0.5 * (lo + hi)
+            done = abs(new - tau) < 1e-13
+            tau = new
+            if done:
+                break
+        v, g, b = _jet(c, math.cos(tau), math.sin(tau))
+        if abs(v) > best:
+            best = abs(v)
+            where = tau
+            value = v
+    return best, where, value

@@ -1,0 +1,102 @@
+"""The linear part of a structure, behind one small contract.
+
+Harmonic balance at a frequency Omega couples the unknown displacement amplitudes `x` (complex, `x exp(i Omega t)`) with the
+amplitudes `s` of element forces minus loads by
+
+    A(Omega) x + B(Omega) s = 0.
+
+- stiffness form: `A = K - Omega^2 M + i Omega C`, `B = I` (returned as None);
+- flexibility form, for a model condensed onto the DOFs that elements touch: `A = I`, `B` = the dynamic flexibility there.
+
+Whatever is above asks for A, B and their derivatives with respect to Omega and the parameters, and for the matrices of an
+equation of motion with the same response (for monodromy and time integration); it never sees which form it is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.model.system import System
+
+
+class LinearPart(Protocol):
+    """Contract of the linear part. `size` is the number of unknown DOFs."""
+
+    size: int
+
+    def rebuilt(self, values: Mapping[str, float]) -> LinearPart:
+        """The same part at other parameter values."""
+
+    def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
+        """`d^order A / d Omega^order`, shape (len(frequency), size, size)."""
+
+    def compliance(self, frequency: Array, order: int = 0) -> ComplexArray | None:
+        """`d^order B / d Omega^order`, same shape; None means the identity (and zero derivatives)."""
+
+    def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
+        """`d^order A / d Omega^order` differentiated by one or two parameters; None if zero."""
+
+    def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
+        """The same for B; None if zero."""
+
+    def retain(self, direction: Array) -> Array:
+        """A direction or load shape in the structure's DOFs (n,) as one in the unknown DOFs (size,)."""
+
+    def equation_of_motion(self) -> tuple[Array, Array, Array]:
+        """Mass, damping, stiffness (size, size) of an equation of motion with this response."""
+
+
+class StructuralMatrices:
+    """Stiffness form straight from a system's M, C, K: `A = K - Omega^2 M + i Omega C`."""
+
+    def __init__(self, system: System, values: Mapping[str, float] | None = None) -> None:
+        self.system = system
+        self.values = dict(system.parameters if values is None else values)
+        self.size = system.n
+        self._mass, self._damping, self._stiffness = system.matrices(self.values)
+
+    def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
+        """The same structure at other parameter values."""
+        return StructuralMatrices(self.system, values)
+
+    def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
+        """See `LinearPart.stiffness`."""
+        return _dynamic_stiffness(self._mass, self._damping, self._stiffness, frequency, order)
+
+    def compliance(self, frequency: Array, order: int = 0) -> None:
+        """Identity."""
+        return None
+
+    def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
+        """See `LinearPart.stiffness_by`."""
+        parts = self.system.matrix_derivatives(*names, values=self.values)
+        if all(part is None for part in parts):
+            return None
+        zero = np.zeros((self.size, self.size))
+        mass, damping, stiffness = (zero if part is None else part for part in parts)
+        return _dynamic_stiffness(mass, damping, stiffness, frequency, order)
+
+    def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> None:
+        """Identity."""
+        return None
+
+    def retain(self, direction: Array) -> Array:
+        """All DOFs are unknowns."""
+        return direction
+
+    def equation_of_motion(self) -> tuple[Array, Array, Array]:
+        """M, C, K of the system."""
+        return self._mass, self._damping, self._stiffness
+
+
+def _dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, frequency: Array, order: int) -> ComplexArray:
+    om = np.asarray(frequency, float)[:, None, None]
+    if order == 0:
+        return (stiffness - om**2 * mass) + 1j * (om * damping)
+    if order == 1:
+        return -2.0 * om * mass + 1j * np.broadcast_to(damping, om.shape[:1] + damping.shape)
+    return np.broadcast_to((-2.0 * mass).astype(complex), om.shape[:1] + mass.shape)

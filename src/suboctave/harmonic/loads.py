@@ -1,0 +1,76 @@
+"""Loads as harmonic coefficients: `amplitude cos(h omega t + phase)` with amplitude and phase free to depend on omega."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.model.system import System
+
+
+class LoadSpectrum:
+    """Coefficients (2 H + 1, n) of the external force and their derivatives with respect to omega and parameters."""
+
+    def __init__(self, system: System, basis: HarmonicBasis, shapes: list[Array]) -> None:
+        self.basis = basis
+        self.size = len(shapes[0]) if shapes else 0
+        self.components = list(zip(system.load_components(), shapes, strict=True))
+        for component, _ in self.components:
+            if component.harmonic * basis.nu > basis.harmonics:
+                raise InputError(
+                    f"a load at {component.harmonic} omega needs harmonics={component.harmonic} or more, "
+                    f"the basis ends at {basis.harmonics / basis.nu:g} omega"
+                )
+
+    def value(self, values: Mapping[str, float], size: int, names: tuple[str, ...] = ()) -> Array:
+        """Coefficients (2 H + 1, size), differentiated by each of `names` (at most two; "omega" is one of them)."""
+        result = np.zeros((self.basis.size, size))
+        for component, shape in self.components:
+            if not names:
+                wave = _wave(component, values)
+            else:
+                touched = component.amplitude.names | component.phase.names
+                if not touched.issuperset(names):
+                    continue
+                wave = _wave_derivative(component, values, names)
+            k = component.harmonic * self.basis.nu
+            # Re(wave exp(i k tau)) = Re(wave) cos - Im(wave) sin
+            if k == 0:
+                result[0] += wave.real * shape
+            else:
+                result[2 * k - 1] += wave.real * shape
+                result[2 * k] -= wave.imag * shape
+        return result
+
+
+def _wave(component, values: Mapping[str, float]) -> complex:
+    return component.amplitude.value(values) * complex(*_unit(component.phase.value(values)))
+
+
+def _unit(angle: float) -> tuple[float, float]:
+    return math.cos(angle), math.sin(angle)
+
+
+def _wave_derivative(component, values: Mapping[str, float], names: tuple[str, ...]) -> complex:
+    """Derivative of `a exp(i phase)` by one or two names (product and chain rule)."""
+    unit = complex(*_unit(component.phase.value(values)))
+    a = component.amplitude
+
+    def d(coefficient, *by: str) -> float:
+        for name in by:
+            coefficient = coefficient.derivative(name)
+        return coefficient.value(values)
+
+    phi = component.phase
+    if len(names) == 1:
+        (x,) = names
+        return unit * (d(a, x) + 1j * a.value(values) * d(phi, x))
+    x, y = names
+    total = d(a, x, y) + 1j * a.value(values) * d(phi, x, y) - a.value(values) * d(phi, x) * d(phi, y)
+    total += sum(1j * d(a, p) * d(phi, q) for p, q in itertools.permutations((x, y)))
+    return unit * total

@@ -1,0 +1,129 @@
+"""A solved periodic motion, as data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.harmonic import kernels
+from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
+from suboctave.model.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """One periodic motion of a system, solved by harmonic balance.
+
+    Attributes
+    ----------
+    balance
+        The equations it solves (system, basis, frozen samples).
+    coefficients
+        `(a_0, a_1, b_1, ...)`, shape (2 H + 1, n): `x(t) = a_0 + sum_k a_k cos(k omega t / nu) + b_k sin(k omega t / nu)`.
+    omega
+        Circular frequency of the load, rad per unit time.
+    values
+        Parameter values.
+    residual
+        Size of the residual in units of the forces that balance.
+    truncation
+        Estimated size of the neglected harmonics of the motion, relative to the motion (0 if not estimated).
+    """
+
+    balance: HarmonicBalance
+    coefficients: Array
+    omega: float
+    values: Mapping[str, float]
+    residual: float
+    truncation: float = 0.0
+
+    @property
+    def basis(self) -> HarmonicBasis:
+        """Harmonics and period."""
+        return self.balance.basis
+
+    @cached_property
+    def system(self) -> System:
+        """The system at the orbit's parameter values."""
+        system = self.balance.system
+        changed = {k: v for k, v in self.values.items() if v != system.parameters[k]}
+        return system.with_parameters(**changed) if changed else system
+
+    @property
+    def period(self) -> float:
+        """Period of the motion, `2 pi nu / omega`."""
+        return 2.0 * math.pi * self.basis.nu / self.omega
+
+    def state(self) -> BalanceState:
+        """The harmonic-balance equations evaluated at this orbit."""
+        return self.balance.at(self.coefficients, self.omega, self.values)
+
+    @cached_property
+    def amplitudes(self) -> ComplexArray:
+        """Complex amplitudes `c_k = a_k - i b_k`, shape (H + 1, n): `x = Re sum_k c_k exp(i k omega t / nu)`."""
+        return to_complex(self.coefficients)
+
+    def displacement(self, t: Array | float) -> Array:
+        """x at the times t; shape (n,) for a number, (n, len(t)) for an array."""
+        return self._series(t, 0)
+
+    def velocity(self, t: Array | float) -> Array:
+        """dx/dt at the times t; shapes as `displacement`."""
+        return self._series(t, 1)
+
+    def acceleration(self, t: Array | float) -> Array:
+        """Second time derivative of x at the times t; shapes as `displacement`."""
+        return self._series(t, 2)
+
+    def _series(self, t: Array | float, order: int) -> Array:
+        rate = self.basis.multiples * self.omega
+        waves = np.exp(1j * np.multiply.outer(np.atleast_1d(np.asarray(t, float)), rate)) * (1j * rate) ** order
+        result = np.real(waves @ self.amplitudes).T
+        return result[:, 0] if np.ndim(t) == 0 else result
+
+    def harmonic(self, k: float, dof: int = 0) -> complex:
+        """Complex amplitude of the component at `k omega`; k may be a fraction for sub-harmonic motions.
+
+        Raises
+        ------
+        InputError
+            If `k nu` is not a whole number, or dof is out of range.
+        """
+        index = k * self.basis.nu
+        if abs(index - round(index)) > 1e-9 or index < 0:
+            raise InputError(
+                f"k={k:g} is no harmonic of a motion of {self.basis.nu} load periods: k * {self.basis.nu} must be whole"
+            )
+        dof = self._dof(dof)
+        at = round(index)
+        return complex(self.amplitudes[at, dof]) if at <= self.basis.harmonics else 0.0 + 0.0j
+
+    def amplitude(self, dof: int = 0) -> float:
+        """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
+        c = np.ascontiguousarray(self.amplitudes[:, self._dof(dof)])
+        return float(kernels.peak(c, 8 * self.basis.harmonics + 8)[0])
+
+    def start(self) -> Array:
+        """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""
+        return np.concatenate((self.displacement(0.0), self.velocity(0.0)))
+
+    def _dof(self, dof: int) -> int:
+        n = self.coefficients.shape[1]
+        if not -n <= dof < n:
+            raise InputError(
+                f"dof={dof} is out of range: the motion has {n} DOF{'s' if n > 1 else ''}, numbered from 0"
+            )
+        return dof
+
+    def __repr__(self) -> str:
+        period = "" if self.basis.nu == 1 else f", {self.basis.nu}T"
+        return (
+            f"PeriodicOrbit(omega={self.omega:.8g}, harmonics={self.basis.harmonics}{period}, "
+            f"residual={self.residual:.1e}, truncation={self.truncation:.1e})"
+        )

@@ -1,0 +1,144 @@
+"""Where a law is sampled: nodes on the period and weights, chosen by what the element tells of itself.
+
+Three rules, all of which converge faster than any power of the number of nodes for the laws they are meant for:
+
+- uniform (the trapezoidal rule), exact for laws that are polynomials in displacement and velocity;
+- composite Gauss-Legendre panels that grade themselves towards the instants at which a sharp law (a regularised contact) is
+  passed, so that no sampling error is left: sampling a sharp law uniformly bends the response curve into false folds;
+- uniform with a number of samples that is doubled until force and tangent stop moving, for laws that tell nothing.
+
+The nodes follow the motion at each evaluation. That does no harm because the rule is accurate to rounding before and after.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic import kernels
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.model.element import Element
+from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, SharpSampling
+
+#: Gauss-Legendre nodes per panel, and how many half-lengths a singularity must keep from a panel's centre: with 12
+#: nodes the error of a panel is about (1.4 + sqrt(0.96))^-24 = 7e-10 at worst, and typically the square of that.
+_ORDER = 12
+_RATIO = 1.4
+_DEPTH = 40
+_FEWEST, _MOST = 32, 1 << 15
+#: relative change of force and tangent coefficients below which adaptive sampling is content
+_SETTLED = 1e-11
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Points `exp(i tau_j)` on the period (real and imaginary part, shape (N,)) and weights that add up to 2 pi."""
+
+    zr: Array
+    zi: Array
+    weights: Array
+
+    @property
+    def tau(self) -> Array:
+        """Instants in [0, 2 pi), shape (N,)."""
+        return np.mod(np.arctan2(self.zi, self.zr), 2.0 * math.pi)
+
+
+@lru_cache(maxsize=64)
+def uniform_nodes(count: int) -> Nodes:
+    """`count` equidistant instants from tau = 0."""
+    tau = 2.0 * math.pi * np.arange(count) / count
+    return Nodes(np.cos(tau), np.sin(tau), np.full(count, 2.0 * math.pi / count))
+
+
+@lru_cache(maxsize=4)
+def _gauss_legendre(order: int) -> tuple[Array, Array]:
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    return nodes, weights
+
+
+def nodes_for(element: Element, motion: ComplexArray, coefficients: Array, top: int, samples: int | None) -> Nodes:
+    """Nodes for an element whose relative displacement is `Re sum_k motion_k exp(i k tau)`.
+
+    Parameters
+    ----------
+    motion
+        Complex coefficients, shape (H + 1,).
+    coefficients
+        Values of the element's coefficients.
+    top
+        Highest Fourier coefficient of the tangent that is wanted.
+    samples
+        Frozen number of samples of an element that tells nothing (`samples_for`), else ignored.
+    """
+    kind = element.sampling(coefficients)
+    high = motion.shape[0] - 1
+    if isinstance(kind, PolynomialSampling):
+        # a force of degree d has harmonics up to d H; none of them may alias onto those up to `top`
+        return uniform_nodes(_even(kind.degree * high + top + 1))
+    if isinstance(kind, SharpSampling):
+        # harmonics up to top + H on a panel of half-length h: the error (e (top + H) h / 4 order)^(2 order) is 1e-10
+        panels = max(4, math.ceil(math.pi * math.e * (top + high) / (0.383 * 4.0 * _ORDER)))
+        x, w = _gauss_legendre(_ORDER)
+        zr, zi, weights = kernels.sharp_nodes(
+            motion, np.asarray(kind.points, float), np.asarray(kind.widths, float), x, w, panels, _RATIO, _DEPTH
+        )
+        return Nodes(zr, zi, weights)
+    return uniform_nodes(samples or _FEWEST)
+
+
+def _even(count: int) -> int:
+    """A number of samples, at least `count`, of a few fixed sizes so that tables are shared."""
+    return 8 * math.ceil(count / 8)
+
+
+def samples_for(element: Element, motion: ComplexArray, rate: float, coefficients: Array, top: int) -> int | None:
+    """Number of uniform samples with which force and tangent of an element that tells nothing have settled.
+
+    `rate` is the base frequency. Returns None for elements that know their rule.
+
+    Raises
+    ------
+    ConvergenceError
+        If even 32768 samples do not suffice: the law is too sharp to be sampled blindly.
+    """
+    if not isinstance(element.sampling(coefficients), AdaptiveSampling):
+        return None
+    count = max(_FEWEST, 1 << math.ceil(math.log2(2 * top + 2)))
+    previous: tuple[NDArray[np.complex128], ...] | None = None
+    while count <= _MOST:
+        nodes = uniform_nodes(count)
+        current = sampled_spectra(element, motion, rate, coefficients, nodes, top)
+        if previous is not None:
+            moved = max(_change(a, b) for a, b in zip(previous, current, strict=True))
+            if moved < _SETTLED:
+                return count // 2
+        previous = current
+        count *= 2
+    raise ConvergenceError(
+        f"{element.label}: the force does not settle with {_MOST} samples per period. Tell where its law is sharp "
+        f"(Element.sampling returning SharpSampling(points, widths)), or use an exact piecewise-linear element"
+    )
+
+
+def _change(a: ComplexArray, b: ComplexArray) -> float:
+    size = float(np.abs(b).max())
+    return float(np.abs(a - b).max()) / size if size > 0.0 else 0.0
+
+
+def sampled_spectra(
+    element: Element, motion: ComplexArray, rate: float, coefficients: Array, nodes: Nodes, top: int
+) -> tuple[ComplexArray, ...]:
+    """Fourier coefficients 0 .. top of force, stiffness and (if the law depends on velocity) damping at the given nodes."""
+    values = kernels.motion(motion, nodes.zr, nodes.zi)
+    f, f_u, f_v = element.tangent(values[0], rate * values[1], coefficients)
+    rows = (f, f_u) if f_v is None else (f, f_u, f_v)
+    weighted = np.empty((len(rows), nodes.weights.shape[0]))
+    for i, row in enumerate(rows):
+        np.multiply(row, nodes.weights, out=weighted[i])
+    return tuple(kernels.spectra(weighted, nodes.zr, nodes.zi, top))

@@ -1,0 +1,232 @@
+"""Directional derivatives of the harmonic-balance equations, analytic, to second order.
+
+A direction is a change of the coefficients together with changes of omega and of parameters. With `v = omega D u`, the change of
+an element's velocity along a direction a is `v_a = omega D u_a + omega_a D u`, and to second order `v_ab = omega_a D u_b + omega_b D u_a`;
+hence
+
+    F''[a, b] = < f_uu u_a u_b + f_uv (u_a v_b + v_a u_b) + f_vv v_a v_b + f_v v_ab >  + terms with the element's coefficients,
+    R''[a, b] = A''[a, b] X + A'[a] X_b + A'[b] X_a + B''[a, b] S + B'[a] S'[b] + B'[b] S'[a] + B S''[a, b].
+
+For piecewise-linear laws `f_uu` is a Dirac comb at the crossings of the gap: the integrals become boundary terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from suboctave.harmonic import kernels
+from suboctave.harmonic.balance import BalanceState, apply_blocks
+from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature
+from suboctave.model.element import Element
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction in which motion, omega and parameters change.
+
+    x
+        Change of the coefficients, shape (2 H + 1, size).
+    rates
+        Changes of "omega" and of parameters, by name; absent means zero.
+    """
+
+    x: Array
+    rates: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def omega(self) -> float:
+        """Change of omega."""
+        return self.rates.get("omega", 0.0)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Changes of the parameters that are not zero."""
+        return {k: r for k, r in self.rates.items() if k != "omega" and r != 0.0}
+
+
+def coefficient_rates(element: Element, values: Mapping[str, float], rates: Mapping[str, float]) -> Array:
+    """First change of an element's coefficients along parameter changes, shape (nc,)."""
+    result = np.zeros(len(element.coefficients))
+    for i, coefficient in enumerate(element.coefficients):
+        for name, rate in rates.items():
+            if name in coefficient.names:
+                result[i] += coefficient.derivative(name).value(values) * rate
+    return result
+
+
+def _coefficient_curvature(
+    element: Element, values: Mapping[str, float], a: Mapping[str, float], b: Mapping[str, float]
+) -> Array:
+    """Second change of an element's coefficients along two parameter changes, shape (nc,)."""
+    result = np.zeros(len(element.coefficients))
+    for i, coefficient in enumerate(element.coefficients):
+        for first, rate in a.items():
+            if first not in coefficient.names:
+                continue
+            slope = coefficient.derivative(first)
+            for second, other in b.items():
+                if second in slope.names:
+                    result[i] += slope.derivative(second).value(values) * rate * other
+    return result
+
+
+def force_by(state: BalanceState, name: str) -> Array | None:
+    """Element forces differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
+    high = state.basis.harmonics
+    result = None
+    if name == "omega":
+        for group, _, _, damping in state.spectra:
+            if damping.size:
+                slope = state.basis.derivative(state.x @ group.direction)
+                result = _accumulate(result, _toeplitz(state, damping) @ slope, group.direction, state)
+        return result
+    for element, local in zip(state.balance.elements, state.local_motions, strict=True):
+        rates = coefficient_rates(element, state.values, {name: 1.0})
+        if not rates.any():
+            continue
+        part = spectrum_to_real((rates @ coefficient_force(local).force)[:, None], high)[:, 0]
+        result = _accumulate(result, part, state.linear.retain(element.direction(state.balance.system.n)), state)
+    return result
+
+
+def _accumulate(result: Array | None, part: Array, direction: Array, state: BalanceState) -> Array:
+    if result is None:
+        result = np.zeros_like(state.x)
+    result += np.multiply.outer(part, direction)
+    return result
+
+
+def _toeplitz(state: BalanceState, spectrum: ComplexArray) -> Array:
+    doubled = 2 * np.arange(state.basis.harmonics + 1)
+    return kernels.galerkin(spectrum, np.zeros(0, dtype=complex), 0.0, doubled, doubled, True, True)
+
+
+def unbalanced_along(state: BalanceState, a: Direction) -> Array:
+    """S'[a], shape (2 H + 1, size)."""
+    result = (state.force_jacobian @ a.x.ravel()).reshape(a.x.shape)
+    for name, rate in a.rates.items():
+        if rate != 0.0:
+            change = state.unbalanced_by(name)
+            if change is not None:
+                result = result + rate * change
+    return result
+
+
+def unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
+    """S''[a, b], shape (2 H + 1, size)."""
+    result = np.zeros_like(state.x)
+    for element, local in zip(state.balance.elements, state.local_motions, strict=True):
+        d = state.linear.retain(element.direction(state.balance.system.n))
+        result += np.multiply.outer(_element_second(state, element, local, a, b, d), d)
+    for first, one in a.rates.items():
+        for second, two in b.rates.items():
+            if one * two != 0.0:
+                values = {**state.values, "omega": state.omega}
+                result -= one * two * state.balance.loads.value(values, state.balance.size, (first, second))
+    return result
+
+
+def _element_second(
+    state: BalanceState, element: Element, local: LocalMotion, a: Direction, b: Direction, d: Array
+) -> Array:
+    """F''[a, b] of one element along its own direction, shape (2 H + 1,)."""
+    basis, high = state.basis, state.basis.harmonics
+    ua, ub, u = a.x @ d, b.x @ d, state.x @ d
+    bend = curvature(local)
+    x_a, dx_a = kernels.motion(to_complex(ua), bend.zr, bend.zi)
+    x_b, dx_b = kernels.motion(to_complex(ub), bend.zr, bend.zi)
+    total = bend.uu * x_a * x_b
+    if bend.uv is not None and bend.vv is not None:
+        slope = kernels.motion(local.motion, bend.zr, bend.zi)[1] / basis.nu
+        v_a = local.rate * dx_a + a.omega * slope
+        v_b = local.rate * dx_b + b.omega * slope
+        total = total + bend.uv * (x_a * v_b + v_a * x_b) + bend.vv * v_a * v_b
+    result = spectrum_to_real(kernels.spectra(total[None, :], bend.zr, bend.zi, high).T, high)[:, 0]
+    damping = state.element_forces[state.balance.elements.index(element)].damping
+    if damping.size and (a.omega or b.omega):
+        result += _toeplitz(state, damping) @ basis.derivative(a.omega * ub + b.omega * ua)
+    rates_a = coefficient_rates(element, state.values, a.parameters)
+    rates_b = coefficient_rates(element, state.values, b.parameters)
+    if rates_a.any() or rates_b.any():
+        by = coefficient_force(local)
+        for rates, other, omega in ((rates_a, ub, b.omega), (rates_b, ua, a.omega)):
+            if not rates.any():
+                continue
+            result += _toeplitz(state, rates @ by.stiffness) @ other
+            if by.damping is not None:
+                change = local.rate * basis.nu * basis.derivative(other) + omega * basis.derivative(u)
+                result += _toeplitz(state, rates @ by.damping) @ change
+        spectrum = np.einsum("i,j,ijq->q", rates_a, rates_b, by.curvature)
+        spectrum = spectrum + _coefficient_curvature(element, state.values, a.parameters, b.parameters) @ by.force
+        result += spectrum_to_real(spectrum[:, None], high)[:, 0]
+    return result
+
+
+def _linear_change(state: BalanceState, a: Direction, compliance: bool) -> ComplexArray | None:
+    """A'[a] or B'[a] per harmonic, None if zero."""
+    linear, freq = state.linear, state.frequencies
+    by = linear.compliance_by if compliance else linear.stiffness_by
+    plain = linear.compliance if compliance else linear.stiffness
+    total = None
+    if a.omega:
+        slope = plain(freq, 1)
+        if slope is not None:
+            total = a.omega * state.basis.multiples[:, None, None] * slope
+    for name, rate in a.parameters.items():
+        block = by(freq, (name,))
+        if block is not None:
+            total = rate * block if total is None else total + rate * block
+    return total
+
+
+def _linear_second(state: BalanceState, a: Direction, b: Direction, compliance: bool) -> ComplexArray | None:
+    """A''[a, b] or B''[a, b] per harmonic, None if zero."""
+    linear, freq = state.linear, state.frequencies
+    m = state.basis.multiples[:, None, None]
+    by = linear.compliance_by if compliance else linear.stiffness_by
+    plain = linear.compliance if compliance else linear.stiffness
+    total = None
+
+    def add(block: ComplexArray | None, factor: float | Array) -> None:
+        nonlocal total
+        if block is not None:
+            total = factor * block if total is None else total + factor * block
+
+    if a.omega and b.omega:
+        add(plain(freq, 2), a.omega * b.omega * m**2)
+    for one, other in ((a, b), (b, a)):
+        if one.omega:
+            for name, rate in other.parameters.items():
+                add(by(freq, (name,), 1), one.omega * rate * m)
+    for first, rate in a.parameters.items():
+        for second, other_rate in b.parameters.items():
+            add(by(freq, (first, second)), rate * other_rate)
+    return total
+
+
+def second_derivative(state: BalanceState, a: Direction, b: Direction) -> Array:
+    """R''[a, b], shape (dimension,)."""
+    result = np.zeros_like(state.x)
+    for block, vector in (
+        (_linear_second(state, a, b, False), state.x),
+        (_linear_change(state, a, False), b.x),
+        (_linear_change(state, b, False), a.x),
+    ):
+        if block is not None:
+            result += apply_blocks(block, vector)
+    s_ab = unbalanced_second(state, a, b)
+    if state.compliance is None:
+        return (result + s_ab).ravel()
+    result += apply_blocks(state.compliance, s_ab)
+    second = _linear_second(state, a, b, True)
+    if second is not None:
+        result += apply_blocks(second, state.unbalanced)
+    for one, other in ((a, b), (b, a)):
+        block = _linear_change(state, one, True)
+        if block is not None:
+            result += apply_blocks(block, unbalanced_along(state, other))
+    return result.ravel()

@@ -1,0 +1,108 @@
+"""How many harmonics a motion needs: the energy of the force that the basis neglects.
+
+The element forces of a truncated motion have harmonics beyond the basis. To first order the motion they would excite is
+`x_k = -A(k w0)^-1 B(k w0) f_k`; its size relative to the motion is the truncation estimate stated on every orbit. It is the criterion of
+Ferri & Leamy (AIAA 2009-2667) carried from forces to displacements, so that it is dimensionless and weighs what matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.basis import Array, HarmonicBasis
+
+#: numbers of harmonics (of omega) that adaptive selection chooses from
+_LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
+
+
+@dataclass(frozen=True)
+class AdaptiveHarmonics:
+    """Harmonics chosen at every step so that the neglected part of the motion stays below a tolerance.
+
+    tolerance
+        Largest neglected motion relative to the motion along a curve.
+    event_tolerance
+        The same for located bifurcations, which are solved again with more harmonics.
+    minimum, maximum
+        Bounds on the highest harmonic of omega; at the maximum the estimate is stated and the curve goes on.
+    """
+
+    tolerance: float = 1e-5
+    event_tolerance: float = 1e-8
+    minimum: int = 5
+    maximum: int = 127
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.event_tolerance <= self.tolerance < 0.1):
+            raise InputError(
+                f"need 0 < event_tolerance <= tolerance < 0.1, got {self.event_tolerance:g} and {self.tolerance:g}"
+            )
+        if not 1 <= self.minimum <= self.maximum <= _LADDER[-1]:
+            raise InputError(
+                f"need 1 <= minimum <= maximum <= {_LADDER[-1]} harmonics, got {self.minimum} and {self.maximum}"
+            )
+
+
+def neglected_motion(state: BalanceState) -> Array:
+    """Sizes of the motion's harmonics k = H + 1 .. 2 H + 1 that the neglected force would excite, shape (H + 1,)."""
+    basis, size = state.basis, state.balance.size
+    high = basis.harmonics
+    force = np.zeros((high + 1, size), dtype=complex)
+    for group, spectrum, _, _ in state.spectra:
+        force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
+    frequency = np.arange(high + 1, 2 * high + 2) / basis.nu * state.omega
+    compliance = state.linear.compliance(frequency)
+    if compliance is not None:
+        force = np.einsum("kij,kj->ki", compliance, force)
+    blocks = state.linear.stiffness(frequency)
+    motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+    return np.linalg.norm(np.abs(motion) * state.balance.scales()[0], axis=1)
+
+
+def motion_size(state: BalanceState) -> float:
+    """Size of a motion with the DOF weights of `HarmonicBalance.scales`."""
+    return float(np.linalg.norm(state.x * state.balance.scales()[0]))
+
+
+def truncation(state: BalanceState, neglected: Array) -> float:
+    """Estimated size of the neglected harmonics (`neglected_motion`) relative to the motion."""
+    size = motion_size(state)
+    return float(np.linalg.norm(neglected)) / size if size > 0.0 else 0.0
+
+
+def choose_harmonics(
+    state: BalanceState, neglected: Array, options: AdaptiveHarmonics, tolerance: float
+) -> HarmonicBasis:
+    """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis.
+
+    `neglected` as from `neglected_motion`.
+    """
+    basis = state.basis
+    nu, high = basis.nu, basis.harmonics
+    size = motion_size(state)
+    if size == 0.0:
+        return basis
+    weight = state.balance.scales()[0]
+    kept = np.linalg.norm(state.x * weight, axis=1)
+    kept = np.concatenate((kept[:1], np.hypot(kept[1::2], kept[2::2])))
+    sizes = np.concatenate((kept, neglected))
+    # tail[k]: size of all harmonics above k
+    tail = np.sqrt(np.append(np.cumsum(sizes[::-1] ** 2)[::-1][1:], 0.0)) / size
+    lowest = max([options.minimum] + [c.harmonic for c in state.balance.system.load_components()])
+    ladder = [h for h in _LADDER if lowest <= h <= options.maximum] or [max(lowest, options.maximum)]
+
+    def sufficient(bound: float) -> int:
+        for h in ladder:
+            if h * nu < 2 * high and tail[h * nu] <= bound:
+                return h
+        return next((h for h in ladder if h * nu >= 2 * high), ladder[-1])
+
+    if tail[high] > tolerance:
+        wanted = sufficient(0.5 * tolerance)
+        return basis if wanted * nu <= high else HarmonicBasis(wanted * nu, nu)
+    wanted = sufficient(0.2 * tolerance)
+    return HarmonicBasis(wanted * nu, nu) if wanted * nu < high else basis
