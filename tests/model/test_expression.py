@@ -63,6 +63,9 @@ DERIVATIVES = [
     ("cosh(a)", "sinh(a)"),
     ("tanh(a)", "1/cosh(a)**2"),
     ("abs(a - b)", "-1"),
+    ("abs(log(a))*b", "-b/a"),
+    ("abs(3)*sqrt(a**2)", "3"),
+    ("abs(a*b)**2", "2*a*b**2"),
     ("b**a", "log(b)*b**a"),
     ("a*omega**2", "omega**2"),
 ]

@@ -223,7 +223,7 @@ def test_observed_degree_of_freedom():
             "stiffness: 'log\\(k\\)' is not a finite real number at k",
         ),
         (lambda: System(1, 0, 1, [CubicSpring(1, 1.0)]), "dof 1 does not exist"),
-        (lambda: System(1, 0, 1, [HarmonicLoad(0, 1.0)]), "elements holds HarmonicLoad"),
+        (lambda: System(1, 0, 1, [HarmonicLoad(0, 1.0)]), "elements must hold objects of the kind Element"),
         (lambda: System(1, 0, 1, 3), "elements must be a sequence"),
         (lambda: System(1, 0, 1, loads=[HarmonicLoad(2, 1.0)]), "HarmonicLoad: dof 2 does not exist"),
         (lambda: System({}, 0, 1), "empty mapping"),
@@ -232,7 +232,7 @@ def test_observed_degree_of_freedom():
         (lambda: HarmonicLoad(0, 1.0, harmonic=-1), "integer from 0 on"),
         (lambda: HarmonicLoad(0, 1.0, harmonic=1.5), "integer from 0 on"),
         (lambda: HarmonicLoad(0, 1.0, harmonic=True), "integer from 0 on"),
-        (lambda: HarmonicLoad(0, [1.0, 2.0]), "2 amplitudes, 1 harmonics"),
+        (lambda: HarmonicLoad(0, [1.0, 2.0]), "2 of amplitude, 1 of harmonic"),
         (lambda: HarmonicLoad(0, "p/"), "HarmonicLoad\\(dof=0\\), amplitude: cannot read"),
     ],
 )

@@ -65,7 +65,8 @@ class Place:
                 raise InputError(f"{self.owner}: direction has {len(self.vector)} entries, the structure {n} DOFs")
             return self.vector.copy()
         if max(self.dofs) >= n:
-            raise InputError(f"{self.owner}: dof {max(self.dofs)} does not exist; the structure has DOFs 0 to {n - 1}")
+            there = "only DOF 0" if n == 1 else f"DOFs 0 to {n - 1}"
+            raise InputError(f"{self.owner}: dof {max(self.dofs)} does not exist; the structure has {there}")
         result = np.zeros(n)
         for dof, sign in zip(self.dofs, (1.0, -1.0), strict=False):
             result[dof] = sign

@@ -50,14 +50,13 @@ class HarmonicLoad:
         self.place = Place("HarmonicLoad", dof, direction)
         required(self.label, amplitude=amplitude)
         amplitudes, harmonics, phases = (_listed(given) for given in (amplitude, harmonic, phase))
-        count = max(len(amplitudes), len(harmonics))
-        if len(phases) == 1 < count:
-            phases *= count
-        if not len(amplitudes) == len(harmonics) == len(phases):
+        if len(amplitudes) != len(harmonics) or len(phases) not in (1, len(amplitudes)):
             raise InputError(
-                f"{self.label}: {len(amplitudes)} amplitudes, {len(harmonics)} harmonics and {len(phases)} phases; "
-                f"give as many of each (one phase serves all)"
+                f"{self.label}: {len(amplitudes)} of amplitude, {len(harmonics)} of harmonic, {len(phases)} of phase; "
+                f"give as many of each (a single phase serves all)"
             )
+        if len(phases) == 1:
+            phases *= len(amplitudes)
         self.amplitudes = tuple(self._read("amplitude", given) for given in amplitudes)
         self.harmonics = tuple(self._read_harmonic(given) for given in harmonics)
         self.phases = tuple(self._read("phase", given) for given in phases)

@@ -7,6 +7,7 @@ walking SymPy's tree: no text is handed to SymPy's parser and none is taken back
 from __future__ import annotations
 
 import ast
+import functools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -25,6 +26,25 @@ def _symbol(name: str) -> Any:
     return sympy.Symbol(name, real=True)
 
 
+@functools.cache
+def _modulus() -> Any:
+    """The modulus of a real argument, straight on either side of its corner.
+
+    SymPy's own `Abs` allows for complex arguments, which makes `abs(log(a))` a derivative of real and imaginary parts.
+    """
+    import sympy
+
+    class Sign(sympy.Function):
+        def fdiff(self, argindex: int = 1) -> Any:
+            return sympy.S.Zero
+
+    class Modulus(sympy.Function):
+        def fdiff(self, argindex: int = 1) -> Any:
+            return Sign(self.args[0])
+
+    return Modulus
+
+
 def from_syntax(node: ast.expr) -> Any:
     """The SymPy expression of a syntax tree that `expression.coefficient` has accepted."""
     import sympy
@@ -40,7 +60,10 @@ def from_syntax(node: ast.expr) -> Any:
             value = from_syntax(inner)
             return -value if isinstance(operation, ast.USub) else value
         case ast.Call(func=ast.Name(id=name), args=[inner]):
-            return getattr(sympy, "Abs" if name == "abs" else name)(from_syntax(inner))
+            argument = from_syntax(inner)
+            if name == "abs":
+                return sympy.Abs(argument) if argument.is_number else _modulus()(argument)
+            return getattr(sympy, name)(argument)
         case ast.BinOp(left=left, op=operation, right=right):
             a, b = from_syntax(left), from_syntax(right)
             match operation:
@@ -100,11 +123,11 @@ def _number(expression: Any) -> float:
 
 
 def _function(name: str) -> Callable[[float], float] | None:
-    if name == "Abs":
+    if name in ("Modulus", "Abs"):  # SymPy itself writes Abs for the root of a square
         return math.fabs
-    if name == "sign":  # from abs
+    if name in ("Sign", "sign"):
         return lambda x: float((x > 0.0) - (x < 0.0))
-    if name == "DiracDelta":  # from the derivative of sign; abs is taken as straight on either side of its corner
+    if name == "DiracDelta":
         return lambda x: 0.0
     return FUNCTIONS.get(name)
 

@@ -114,21 +114,21 @@ class System:
             has = suggest(str(name), self.parameters) or "; it has none"
             raise InputError(f"the system has no parameter {name!r}{has}")
 
-    def _expressions(self) -> Iterator[tuple[str, Coefficient]]:
+    def _expressions(self) -> Iterator[tuple[str, Coefficient, bool]]:
+        """Every expression: where it stands, itself, and whether it may contain omega."""
         for matrix in (self.mass, self.damping, self.stiffness):
             for source in matrix.coefficients:
-                yield matrix.what, source
+                yield matrix.what, source, False
         for element in self.elements:
             for what, source in zip(element.coefficient_names, element.coefficients, strict=True):
-                yield f"{element.label}, {what}", source
+                yield f"{element.label}, {what}", source, False
         for load in self.loads:
             for what, source in load.coefficients:
-                yield f"{load.label}, {what}", source
+                yield f"{load.label}, {what}", source, True
 
     def _check_names(self) -> None:
         used: set[str] = set()
-        for where, source in self._expressions():
-            in_load = where.startswith("HarmonicLoad")
+        for where, source, in_load in self._expressions():
             for name in sorted(source.names):
                 if name == "omega" and not in_load:
                     raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
@@ -144,10 +144,8 @@ class System:
 
     def _check_values(self, changed: Mapping[str, float]) -> None:
         """Refuse values at which an expression has no number or the mass is not a mass."""
-        for where, source in self._expressions():
-            if "omega" in source.names:
-                continue
-            if source.names:
+        for where, source, _ in self._expressions():
+            if source.names and "omega" not in source.names:
                 try:
                     source.value(self.parameters)
                 except InputError as error:
@@ -256,7 +254,7 @@ def _several(items: Any, kind: type, what: str) -> tuple[Any, ...]:
         raise InputError(f"{what} must be a sequence of {kind.__name__}, not {items!r}") from None
     for item in listed:
         if not isinstance(item, kind):
-            raise InputError(f"{what} holds {item!r} ({type(item).__name__}), which is not a {kind.__name__}")
+            raise InputError(f"{what} must hold objects of the kind {kind.__name__}, not {item!r}")
     return listed
 
 
