@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from suboctave.store.layout import EventRow, branch_dataset
+from suboctave.store.layout import EventRow, curve_dataset
 
 
 def duffing(stiffness=1.0, damping=0.1, cubic=0.1, force=0.4, points=60, named="F"):
@@ -41,7 +41,7 @@ def duffing(stiffness=1.0, damping=0.1, cubic=0.1, force=0.4, points=60, named="
         EventRow("LP", int(np.searchsorted(right, a)) - 1, float(frequency(a, 1)), float(a), 1e-12, 1.0 + 0j)
         for a in folds
     ]
-    return branch_dataset(
+    return curve_dataset(
         omega,
         amplitude,
         stable=stable,

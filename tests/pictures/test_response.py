@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from suboctave.errors import InputError
-from suboctave.pictures import response_figure, response_panels, save_figure
+from suboctave.pictures import plot_panels, plot_response, save_figure
 from suboctave.pictures.style import KINDS
-from suboctave.store.layout import EventRow, branch_dataset
+from suboctave.store.layout import EventRow, curve_dataset
 
 
 def legend_of(figure):
@@ -24,7 +24,7 @@ def texts(figure):
 
 def test_markers_lie_on_the_located_bifurcations(duffing):
     dataset = duffing()
-    figure = response_figure(dataset)
+    figure = plot_response(dataset)
     (marks,) = [line for line in figure.axes[0].get_lines() if line.get_gid() == "LP"]
     np.testing.assert_array_equal(marks.get_xdata(), dataset["event_omega"])
     np.testing.assert_array_equal(marks.get_ydata(), dataset["event_amplitude"])
@@ -36,31 +36,31 @@ def test_markers_lie_on_the_located_bifurcations(duffing):
 
 
 def test_the_legend_names_only_what_occurs(duffing):
-    assert texts(response_figure(duffing())) == ["stable", "unstable", "limit point"]
-    assert texts(response_figure(duffing(force=0.02))) == ["stable"]
+    assert texts(plot_response(duffing())) == ["stable", "unstable", "limit point"]
+    assert texts(plot_response(duffing(force=0.02))) == ["stable"]
 
 
 def test_each_kind_has_its_own_marker_and_an_unknown_one_its_own_name():
     x = np.linspace(0, 1, 9)
     kinds = [*KINDS, "grazing"]
     rows = [EventRow(kind, i, x[i], x[i]) for i, kind in enumerate(kinds)]
-    figure = response_figure(branch_dataset(x, x, stable=x < 2, events=rows))
+    figure = plot_response(curve_dataset(x, x, stable=x < 2, events=rows))
     drawn = {line.get_gid(): line.get_marker() for line in figure.axes[0].get_lines() if line.get_gid() in kinds}
     assert drawn == {"LP": "o", "PD": "v", "NS": "s", "BP": "D", "grazing": "*"}
     assert {"limit point", "period doubling", "Neimark–Sacker", "branch point", "grazing"} < set(texts(figure))
 
 
 def test_several_curves_are_told_apart_by_what_differs(duffing):
-    figure = response_figure([duffing(force=0.4), duffing(force=0.2)])
+    figure = plot_response([duffing(force=0.4), duffing(force=0.2)])
     assert texts(figure)[:2] == ["F = 0.4", "F = 0.2"]
     colours = {line.get_color() for line in figure.axes[0].get_lines() if line.get_gid() == "stable"}
     assert len(colours) == 2
-    assert texts(response_figure([duffing()] * 2, labels=["a", "b"]))[:2] == ["a", "b"]
+    assert texts(plot_response([duffing()] * 2, labels=["a", "b"]))[:2] == ["a", "b"]
 
 
 @pytest.mark.parametrize("forces", [(0.4,), (0.4, 0.2), (0.9, 0.05, 0.3)])
 def test_the_legend_covers_no_curve(duffing, forces):
-    figure = response_figure([duffing(force=force) for force in forces])
+    figure = plot_response([duffing(force=force) for force in forces])
     figure.canvas.draw()
     box = legend_of(figure).get_window_extent()
     for axes in figure.axes:
@@ -71,15 +71,15 @@ def test_the_legend_covers_no_curve(duffing, forces):
 
 def test_a_full_frame_puts_the_legend_outside():
     x = np.linspace(0, 40, 2000)
-    dataset = branch_dataset(x, 1 + np.sin(8 * x), stable=x < 50)
-    figure = response_figure(dataset)
+    dataset = curve_dataset(x, 1 + np.sin(8 * x), stable=x < 50)
+    figure = plot_response(dataset)
     figure.canvas.draw()
     assert figure.legends
     assert figure.legends[0].get_window_extent().y0 > figure.axes[0].get_window_extent().y1
 
 
 def test_labels_and_ticks_stay_inside_and_apart(duffing, tmp_path):
-    figure = response_panels([duffing(), duffing(force=0.2)], tmp_path / "two.svg", titles=["one", "two"])
+    figure = plot_panels([duffing(), duffing(force=0.2)], tmp_path / "two.svg", titles=["one", "two"])
     assert (tmp_path / "two.svg").exists()
     figure.canvas.draw()
     whole = figure.bbox
@@ -95,14 +95,14 @@ def test_labels_and_ticks_stay_inside_and_apart(duffing, tmp_path):
 
 def test_the_axis_is_the_free_parameter():
     p = np.linspace(0.0, 1.0, 5)
-    along_p = branch_dataset(np.full(5, 2.0), p, parameters={"p": p}, free="p", observed_dof=2, dofs=3)
-    axes = response_figure(along_p).axes[0]
+    along_p = curve_dataset(np.full(5, 2.0), p, parameters={"p": p}, free="p", observed_dof=2, dofs=3)
+    axes = plot_response(along_p).axes[0]
     assert axes.get_xlabel() == "p"
     assert "x_{2}" in axes.get_ylabel()
-    along_omega = branch_dataset(p + 1, p, parameters={"p": 0.5})
+    along_omega = curve_dataset(p + 1, p, parameters={"p": 0.5})
     with pytest.raises(InputError, match="choose one with x="):
-        response_figure([along_p, along_omega])
-    assert response_figure([along_p, along_omega], x="p").axes[0].get_xlabel() == "p"
+        plot_response([along_p, along_omega])
+    assert plot_response([along_p, along_omega], x="p").axes[0].get_xlabel() == "p"
 
 
 @pytest.mark.parametrize(
@@ -110,35 +110,35 @@ def test_the_axis_is_the_free_parameter():
 )
 def test_the_suffix_says_the_form(duffing, tmp_path, suffix, magic):
     path = tmp_path / "new" / f"curve.{suffix}"
-    response_figure(duffing(), path)
+    plot_response(duffing(), path)
     first = path.read_bytes()
     assert first.startswith(magic)
-    save_figure(response_figure(duffing()), path)
+    save_figure(plot_response(duffing()), path)
     assert path.read_bytes() == first  # no time stamp in it
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]
 
 
 def test_an_unknown_suffix_and_a_wrong_object_are_refused(duffing, tmp_path):
     with pytest.raises(InputError, match=r"did you mean '\.png'"):
-        response_figure(duffing(), tmp_path / "curve.pgn")
+        plot_response(duffing(), tmp_path / "curve.pgn")
     with pytest.raises(InputError, match="to_xarray"):
-        response_figure(object())
+        plot_response(object())
     with pytest.raises(InputError, match="no curve"):
-        response_figure([])
+        plot_response([])
     with pytest.raises(InputError, match="not laid out by suboctave"):
-        response_figure(duffing().drop_attrs())
+        plot_response(duffing().drop_attrs())
     newer = duffing().assign_attrs(layout=999)
     with pytest.raises(InputError, match="newer than"):
-        response_figure(newer)
+        plot_response(newer)
 
 
 def test_no_global_plotting_state():
     code = """
 import sys, matplotlib
 before = matplotlib.rcParams.copy()
-from suboctave.pictures import response_figure
-from suboctave.store.layout import branch_dataset
-response_figure(branch_dataset([1.0, 2.0], [1.0, 2.0]), sys.argv[1])
+from suboctave.pictures import plot_response
+from suboctave.store.layout import curve_dataset
+plot_response(curve_dataset([1.0, 2.0], [1.0, 2.0]), sys.argv[1])
 assert "matplotlib.pyplot" not in sys.modules
 after = matplotlib.rcParams.copy()
 assert all(dict.__getitem__(after, key) == value for key, value in dict.items(before))

@@ -5,13 +5,13 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.pictures.strokes import strokes
-from suboctave.store.layout import EventRow, branch_dataset
+from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.arange(5.0)
 
 
 def curve(stable, events, **more):
-    return branch_dataset(X, X**2, stable=stable, events=events, **more)
+    return curve_dataset(X, X**2, stable=stable, events=events, **more)
 
 
 def described(dataset, x="omega"):
@@ -69,7 +69,7 @@ def test_an_event_that_changes_nothing_cuts_nothing():
 
 def test_a_named_parameter_on_the_axis():
     rows = [EventRow("LP", 1, 2.0, 1.5, parameters={"p": 0.15})]
-    dataset = branch_dataset(
+    dataset = curve_dataset(
         np.full(5, 2.0), X, stable=[1, 1, 0, 0, 0], parameters={"p": X / 10, "j": 0.5}, free="p", events=rows
     )
     assert described(dataset, "p") == [([0.0, 0.1, 0.15], True), ([0.15, 0.2, 0.3, 0.4], False)]
@@ -85,7 +85,7 @@ def test_without_stability_there_is_one_stroke():
 
 
 def test_a_single_point():
-    dataset = branch_dataset([1.0], [2.0], stable=[True])
+    dataset = curve_dataset([1.0], [2.0], stable=[True])
     assert described(dataset) == [([1.0], True)]
 
 
@@ -95,10 +95,10 @@ def test_wrong_lengths_are_refused():
     with pytest.raises(InputError, match="after point 9"):
         curve(None, [EventRow("LP", 9, 1.0, 1.0)])
     with pytest.raises(InputError, match="free parameter 'q'"):
-        branch_dataset(X, X, parameters={"p": 1.0}, free="q")
+        curve_dataset(X, X, parameters={"p": 1.0}, free="q")
 
 
 def test_a_parameter_may_have_any_name():
-    dataset = branch_dataset(X, X, parameters={"amplitude": X, "error": 3.0}, free="amplitude")
+    dataset = curve_dataset(X, X, parameters={"amplitude": X, "error": 3.0}, free="amplitude")
     assert list(dataset["amplitude"].to_numpy()) == list(X)
     assert described(dataset, "error") == [([3.0] * 5, None)]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import suboctave
-from suboctave.store.layout import EventRow, branch_dataset
+from suboctave.store.layout import EventRow, curve_dataset
 from suboctave.study import cli, demo
 
 
@@ -34,7 +34,7 @@ def curve_of(case):
         EventRow("NS", 60, 3.5, 0.3, 4e-14, complex(0.6, 0.8)),
         EventRow("LP", 120, 2.5, 4.0 * case.p, 1e-12),
     ]
-    dataset = branch_dataset(
+    dataset = curve_dataset(
         omega,
         1 / (1 + (omega - 2) ** 2) * case.p,
         stable=omega < 3,

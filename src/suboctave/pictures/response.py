@@ -7,6 +7,7 @@ Stable motions solid, unstable ones dashed, located bifurcations marked. Figures
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
-from suboctave.pictures.saving import save_figure
+from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import Stroke, strokes
 from suboctave.store.layout import check_layout, coordinate
 
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
 
-__all__ = ["draw_response", "response_figure", "response_panels"]
+__all__ = ["draw_response", "plot_panels", "plot_response"]
 
 
-def response_figure(
+def plot_response(
     curves: xarray.Dataset | Sequence[xarray.Dataset],
     path: str | Path | None = None,
     *,
@@ -43,12 +44,12 @@ def response_figure(
     several curves apart (default: the parameters in which they differ). `size` in inches.
     """
     group = _as_list(curves)
-    return response_panels(
+    return plot_panels(
         [group], path, x=x, labels=None if labels is None else [labels], titles=[title] if title else None, size=size
     )
 
 
-def response_panels(
+def plot_panels(
     panels: Sequence[xarray.Dataset | Sequence[xarray.Dataset]],
     path: str | Path | None = None,
     *,
@@ -59,7 +60,7 @@ def response_panels(
 ) -> Figure:
     """Several frames side by side on the same axes, with one legend for all of them.
 
-    Each entry of `panels` is what `response_figure` takes; `labels` and `titles` have one entry for each panel. Saved
+    Each entry of `panels` is what `plot_response` takes; `labels` and `titles` have one entry for each panel. Saved
     to `path` where one is given.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -86,6 +87,8 @@ def response_panels(
     _place_legend(figure, frames, _ordered(legend))
     if path is not None:
         save_figure(figure, path)
+    # Notebooks show an object that has this; without pyplot nothing else would tell them to.
+    setattr(figure, "_repr_png_", partial(png_bytes, figure))  # noqa: B010
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import tempfile
 from pathlib import Path
@@ -12,7 +13,7 @@ from suboctave.errors import InputError, suggest
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["SUFFIXES", "save_figure"]
+__all__ = ["SUFFIXES", "png_bytes", "save_figure"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 # No time stamps: the same curve gives the same file.
@@ -42,6 +43,13 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: float = 200.0) -> Path
         Path(name).unlink(missing_ok=True)
         raise
     return target
+
+
+def png_bytes(figure: Figure, dpi: float = 110.0) -> bytes:
+    """The figure as PNG in memory."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
 
 
 def _umask() -> int:

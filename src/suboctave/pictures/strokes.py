@@ -34,7 +34,7 @@ def strokes(dataset: xarray.Dataset, x: str) -> list[Stroke]:
 
     A piece between two neighbours of the line is stable when both ends say so. An event takes the stability of the side
     in question: that of the preceding point before it, of the following point after it. Between two events of the same
-    step only `event_stable_after` can tell; where it does not, and where stability changes with no located event,
+    step `event_stable_after` tells; where it does not, and where stability changes with no located event,
     the piece counts as unstable: a picture must not promise more than was found.
     """
     horizontal, event_horizontal = coordinate(dataset, x)
@@ -75,23 +75,14 @@ def _pieces(
     count = stable.size + after.size
     is_event = np.zeros(count, dtype=bool)
     is_event[event_position] = True
-    leaving = np.zeros(count, dtype=bool)  # what a vertex says about the piece after it
-    leaving[position] = stable
-    arriving = np.zeros(count, dtype=bool)  # what it says about the piece before it
-    arriving[position] = stable
-    told = np.zeros(count, dtype=bool)
-    leaving[event_position] = stable_after == 1
-    told[event_position] = stable_after >= 0
+    here = np.zeros(count, dtype=bool)  # the verdict at a point, or right after an event
+    here[position] = stable
+    here[event_position] = stable_after == 1
 
     verdict = np.zeros(count - 1, dtype=bool)
     for piece in range(count - 1):
-        first_event, last_event = is_event[piece], is_event[piece + 1]
-        if first_event and told[piece]:
-            verdict[piece] = leaving[piece]
-        elif first_event:
-            verdict[piece] = not last_event and arriving[piece + 1]
-        elif last_event:
-            verdict[piece] = leaving[piece]
+        if is_event[piece]:
+            verdict[piece] = here[piece] if is_event[piece + 1] else here[piece + 1]
         else:
-            verdict[piece] = leaving[piece] and arriving[piece + 1]
+            verdict[piece] = here[piece] and (is_event[piece + 1] or here[piece + 1])
     return verdict

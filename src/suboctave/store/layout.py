@@ -16,9 +16,9 @@ point after which the event lies, so that the curve with its events is one line:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -29,7 +29,10 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
 
-__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate"]
+    from suboctave.harmonic.orbit import PeriodicOrbit
+    from suboctave.model.system import System
+
+__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate", "curve_dataset"]
 
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
 UNKNOWN = -1  # in event_stable_after
@@ -44,7 +47,8 @@ class EventRow:
     """One located bifurcation, as a row of the dataset.
 
     `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
-    the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known).
+    the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
+    `uncertainty` is the half-width in the free parameter where the event could only be bracketed.
     """
 
     kind: str
@@ -55,10 +59,75 @@ class EventRow:
     multiplier: complex = complex(np.nan, np.nan)
     criticality: str | None = None
     stable_after: bool | None = None
+    uncertainty: float = 0.0
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 
-def branch_dataset(
+class EventLike(Protocol):
+    """What the layout asks of a located bifurcation or a user's event."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def omega(self) -> float: ...
+    @property
+    def amplitude(self) -> float: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def uncertainty(self) -> float: ...
+    @property
+    def criticality(self) -> str | None: ...
+    @property
+    def arclength(self) -> float: ...
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
+    @property
+    def multipliers(self) -> np.ndarray: ...
+    def critical_multiplier(self) -> complex: ...
+
+
+class BranchLike(Protocol):
+    """What the layout asks of a branch; events carry their place as arclength along it."""
+
+    @property
+    def system(self) -> System: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def orbits(self) -> Sequence[PeriodicOrbit]: ...
+    @property
+    def omega(self) -> np.ndarray: ...
+    @property
+    def amplitude(self) -> np.ndarray: ...
+    @property
+    def stable(self) -> np.ndarray: ...
+    @property
+    def harmonics(self) -> np.ndarray: ...
+    @property
+    def truncation(self) -> np.ndarray: ...
+    @property
+    def multipliers(self) -> np.ndarray: ...
+    @property
+    def arclength(self) -> np.ndarray: ...
+    @property
+    def bifurcations(self) -> Iterable[EventLike]: ...
+    @property
+    def events(self) -> Iterable[EventLike]: ...
+    @property
+    def closed(self) -> bool: ...
+    @property
+    def ended(self) -> str: ...
+    @property
+    def observe(self) -> int: ...
+    @property
+    def options(self) -> Mapping[str, Any]: ...
+    @property
+    def warnings(self) -> Sequence[str]: ...
+    def parameter(self, name: str) -> np.ndarray: ...
+
+
+def curve_dataset(
     omega: ArrayLike,
     amplitude: ArrayLike,
     *,
@@ -151,6 +220,71 @@ def branch_dataset(
     return xarray.Dataset(variables, coords, attributes)
 
 
+def branch_dataset(branch: BranchLike) -> xarray.Dataset:
+    """A computed branch as a labelled dataset; the layout is described at the top of this module."""
+    names = list(branch.system.parameters)
+    arclength = np.asarray(branch.arclength)
+    return curve_dataset(
+        branch.omega,
+        branch.amplitude,
+        stable=branch.stable,
+        harmonics=branch.harmonics,
+        error=branch.truncation,
+        residual=[orbit.residual for orbit in branch.orbits],
+        multipliers=branch.multipliers,
+        parameters={name: branch.parameter(name) for name in names},
+        free=branch.name,
+        events=_event_rows(branch, arclength),
+        system=branch.system.name,
+        ended=branch.ended,
+        closed=branch.closed,
+        period=branch.orbits[0].basis.nu if len(branch.orbits) else 1,
+        observed_dof=branch.observe,
+        dofs=branch.system.n,
+        options={
+            name: value if isinstance(value, str | int | float) else repr(value)
+            for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
+        },
+    )
+
+
+def _event_rows(branch: BranchLike, arclength: np.ndarray) -> list[EventRow]:
+    """The branch's bifurcations and events in the order met, each with its place and the verdict right after it."""
+    own = {id(event) for event in branch.events}
+    met = sorted([*branch.bifurcations, *branch.events], key=lambda event: event.arclength)
+    rows: list[EventRow] = []
+    for event in met:
+        place = int(np.searchsorted(arclength, event.arclength, side="right")) - 1
+        after = min(max(place, 0), max(arclength.size - 2, 0))
+        told = rows[-1].stable_after if rows and rows[-1].after == after else None
+        before = bool(branch.stable[after]) if told is None else told
+        critical = event.critical_multiplier()
+        rows.append(
+            EventRow(
+                event.kind,
+                after,
+                event.omega,
+                event.amplitude,
+                residual=event.residual,
+                multiplier=critical,
+                criticality=event.criticality,
+                stable_after=(
+                    before if id(event) in own else not before and not _others_unstable(event.multipliers, critical)
+                ),
+                uncertainty=event.uncertainty,
+                parameters=dict(event.parameters),
+            )
+        )
+    return rows
+
+
+def _others_unstable(multipliers: np.ndarray, critical: complex) -> bool:
+    """Whether multipliers other than the critical one (and its conjugate) lie outside the unit circle."""
+    distance = np.minimum(np.abs(multipliers - critical), np.abs(multipliers - np.conj(critical)))
+    skip = np.argsort(distance)[: 1 if abs(critical.imag) < 1e-6 * abs(critical) else 2]
+    return bool(np.any(np.abs(np.delete(multipliers, skip)) > 1.0))
+
+
 def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:
     """The values of `omega` or of a named parameter, at the points (points,) and at the events (events,).
 
@@ -166,7 +300,7 @@ def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarr
 
 
 def check_layout(dataset: xarray.Dataset) -> None:
-    """Raises InputError when the dataset is not one that `branch_dataset` of this version lays out."""
+    """Raises InputError when the dataset is not one that `curve_dataset` of this version lays out."""
     found = dataset.attrs.get("layout")
     if found is None:
         raise InputError("this dataset was not laid out by suboctave: it has no attribute 'layout'")
@@ -210,6 +344,11 @@ def _event_variables(
         "event_omega": ("event", np.array([row.omega for row in events], dtype=float)),
         "event_amplitude": ("event", np.array([row.amplitude for row in events], dtype=float)),
         "event_residual": ("event", np.array([row.residual for row in events], dtype=float)),
+        "event_uncertainty": (
+            "event",
+            np.array([row.uncertainty for row in events], dtype=float),
+            {"long_name": "half-width in the free parameter of an event that was only bracketed, else 0"},
+        ),
         "event_multiplier": (
             "event",
             np.array([row.multiplier for row in events], dtype=complex),

@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from suboctave.pictures import response_figure, response_panels
+from suboctave.pictures import plot_panels, plot_response
 
 if TYPE_CHECKING:
     import xarray
@@ -72,20 +72,30 @@ def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:
             f"({letter}) $p = {c.case.p:g}$, $j = {c.case.j:g}$" for letter, c in zip("abcdef", weak, strict=False)
         ]
         files.append(folder / "weak_forcing.png")
-        response_panels([curve.dataset for curve in weak], files[-1], titles=titles)
+        plot_panels([curve.dataset for curve in weak], files[-1], titles=titles)
     if strong:
         title = ", ".join(f"$p = {c.case.p:g}$, $j = {c.case.j:g}$" for c in strong)
         files.append(folder / "strong_forcing.png")
-        response_figure([curve.dataset for curve in strong], files[-1], title=title)
+        plot_response([curve.dataset for curve in strong], files[-1], title=title)
     return files
 
 
 def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]:
-    """The located bifurcations as text: kind, omega, max |x|, critical multiplier, residual."""
-    columns = (dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual"))
+    """The located bifurcations as text: kind, omega, max |x|, critical multiplier, residual.
+
+    One that could only be bracketed shows the half-width of its bracket in place of a residual.
+    """
+    names = ("kind", "omega", "amplitude", "multiplier", "residual", "uncertainty")
+    columns = (dataset[f"event_{name}"].to_numpy() for name in names)
     return [
-        (str(kind), f"{omega:.8f}", f"{amplitude:.7f}", _complex_text(complex(multiplier)), f"{residual:.0e}")
-        for kind, omega, amplitude, multiplier, residual in zip(*columns, strict=True)
+        (
+            str(kind),
+            f"{omega:.8f}",
+            f"{amplitude:.7f}",
+            _complex_text(complex(multiplier)),
+            f"± {uncertainty:.0e}" if uncertainty else f"{residual:.0e}",
+        )
+        for kind, omega, amplitude, multiplier, residual, uncertainty in zip(*columns, strict=True)
     ]
 
 
