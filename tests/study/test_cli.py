@@ -40,7 +40,7 @@ def curve_of(case):
         stable=omega < 3,
         parameters={"p": case.p, "j": case.j},
         events=rows,
-        ended="omega reached 1.25, the end of its range.",
+        ended="reached the end of the range at omega = 1.25",
     )
     return demo.Curve(case, dataset, 0.25)
 
@@ -79,10 +79,23 @@ def test_the_demo_prints_tables_of_80_columns_and_writes_figures(computed, tmp_p
     assert max(map(len, printed.out.splitlines()[:-2])) <= 80
     assert len(re.findall(r"^ *PD +3\.99000000 +0\.2000000 +-1\.000000 +3e-13 *$", printed.out, re.MULTILINE)) == 3
     assert len(re.findall(r"^ *NS .*\+0\.600000 ± 0\.800000i", printed.out, re.MULTILINE)) == 3
-    assert printed.out.count("omega reached 1.25, the end of its range.") == 3
+    assert printed.out.count("200 points in 0.25 s; reached the end of the range at omega = 1.25.") == 3
     for name in ("weak_forcing.png", "strong_forcing.png"):
         assert (tmp_path / "new" / name).read_bytes().startswith(b"\x89PNG")
         assert name in printed.out
+
+
+def test_ctrl_c_keeps_what_was_computed(monkeypatch, tmp_path, capsys):
+    def interrupted(case, progress=None):
+        curve = curve_of(case)
+        curve.dataset.attrs["ended"] = "interrupted at omega = 2; what was computed is kept"
+        return curve
+
+    monkeypatch.setattr(demo, "compute", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        cli.run_demo(tmp_path)
+    assert capsys.readouterr().out.count("interrupted at omega = 2") == 1  # the other cases are not begun
+    assert [path.name for path in tmp_path.iterdir()] == ["weak_forcing.png"]
 
 
 def test_an_error_of_ours_is_one_sentence(monkeypatch, capsys):

@@ -95,9 +95,13 @@ def run_demo(out: Path) -> None:
             curve = demo.compute(case, report)
         curves.append(curve)
         _print_curve(console, curve)
+        if curve.interrupted:
+            break
     console.print()
     for path in demo.draw(curves, out):
         console.print(f"figure: {path}", markup=False, soft_wrap=True)
+    if curves[-1].interrupted:
+        raise KeyboardInterrupt
 
 
 def _print_curve(console: "Console", curve: "Curve") -> None:
@@ -118,7 +122,7 @@ def _print_curve(console: "Console", curve: "Curve") -> None:
         console.print(table)
     else:
         console.print("no bifurcation")
-    console.print(f"{dataset.sizes['point']} points in {curve.seconds:.2f} s. {dataset.attrs['ended']}", markup=False)
+    console.print(f"{dataset.sizes['point']} points in {curve.seconds:.2f} s; {dataset.attrs['ended']}.", markup=False)
 
 
 @contextmanager
