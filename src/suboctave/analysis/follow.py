@@ -17,12 +17,16 @@ from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.floquet import floquet_multipliers
-from suboctave.harmonic.balance import BalanceState
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, neglected_motion, truncation
 
 #: two changes in one step are separated by halving it, down to this distance in scaled arclength
 _SEPARATE = 2e-3
+#: multipliers of modulus above one half may move by this much per step (relative to their modulus where it exceeds one)
+_MOVEMENT = 0.4
+#: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
+_NEAR_CIRCLE = 0.02
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,11 @@ class _Follower:
         self.trace = Trace()
         self.previous: Sample | None = None
         self._candidate: Sample | None = None
+        self._speed = self._next_speed = 0.0
+        self._recent: list[str] = []
+        self._changed: list[str] = []
+        self._counted: Sample | None = None
+        self._since: list[Bifurcation] = []
 
     def run(self) -> Trace:
         trace = self.trace
@@ -105,12 +114,34 @@ class _Follower:
         return Sample(point, point.evaluation.state)
 
     def _separated(self, a: CurvePoint, b: CurvePoint) -> bool:
-        """True if at most one test changes in a step, or the step is short already."""
+        """True if a step hides nothing that its ends could tell of, or is short already.
+
+        At most one test may change in a step; the multipliers may not move far, so that their path is known; no multiplier may have
+        had the time to reach +1 or -1 and come back, and no complex pair the time to meet on the real axis, part, and meet again.
+        """
         self._candidate = new = self._sample(b)
-        if self.previous is None or b.arclength - a.arclength < _SEPARATE:
+        old, step = self.previous, b.arclength - a.arclength
+        if old is None or step < _SEPARATE:
             return True
-        changes = sum(kind.changed(self.previous, new) for kind in ALL_KINDS)
-        return changes <= 1 and abs(self.previous.floquet.unstable - new.floquet.unstable) <= 2
+        changed = [kind.name for kind in ALL_KINDS if kind.changed(old, new)]
+        if len(changed) > 1 or abs(old.floquet.unstable - new.floquet.unstable) > 2:
+            return False
+        moved = _movement(old.floquet.multipliers, new.floquet.multipliers)
+        # how far they went, seen directly and at the speed of the step before (a fast rotation may look like none)
+        speed = max(moved, self._speed * step)
+        if moved > _MOVEMENT or speed > 1.5 * _MOVEMENT:
+            return False
+        for target, kinds in ((1.0, ("LP", "BP")), (-1.0, ("PD",))):
+            if any(kind in changed or kind in self._recent for kind in kinds):
+                continue
+            gap = sum(float(np.abs(s.floquet.multipliers - target).min()) for s in (old, new))
+            if gap < 1.3 * speed:
+                return False
+        if _height(old.floquet.multipliers, new.floquet.multipliers) < 1.3 * speed:
+            return False
+        self._next_speed = moved / step
+        self._changed = changed
+        return True
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
@@ -120,6 +151,7 @@ class _Follower:
             BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations)
         )
         self.previous = sample
+        self._speed, self._recent, self._changed = self._next_speed, self._changed, []
         report = self.settings.report
         if report is not None:
             low, high = self.bounds
@@ -150,23 +182,28 @@ class _Follower:
             found.append((located.fraction, item))
             if kind.name == "BP":
                 branch_point = item
-        self._check_count(a, b, [item for _, item in found])
+        self._check_count(b, [item for _, item in found])
         self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
         for event in self.settings.events:
             crossed = self._event(event, a, b)
             if crossed is not None:
                 self.trace.events.append(crossed)
 
-    def _check_count(self, a: Sample, b: Sample, found: list[Bifurcation]) -> None:
+    def _check_count(self, b: Sample, found: list[Bifurcation]) -> None:
         """The number of unstable multipliers must have changed by what the bifurcations explain."""
-        if not (a.floquet.decided and b.floquet.decided):
+        self._since += found
+        if not b.floquet.decided or np.any(np.abs(np.abs(b.floquet.multipliers) - 1.0) < _NEAR_CIRCLE):
             return
-        odd = sum(item.kind in ("LP", "PD", "BP") for item in found)
-        pairs = sum(item.kind == "NS" for item in found)
+        a, items = self._counted, self._since
+        self._counted, self._since = b, []
+        if a is None:
+            return
+        odd = sum(item.kind in ("LP", "PD", "BP") for item in items)
+        pairs = sum(item.kind == "NS" for item in items)
         change = abs(b.floquet.unstable - a.floquet.unstable)
         if change > odd + 2 * pairs or (change - odd) % 2:
             where = f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)}"
-            names = ", ".join(item.kind for item in found) or "none"
+            names = ", ".join(item.kind for item in items) or "none"
             self.trace.warnings.append(
                 f"{where} the number of unstable multipliers changes from {a.floquet.unstable} to {b.floquet.unstable}, "
                 f"which the bifurcations located there ({names}) do not explain; a smaller max_step may resolve it"
@@ -221,7 +258,7 @@ class _Follower:
             if moved > 0.05:
                 self.trace.warnings.append(
                     f"{located.kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
-                    "harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
+                    f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
                 )
                 break
             solution = better
@@ -255,6 +292,25 @@ def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
     return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
 
 
+def _movement(old: ComplexArray, new: ComplexArray) -> float:
+    """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
+    relevant = new[np.abs(new) > 0.5]
+    if not relevant.size:
+        return 0.0
+    nearest = np.abs(relevant[:, None] - old[None, :]).min(axis=1)
+    return float((nearest / np.maximum(1.0, np.abs(relevant))).max())
+
+
+def _height(old: ComplexArray, new: ComplexArray) -> float:
+    """Least way of a complex pair (modulus above one half) down to the real axis and up again between two points."""
+    relevant = new[(new.imag > 0.0) & (np.abs(new) > 0.5)]
+    before = old[old.imag > 0.0]
+    if not (relevant.size and before.size):
+        return np.inf
+    partner = before[np.abs(relevant[:, None] - before[None, :]).argmin(axis=1)]
+    return float((relevant.imag + partner.imag).min())
+
+
 def _drop_seam(items: list[Bifurcation]) -> None:
     """A bifurcation on the seam of a closed curve is met at both ends: keep the first."""
     if len(items) < 2:
@@ -265,4 +321,4 @@ def _drop_seam(items: list[Bifurcation]) -> None:
         items.pop()
 
 
-__all__ = ["BalanceState", "Settings", "Trace", "follow"]
+__all__ = ["Settings", "Trace", "follow"]
