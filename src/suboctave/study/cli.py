@@ -144,7 +144,11 @@ def _progress(name: str) -> Iterator[Any]:
     ) as bar:
         task = bar.add_task(name, total=1.0, text="")
 
+        furthest = 0.0
+
         def report(fraction: float, text: str = "") -> None:
-            bar.update(task, completed=fraction, text=text)
+            nonlocal furthest  # a curve that folds back runs through its range again; a bar does not
+            furthest = max(furthest, fraction)
+            bar.update(task, completed=furthest, text=text)
 
         yield report
