@@ -1,0 +1,15 @@
+"""The witness: time integration with located contacts, shooting, bifurcations by shooting; knows no harmonic object."""
+
+from suboctave.timedomain.locate import locate_by_shooting
+from suboctave.timedomain.shooting import PeriodicSolution, shoot
+from suboctave.timedomain.trajectory import Contact, Trajectory, integrate, state_transition
+
+__all__ = [
+    "Contact",
+    "PeriodicSolution",
+    "Trajectory",
+    "integrate",
+    "locate_by_shooting",
+    "shoot",
+    "state_transition",
+]

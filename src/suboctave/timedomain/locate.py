@@ -1,0 +1,236 @@
+"""Bifurcations of periodic motions by shooting alone, with free `omega`.
+
+The periodic motions near a start form a curve of `F(z, eta) = Phi(z, eta) - z = 0`, `eta = omega / W`, `z` the scaled
+state; it is followed in short steps and a test function that vanishes at the bifurcation is driven to zero along it by
+a safeguarded secant iteration. Every step onto the curve is Newton with the least-norm correction, so that limit
+points are points like any other. With `A = [F_z, F_eta]` and its null vector `t`:
+
+- LP: the component of `t` along `eta` vanishes;
+- PD: `[F_z + 2 I, b; c^T, 0]` gives a zero last component (a multiplier is -1);
+- NS: `|mu|^2 - 1` of one complex pair, followed by nearness;
+- BP: the same bordering of `[A; t^T]`, which has a second null vector there (with `b`, `c` from the start); the
+  direction that leaves the curve is not corrected while it is nearly singular.
+
+Kuznetsov, Elements of Applied Bifurcation Theory, chapter 10, has the bordered test functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.model import System
+from suboctave.timedomain.field import Array, Field, scaled_field
+from suboctave.timedomain.shooting import PeriodicSolution, check_dof, check_periods, finish
+from suboctave.timedomain.trajectory import flow, measured_lengths
+
+__all__ = ["locate_by_shooting"]
+
+_KINDS = ("LP", "PD", "NS", "BP")
+_FIRST_STEP = 1e-4  # along the curve, in units of the size of the motion
+_NEARLY_SINGULAR = 1e-5  # relative singular value below which a BP's second direction is left alone
+_NO_BRANCH_POINT = 1e-4
+_REAL_MULTIPLIER = 1e-5  # imaginary part below which a pair on the unit circle is taken for two real multipliers
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A point of the curve: `u` = scaled state and eta, `A`, unit null vector, monodromy, relative residual."""
+
+    u: Array
+    slopes: Array
+    tangent: Array
+    transition: Array
+    residual: float
+
+
+class _Curve:
+    """Periodic motions with free frequency, in the scales of the start."""
+
+    def __init__(self, model: Field, periods: int, rtol: float, tol: float, branch_point: bool) -> None:
+        self.model, self.periods, self.rtol, self.tol = model, periods, rtol, tol
+        self.m = 2 * model.n
+        self.cut = _NEARLY_SINGULAR if branch_point else 0.0
+        self.evaluations = 0
+
+    def evaluate(self, u: Array) -> tuple[Array, Array, Array]:
+        """Defect (2n,), `[F_z, F_eta]` (2n, 2n + 1), scaled monodromy."""
+        if not u[-1] > 0.0:
+            raise ConvergenceError("the search left the positive frequencies: start closer to the bifurcation")
+        self.evaluations += 1
+        field = self.model.at_frequency(u[-1] * self.model.reference)
+        end = 2.0 * np.pi * self.periods
+        final, slopes, _ = flow(field, 0.0, u[:-1], end, self.rtol, slope=True)
+        transition = slopes[:, :-1].copy()
+        slopes[:, :-1] -= np.eye(self.m)
+        return final - u[:-1], slopes, transition
+
+    def onto(self, u: Array, along: Array | None, max_iterations: int = 25) -> _Point:
+        """The point of the curve nearest to `u`, tangent oriented like `along`."""
+        previous = np.inf
+        for _ in range(max_iterations):
+            defect, slopes, transition = self.evaluate(u)
+            residual = float(np.max(np.abs(defect)))
+            left, size, right = np.linalg.svd(slopes)
+            keep = size > self.cut * size[0]
+            step = -right[:-1][keep].T @ ((left.T @ defect)[keep] / size[keep])
+            floor = self.tol * max(1.0, size[0])
+            # At the floor one more step still brings digits of omega, unless the last one brought none.
+            if residual <= (floor if residual > 0.1 * previous else 0.01 * floor):
+                tangent = right[-1]
+                if along is not None:
+                    null = right[-1:] if keep.all() else right[-2:]
+                    tangent = null.T @ (null @ along)
+                    tangent /= np.linalg.norm(tangent)
+                elif tangent[-1] < 0.0:
+                    tangent = -tangent
+                return _Point(u, slopes, tangent, transition, residual)
+            length = float(np.max(np.abs(step)))
+            u = u + step * min(1.0, 0.5 / length if length > 0.0 else 1.0)
+            previous = residual
+        raise ConvergenceError(
+            f"shooting with free omega did not arrive near omega = {u[-1] * self.model.reference:.9g} (relative "
+            f"residual {residual:.1e} after {max_iterations} steps): start closer, for instance from shoot(...) on the "
+            "same branch"
+        )
+
+
+def _bordered(matrix: Callable[[_Point], Array], start: _Point) -> Callable[[_Point], float]:
+    """Signed measure of singularity: last component of the solution of the matrix bordered by its singular vectors."""
+    left, _, right = np.linalg.svd(matrix(start))
+    b, c = left[:, -1], right[-1]
+
+    def value(point: _Point) -> float:
+        a = matrix(point)
+        whole = np.block([[a, b[:, None]], [c[None, :], np.zeros((1, 1))]])
+        target = np.zeros(len(whole))
+        target[-1] = 1.0
+        return float(np.linalg.solve(whole, target)[-1])
+
+    return value
+
+
+def _neimark_sacker(start: _Point) -> Callable[[_Point], float]:
+    """`|mu|^2 - 1` of the complex multiplier that starts nearest to the unit circle."""
+    multipliers = np.linalg.eigvals(start.transition)
+    upper = multipliers[multipliers.imag > 1e-6 * np.abs(multipliers)]
+    if upper.size == 0:
+        raise ConvergenceError(
+            "no complex pair of multipliers at the start, so that no NS can be followed from there: start closer to it "
+            "(two real multipliers whose product is 1 are a neutral saddle, not an NS)"
+        )
+    current = [upper[np.argmin(np.abs(np.abs(upper) - 1.0))]]
+
+    def value(point: _Point) -> float:
+        all_of_them = np.linalg.eigvals(point.transition)
+        nearest = all_of_them[np.argmin(np.abs(all_of_them - current[0]))]
+        current[0] = nearest
+        return float(abs(nearest) ** 2 - 1.0)
+
+    return value
+
+
+def _test_function(kind: str, start: _Point) -> Callable[[_Point], float]:
+    identity = np.eye(len(start.transition))
+    if kind == "LP":
+        return lambda point: float(point.tangent[-1])
+    if kind == "PD":
+        return _bordered(lambda point: point.transition + identity, start)
+    if kind == "BP":
+        return _bordered(lambda point: np.vstack([point.slopes, point.tangent]), start)
+    return _neimark_sacker(start)
+
+
+def locate_by_shooting(
+    system: System,
+    kind: str,
+    state: ArrayLike,
+    omega: float,
+    periods: int = 1,
+    values: Mapping[str, float] | None = None,
+    tol: float = 1e-11,
+    max_step: float = 0.05,
+    max_iterations: int = 60,
+    observe: int | None = None,
+    rtol: float = 1e-12,
+) -> PeriodicSolution:
+    """The LP, PD, NS or BP nearest along the curve of periodic motions through a start, `omega` free.
+
+    `state` (2n,), `omega`: a start near it. `periods`: those of the motion itself (a PD that leads from 2T to 4T has
+    2). `max_step`: longest step along the curve, in units of the size of the motion. The returned solution has `kind`,
+    and in `test` what is left of the test function. Raises `InputError`, or `ConvergenceError` with the place it got
+    to. A BP is found where a symmetry makes the crossing branches exist at all.
+    """
+    if kind not in _KINDS:
+        raise InputError(f"unknown kind of bifurcation {kind!r}{suggest(str(kind), _KINDS)}")
+    periods, dof = check_periods(periods), check_dof(system, observe)
+    start = np.array(state, dtype=float)
+    model = scaled_field(system, start, omega, values)
+    # One pass for the size of the motion, then fixed scales: the secant iteration needs one measure of length.
+    _, _, passage = flow(model, 0.0, start / model.scale, 2.0 * np.pi * periods, 1e-6)
+    model.rescale(measured_lengths(model, passage))
+    curve = _Curve(model, periods, rtol, tol, kind == "BP")
+    point = curve.onto(np.append(start / model.scale, 1.0), None)
+    point, test, steps = _drive(curve, point, kind, max_step, max_iterations)
+
+    final = model.at_frequency(point.u[-1] * model.reference)
+    solution = finish(
+        final, point.u[:-1] * model.scale, periods, point.transition, point.residual, steps, dof, rtol, kind, test
+    )
+    _confirm(kind, solution, point)
+    return solution
+
+
+def _drive(curve: _Curve, point: _Point, kind: str, max_step: float, max_iterations: int) -> tuple[_Point, float, int]:
+    """Secant iteration on the test function along the curve, kept inside a bracket once there is one."""
+    measure = _test_function(kind, point)
+    value = measure(point)
+    best = (abs(value), point, value)
+    step = _FIRST_STEP
+    bracket: _Point | None = None  # a point with the other sign of the test function
+    for count in range(1, max_iterations + 1):
+        following = curve.onto(point.u + step * point.tangent, point.tangent)
+        new = measure(following)
+        moved = float(point.tangent @ (following.u - point.u))
+        if abs(new) < best[0]:
+            best = (abs(new), following, new)
+        if new == 0.0:
+            return following, new, count
+        if new * value < 0.0:
+            bracket = point
+        slope = (new - value) / moved if moved != 0.0 else 0.0
+        wanted = -new / slope if slope != 0.0 else np.copysign(max_step, step)
+        if abs(wanted * following.tangent[-1]) <= 2e-13 and abs(wanted) <= 1e-9:
+            return best[1], best[2], count
+        if count > 5 and abs(wanted * following.tangent[-1]) <= 1e-10 and abs(wanted) <= 1e-7 and abs(new) >= best[0]:
+            return best[1], best[2], count  # the noise of the integration: no further digit to be had
+        limit = max_step if count > 1 else min(max_step, 100.0 * _FIRST_STEP)
+        if bracket is not None:
+            room = float(following.tangent @ (bracket.u - following.u))
+            if not 0.0 <= wanted / room <= 1.0:
+                wanted = 0.5 * room
+        step = float(np.clip(wanted, -limit, limit))
+        point, value = following, new
+    raise ConvergenceError(
+        f"no {kind} found within {max_iterations} steps: test function {best[2]:.2e} at best, at omega = "
+        f"{best[1].u[-1] * curve.model.reference:.9g}, {value:.2e} at the last point. Start closer, or allow longer "
+        "steps (max_step)"
+    )
+
+
+def _confirm(kind: str, solution: PeriodicSolution, point: _Point) -> None:
+    """Refuse a point that is not what was asked for."""
+    mu = solution.multipliers
+    where = f"near omega = {solution.omega:.9g}"
+    if kind == "NS":
+        off_axis = np.abs(mu.imag) > _REAL_MULTIPLIER
+        if not np.any(np.abs(np.abs(mu[off_axis]) - 1.0) < 1e-6):
+            raise ConvergenceError(f"the pair of multipliers followed became real {where}: no NS there")
+    if kind == "BP":
+        size = np.linalg.svd(point.slopes, compute_uv=False)
+        if size[-1] > _NO_BRANCH_POINT * size[0]:
+            raise ConvergenceError(f"no branch point {where}: no second branch crosses there (is it an LP?)")
