@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import BalanceState, HarmonicBalance
@@ -41,7 +42,7 @@ class ResponseEvaluation:
         """Residual in units of the forces that balance."""
         state = self.state
         weight = state.balance.scales()[1]
-        size = float(np.linalg.norm(state.residual.reshape(state.x.shape) * weight))
+        size = length(state.residual.reshape(state.x.shape) * weight)
         return size / max(state.force_scale(), np.finfo(float).tiny)
 
     @cached_property
@@ -118,7 +119,7 @@ class ResponseCurve:
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
-        return float(np.linalg.norm(self._weight * u[:-1]))
+        return length(self._weight * u[:-1])
 
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
@@ -161,6 +162,8 @@ class ResponseCurve:
     def images(self, u: Array) -> list[Array]:
         """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""
         basis = self.balance.basis
+        if basis.nu == 1:
+            return [u]
         x = u[:-1].reshape(basis.size, -1)
         shifted = []
         for shift in range(basis.nu):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,12 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 Array = NDArray[np.float64]
+
+
+def length(vector: Array) -> float:
+    """Euclidean norm of a real array, without the overhead of `numpy.linalg.norm`."""
+    flat = vector.ravel()
+    return math.sqrt(flat.dot(flat))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.continuation.newton import NewtonOptions, Solved, bordered, correct, tangent
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
 
@@ -36,7 +37,7 @@ class SteppingOptions:
         Points after which the curve ends with a reason.
     """
 
-    max_step: float = 0.1
+    max_step: float = 0.05
     initial_step: float = 0.01
     min_step: float = 1e-7
     deviation: float = 0.01
@@ -76,10 +77,11 @@ class CurvePoint:
 def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
     """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
     t = tangent(solved)
+    # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of F_u, so that
+    # det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
+    sign = solved.factor.sign
     if along is not None and (solved.weights * t) @ (solved.weights * along) < 0.0:
-        t = -t
-    # sign of det [F_u; t]: changes at a branch point that the curve passes straight on
-    sign = bordered(solved.evaluation, solved.weights * t, solved.weights).sign
+        t, sign = -t, -sign
     return CurvePoint(curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations)
 
 
@@ -93,7 +95,7 @@ def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
     ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    h = float(np.linalg.norm(b.weights * (b.u - ua)))
+    h = length(b.weights * (b.u - ua))
     s = fraction
     return (
         (1.0 + 2.0 * s) * (1.0 - s) ** 2 * ua
@@ -114,8 +116,7 @@ def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonO
     guess = between(a, b, fraction)
     chord = b.u - b.curve.transfer(a.u, a.curve)
     row = b.weights * chord
-    length = float(np.linalg.norm(row))
-    solved = correct(b.curve, guess, row / length, b.weights, newton)
+    solved = correct(b.curve, guess, row / length(row), b.weights, newton)
     return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
 
 
@@ -210,16 +211,14 @@ class March:
         """The start with its tangent pointing in the wanted direction."""
         point = self.start
         if point.tangent[point.curve.parameter] * self._direction < 0.0:
-            flipped = -point.tangent
-            sign = bordered(point.evaluation, point.weights * flipped, point.weights).sign
-            point = replace(point, tangent=flipped, orientation=sign)
+            point = replace(point, tangent=-point.tangent, orientation=-point.orientation)
         return point
 
     @staticmethod
     def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
         """The same point with scaling and tangent length of the present amplitude."""
         weights = point.curve.weights(point.u, largest)
-        return replace(point, weights=weights, tangent=point.tangent / np.linalg.norm(weights * point.tangent))
+        return replace(point, weights=weights, tangent=point.tangent / length(weights * point.tangent))
 
     def _advance(self, point: CurvePoint, step: float, bend: Array | None) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, step length used, distance between prediction and solution."""
@@ -230,7 +229,7 @@ class March:
                     guess += 0.5 * step**2 * bend
                 row = point.weights * point.tangent
                 solved = correct(point.curve, guess, row, point.weights, self.newton)
-                taken = float(np.linalg.norm(point.weights * (solved.u - point.u)))
+                taken = length(point.weights * (solved.u - point.u))
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
                 fine = (
@@ -249,7 +248,7 @@ class March:
     @staticmethod
     def _angle(a: CurvePoint, b: CurvePoint) -> float:
         ta, tb = b.weights * a.tangent, b.weights * b.tangent
-        cosine = float(ta @ tb / (np.linalg.norm(ta) * np.linalg.norm(tb)))
+        cosine = float(ta @ tb / (length(ta) * length(tb)))
         return math.acos(min(1.0, max(-1.0, cosine)))
 
     def _next_step(self, point: CurvePoint, new: CurvePoint, step: float, deviation: float) -> float:
@@ -291,27 +290,27 @@ class March:
             return None
         u = solved.u
         u[index] = bound
-        length = point.arclength + float(np.linalg.norm(new.weights * (u - point.u)))
-        return make_point(solved, new.curve, new.tangent, length)
+        arclength = point.arclength + length(new.weights * (u - point.u))
+        return make_point(solved, new.curve, new.tangent, arclength)
 
     def _returns(self, first: CurvePoint, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
         """The start point again, if the step from `point` to `new` passes it in the same direction."""
         origin = new.curve.transfer(first.u, first.curve)
         heading = new.curve.transfer(first.tangent, first.curve)
         w = new.weights
-        step = float(np.linalg.norm(w * (new.u - point.u)))
+        step = length(w * (new.u - point.u))
         for image, leaving in zip(new.curve.images(origin), new.curve.images(heading), strict=True):
             from_point, to_new = w * (image - point.u), w * (new.u - image)
-            if np.linalg.norm(from_point) > 1.5 * step or np.linalg.norm(to_new) > 1.5 * step:
+            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
                 continue
             ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
-            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * np.linalg.norm(w * leaving)
+            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
             if not (ahead and same_way):
                 continue
-            fraction = float(np.linalg.norm(from_point)) / (
-                float(np.linalg.norm(from_point)) + float(np.linalg.norm(to_new))
+            fraction = length(from_point) / (
+                length(from_point) + length(to_new)
             )
-            miss = float(np.linalg.norm(w * (between(point, new, fraction) - image)))
+            miss = length(w * (between(point, new, fraction) - image))
             if miss < 0.05 * step + 1e-6:
-                return replace(first, arclength=point.arclength + float(np.linalg.norm(from_point)))
+                return replace(first, arclength=point.arclength + length(from_point))
         return None

@@ -10,9 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.continuation.linear import Factor
+from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
+
+
+#: correction in scaled arclength below which the Jacobian is not computed anew
+_SHORT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -77,32 +81,37 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
     previous = np.inf
     contraction = 0.0
     first = 0.0
+    factor: Factor | None = None
     for iteration in range(options.iterations + 1):
         evaluation = curve.evaluate(u)
         error = evaluation.error
         if not np.isfinite(error):
             raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
-        factor = bordered(evaluation, row, weights)
         # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
         if error <= options.tolerance and (settled or iteration == 0):
-            distance = float(np.linalg.norm(weights * (u - guess)))
-            return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
-        if iteration == options.iterations or factor.singular:
+            distance = length(weights * (u - guess))
+            return Solved(u, evaluation, weights, bordered(evaluation, row, weights), iteration, distance, contraction)
+        if iteration == options.iterations:
+            break
+        # after a short step that contracts, the old factors take the next one as far
+        if factor is None or previous > _SHORT or contraction > 0.1:
+            factor = bordered(evaluation, row, weights)
+        if factor.singular:
             break
         rhs = np.empty(len(u))
         rhs[:-1] = evaluation.residual
         rhs[-1] = row @ (weights * (u - guess))
         step = factor.solve(rhs)
-        length = float(np.linalg.norm(step))
+        size = length(step)
         if iteration == 0:
-            first = length
+            first = size
         else:
-            contraction = length / previous if previous > 0.0 else 0.0
-            if contraction > 2.0 and length > first:
+            contraction = size / previous if previous > 0.0 else 0.0
+            if contraction > 2.0 and size > first:
                 break
         u = u - step / weights
-        previous = length
+        previous = size
     raise ConvergenceError(
         f"Newton's method did not converge near {curve.where(guess)} (residual {error:.1e} after {iteration} iterations)"
     )
@@ -113,4 +122,4 @@ def tangent(solved: Solved) -> Array:
     rhs = np.zeros(len(solved.u))
     rhs[-1] = 1.0
     direction = solved.factor.solve(rhs)
-    return direction / np.linalg.norm(direction) / solved.weights
+    return direction / length(direction) / solved.weights

@@ -20,11 +20,11 @@ from suboctave.harmonic import kernels as harmonic_kernels
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import LocalMotion
+from suboctave.harmonic.quadrature import sharp_nodes
 from suboctave.model.sampling import PiecewiseLinear, SharpSampling
 
 _GAUSS = np.array([-1.0, 1.0]) / math.sqrt(3.0)
 _RATIO = 2.5
-_DEPTH = 24
 
 
 @dataclass(frozen=True)
@@ -167,16 +167,7 @@ class _Linearisation:
 
 def _panel_edges(local: LocalMotion, kind: SharpSampling) -> Array:
     """Ends of panels graded towards the passages of a sharp law."""
-    weights = harmonic_kernels.sharp_nodes(
-        local.motion,
-        np.asarray(kind.points, float),
-        np.asarray(kind.widths, float),
-        np.zeros(1),
-        np.full(1, 2.0),
-        8,
-        _RATIO,
-        _DEPTH,
-    )[2]
+    weights = sharp_nodes(local.motion, kind, 8, 1, _RATIO)[2]
     return np.minimum(np.append(0.0, np.cumsum(weights)), 2.0 * math.pi)
 
 

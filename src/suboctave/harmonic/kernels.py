@@ -104,27 +104,19 @@ def _nearest(x, d, s, point, width):
 
 
 @njit(cache=True)
-def sharp_nodes(c, points, widths, nodes, weights, panels, ratio, depth):
+def sharp_nodes(c, points, widths, cr, ci, hr, hi, weights, ratio):
     """Composite Gauss-Legendre nodes on a period, graded towards the instants at which a sharp law is passed.
 
     A panel is halved until the nearest complex instant at which the motion meets a singularity of the law (point +- i width)
     lies at least `ratio` half-lengths from its centre; the rule then converges geometrically on it.
-    Returns z (real, imaginary part) and weights, which add up to 2 pi.
+    Tables (`quadrature.panel_tables`): cr, ci (levels, order) hold the nodes of a panel of every level, relative to its centre,
+    as points on the circle; hr, hi (levels,) half its half-length; `weights` those of the rule on (-1, 1). Level 0 covers the
+    period with equal panels. Returns z (real, imaginary part) and weights, which add up to 2 pi.
     """
-    order = nodes.shape[0]
-    # half a panel of every level, and its nodes, as points on the circle
-    cr = np.empty((depth + 1, order))
-    ci = np.empty((depth + 1, order))
-    hr = np.empty(depth + 1)
-    hi = np.empty(depth + 1)
-    half = math.pi / panels
-    for level in range(depth + 1):
-        h = half * 0.5**level
-        hr[level] = math.cos(0.5 * h)
-        hi[level] = math.sin(0.5 * h)
-        for j in range(order):
-            cr[level, j] = math.cos(h * nodes[j])
-            ci[level, j] = math.sin(h * nodes[j])
+    order = weights.shape[0]
+    depth = hr.shape[0] - 1
+    half = 2.0 * math.atan2(hi[0], hr[0])
+    panels = int(round(math.pi / half))
     capacity = order * panels * 4
     zr = np.empty(capacity)
     zi = np.empty(capacity)
@@ -345,19 +337,26 @@ def galerkin(stiffness, damping, rate, rows, cols, rows_mean, cols_mean):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_FAST)
 def polynomial(coefficients, zr, zi):
     """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
     rows, count = coefficients.shape
     n = zr.shape[0]
     out = np.empty((rows, n), dtype=np.complex128)
+    pr = np.empty(n)
+    pi = np.empty(n)
     for r in range(rows):
+        pr[:] = coefficients[r, count - 1].real
+        pi[:] = coefficients[r, count - 1].imag
+        for k in range(count - 2, -1, -1):
+            a = coefficients[r, k].real
+            b = coefficients[r, k].imag
+            for j in range(n):
+                t = pr[j] * zr[j] - pi[j] * zi[j] + a
+                pi[j] = pr[j] * zi[j] + pi[j] * zr[j] + b
+                pr[j] = t
         for j in range(n):
-            z = complex(zr[j], zi[j])
-            s = coefficients[r, count - 1]
-            for k in range(count - 2, -1, -1):
-                s = s * z + coefficients[r, k]
-            out[r, j] = s
+            out[r, j] = complex(pr[j], pi[j])
     return out
 
 

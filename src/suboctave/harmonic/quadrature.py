@@ -56,10 +56,22 @@ def uniform_nodes(count: int) -> Nodes:
     return Nodes(np.cos(tau), np.sin(tau), np.full(count, 2.0 * math.pi / count))
 
 
-@lru_cache(maxsize=4)
-def _gauss_legendre(order: int) -> tuple[Array, Array]:
+@lru_cache(maxsize=64)
+def panel_tables(panels: int, order: int) -> tuple[Array, ...]:
+    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `kernels.sharp_nodes` asks for."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
-    return nodes, weights
+    half = math.pi / panels * 0.5 ** np.arange(_DEPTH + 1)
+    angles = np.multiply.outer(half, nodes)
+    return np.cos(angles), np.sin(angles), np.cos(0.5 * half), np.sin(0.5 * half), weights
+
+
+def sharp_nodes(
+    motion: ComplexArray, kind: SharpSampling, panels: int, order: int, ratio: float
+) -> tuple[Array, Array, Array]:
+    """z (real, imaginary part) and weights of composite Gauss-Legendre panels graded towards the passages of a sharp law."""
+    return kernels.sharp_nodes(
+        motion, np.asarray(kind.points, float), np.asarray(kind.widths, float), *panel_tables(panels, order), ratio
+    )
 
 
 def nodes_for(element: Element, motion: ComplexArray, coefficients: Array, top: int, samples: int | None) -> Nodes:
@@ -84,11 +96,7 @@ def nodes_for(element: Element, motion: ComplexArray, coefficients: Array, top: 
     if isinstance(kind, SharpSampling):
         # harmonics up to top + H on a panel of half-length h: the error (e (top + H) h / 4 order)^(2 order) is 1e-10
         panels = max(4, math.ceil(math.pi * math.e * (top + high) / (0.383 * 4.0 * _ORDER)))
-        x, w = _gauss_legendre(_ORDER)
-        zr, zi, weights = kernels.sharp_nodes(
-            motion, np.asarray(kind.points, float), np.asarray(kind.widths, float), x, w, panels, _RATIO, _DEPTH
-        )
-        return Nodes(zr, zi, weights)
+        return Nodes(*sharp_nodes(motion, kind, panels, _ORDER, _RATIO))
     return uniform_nodes(samples or _FEWEST)
 
 

@@ -28,7 +28,7 @@ from suboctave.timedomain.field import Array, Field, scaled_field
 from suboctave.timedomain.shooting import PeriodicSolution, check_dof, check_periods, finish
 from suboctave.timedomain.trajectory import flow, measured_lengths
 
-__all__ = ["locate_by_shooting"]
+__all__ = ["Curve", "CurvePoint", "locate_by_shooting"]
 
 _KINDS = ("LP", "PD", "NS", "BP")
 _FIRST_STEP = 1e-4  # along the curve, in units of the size of the motion
@@ -38,7 +38,7 @@ _REAL_MULTIPLIER = 1e-5  # imaginary part below which a pair on the unit circle 
 
 
 @dataclass(frozen=True)
-class _Point:
+class CurvePoint:
     """A point of the curve: `u` = scaled state and eta, `A`, unit null vector, monodromy, relative residual."""
 
     u: Array
@@ -48,7 +48,7 @@ class _Point:
     residual: float
 
 
-class _Curve:
+class Curve:
     """Periodic motions with free frequency, in the scales of the start."""
 
     def __init__(self, model: Field, periods: int, rtol: float, tol: float, branch_point: bool) -> None:
@@ -69,7 +69,7 @@ class _Curve:
         slopes[:, :-1] -= np.eye(self.m)
         return final - u[:-1], slopes, transition
 
-    def onto(self, u: Array, along: Array | None, max_iterations: int = 25) -> _Point:
+    def onto(self, u: Array, along: Array | None, max_iterations: int = 25) -> CurvePoint:
         """The point of the curve nearest to `u`, tangent oriented like `along`."""
         previous = np.inf
         for _ in range(max_iterations):
@@ -88,7 +88,7 @@ class _Curve:
                     tangent /= np.linalg.norm(tangent)
                 elif tangent[-1] < 0.0:
                     tangent = -tangent
-                return _Point(u, slopes, tangent, transition, residual)
+                return CurvePoint(u, slopes, tangent, transition, residual)
             length = float(np.max(np.abs(step)))
             u = u + step * min(1.0, 0.5 / length if length > 0.0 else 1.0)
             previous = residual
@@ -99,12 +99,12 @@ class _Curve:
         )
 
 
-def _bordered(matrix: Callable[[_Point], Array], start: _Point) -> Callable[[_Point], float]:
+def _bordered(matrix: Callable[[CurvePoint], Array], start: CurvePoint) -> Callable[[CurvePoint], float]:
     """Signed measure of singularity: last component of the solution of the matrix bordered by its singular vectors."""
     left, _, right = np.linalg.svd(matrix(start))
     b, c = left[:, -1], right[-1]
 
-    def value(point: _Point) -> float:
+    def value(point: CurvePoint) -> float:
         a = matrix(point)
         whole = np.block([[a, b[:, None]], [c[None, :], np.zeros((1, 1))]])
         target = np.zeros(len(whole))
@@ -114,7 +114,7 @@ def _bordered(matrix: Callable[[_Point], Array], start: _Point) -> Callable[[_Po
     return value
 
 
-def _neimark_sacker(start: _Point) -> Callable[[_Point], float]:
+def _neimark_sacker(start: CurvePoint) -> Callable[[CurvePoint], float]:
     """`|mu|^2 - 1` of the complex multiplier that starts nearest to the unit circle."""
     multipliers = np.linalg.eigvals(start.transition)
     upper = multipliers[multipliers.imag > 1e-6 * np.abs(multipliers)]
@@ -125,7 +125,7 @@ def _neimark_sacker(start: _Point) -> Callable[[_Point], float]:
         )
     current = [upper[np.argmin(np.abs(np.abs(upper) - 1.0))]]
 
-    def value(point: _Point) -> float:
+    def value(point: CurvePoint) -> float:
         all_of_them = np.linalg.eigvals(point.transition)
         nearest = all_of_them[np.argmin(np.abs(all_of_them - current[0]))]
         current[0] = nearest
@@ -134,7 +134,7 @@ def _neimark_sacker(start: _Point) -> Callable[[_Point], float]:
     return value
 
 
-def _test_function(kind: str, start: _Point) -> Callable[[_Point], float]:
+def _test_function(kind: str, start: CurvePoint) -> Callable[[CurvePoint], float]:
     identity = np.eye(len(start.transition))
     if kind == "LP":
         return lambda point: float(point.tangent[-1])
@@ -173,7 +173,7 @@ def locate_by_shooting(
     # One pass for the size of the motion, then fixed scales: the secant iteration needs one measure of length.
     _, _, passage = flow(model, 0.0, start / model.scale, 2.0 * np.pi * periods, 1e-6)
     model.rescale(measured_lengths(model, passage))
-    curve = _Curve(model, periods, rtol, tol, kind == "BP")
+    curve = Curve(model, periods, rtol, tol, kind == "BP")
     point = curve.onto(np.append(start / model.scale, 1.0), None)
     point, test, steps = _drive(curve, point, kind, max_step, max_iterations)
 
@@ -185,13 +185,13 @@ def locate_by_shooting(
     return solution
 
 
-def _drive(curve: _Curve, point: _Point, kind: str, max_step: float, max_iterations: int) -> tuple[_Point, float, int]:
+def _drive(curve: Curve, point: CurvePoint, kind: str, max_step: float, max_iterations: int) -> tuple[CurvePoint, float, int]:
     """Secant iteration on the test function along the curve, kept inside a bracket once there is one."""
     measure = _test_function(kind, point)
     value = measure(point)
     best = (abs(value), point, value)
     step = _FIRST_STEP
-    bracket: _Point | None = None  # a point with the other sign of the test function
+    bracket: CurvePoint | None = None  # a point with the other sign of the test function
     for count in range(1, max_iterations + 1):
         following = curve.onto(point.u + step * point.tangent, point.tangent)
         new = measure(following)
@@ -222,7 +222,7 @@ def _drive(curve: _Curve, point: _Point, kind: str, max_step: float, max_iterati
     )
 
 
-def _confirm(kind: str, solution: PeriodicSolution, point: _Point) -> None:
+def _confirm(kind: str, solution: PeriodicSolution, point: CurvePoint) -> None:
     """Refuse a point that is not what was asked for."""
     mu = solution.multipliers
     where = f"near omega = {solution.omega:.9g}"
