@@ -87,6 +87,7 @@ class _Follower:
         self.previous: Sample | None = None
         self._candidate: Sample | None = None
         self._speed = self._next_speed = 0.0
+        self._done = 0.0
         self._recent: list[str] = []
         self._changed: list[str] = []
         self._counted: Sample | None = None
@@ -116,8 +117,9 @@ class _Follower:
     def _separated(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step hides nothing that its ends could tell of, or is short already.
 
-        At most one test may change in a step; the multipliers may not move far, so that their path is known; no multiplier may have
-        had the time to reach +1 or -1 and come back, and no complex pair the time to meet on the real axis, part, and meet again.
+        At most one test may change in a step; the multipliers may not move far, so that their path is known; no
+        multiplier may have had the time to reach +1 or -1 and come back, and no complex pair the time to meet on the
+        real axis, part, and meet again.
         """
         self._candidate = new = self._sample(b)
         old, step = self.previous, b.arclength - a.arclength
@@ -147,16 +149,16 @@ class _Follower:
         sample = self._sample(point)
         if self.previous is not None:
             self._search(self.previous, sample)
-        self.trace.points.append(
-            BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations)
-        )
+        self.trace.points.append(BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations))
         self.previous = sample
         self._speed, self._recent, self._changed = self._next_speed, self._changed, []
         report = self.settings.report
         if report is not None:
             low, high = self.bounds
             share = (point.parameter - low) / (high - low)
-            report(min(1.0, max(0.0, share if self.direction > 0 else 1.0 - share)), point.curve.where(point.u))
+            # where the branch folds back the share done does not
+            self._done = max(self._done, min(1.0, share if self.direction > 0 else 1.0 - share))
+            report(self._done, point.curve.where(point.u))
 
     def _orbit(self, sample: Sample) -> PeriodicOrbit:
         evaluation = sample.point.evaluation
@@ -205,8 +207,9 @@ class _Follower:
             where = f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)}"
             names = ", ".join(item.kind for item in items) or "none"
             self.trace.warnings.append(
-                f"{where} the number of unstable multipliers changes from {a.floquet.unstable} to {b.floquet.unstable}, "
-                f"which the bifurcations located there ({names}) do not explain; a smaller max_step may resolve it"
+                f"{where} the number of unstable multipliers changes from {a.floquet.unstable} to "
+                f"{b.floquet.unstable}, which the bifurcations located there ({names}) do not explain; "
+                "a smaller max_step may resolve it"
             )
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
@@ -216,21 +219,37 @@ class _Follower:
         if located.solution is None:
             orbit = self._orbit(located.sample)
             self.trace.warnings.append(
-                f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, to +- {located.width:.1e}: "
-                "the motion probably grazes a contact there"
+                f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
+                f"to +- {located.width:.1e}: the motion probably grazes a contact there"
             )
             return Bifurcation(
-                located.kind.name, orbit, located.sample.floquet, orbit.residual, orbit.amplitude(self.settings.observe),
-                curve.name, uncertainty=located.width, arclength=arclength, context=self.settings.context,
+                located.kind.name,
+                orbit,
+                located.sample.floquet,
+                orbit.residual,
+                orbit.amplitude(self.settings.observe),
+                curve.name,
+                uncertainty=located.width,
+                arclength=arclength,
+                context=self.settings.context,
             )
         solution = self._refined(located, located.solution, curve)
         state = solution.state
         neglected = truncation(state, neglected_motion(state))
-        orbit = PeriodicOrbit(state.balance, state.x.copy(), state.omega, dict(state.values), solution.residual, neglected)
+        orbit = PeriodicOrbit(
+            state.balance, state.x.copy(), state.omega, dict(state.values), solution.residual, neglected
+        )
         return Bifurcation(
-            located.kind.name, orbit, floquet_multipliers(state), solution.residual,
-            orbit.amplitude(self.settings.observe), curve.name, solution.vectors, solution.kappa,
-            arclength=arclength, context=self.settings.context,
+            located.kind.name,
+            orbit,
+            floquet_multipliers(state),
+            solution.residual,
+            orbit.amplitude(self.settings.observe),
+            curve.name,
+            solution.vectors,
+            solution.kappa,
+            arclength=arclength,
+            context=self.settings.context,
         )
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
@@ -250,8 +269,8 @@ class _Follower:
                 better = located.kind.solve(guess)
             except ConvergenceError as failure:
                 self.trace.warnings.append(
-                    f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} harmonics; "
-                    f"with {basis.harmonics} it was not found again ({failure})"
+                    f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
+                    f"harmonics; with {basis.harmonics} it was not found again ({failure})"
                 )
                 break
             moved = abs(better.state.omega - state.omega) / state.omega
@@ -270,7 +289,12 @@ class _Follower:
             return None
         try:
             point = locate_zero(
-                a.point, b.point, value_a, value_b, lambda p: event.function(self._orbit(self._sample(p))), self.settings.newton
+                a.point,
+                b.point,
+                value_a,
+                value_b,
+                lambda p: event.function(self._orbit(self._sample(p))),
+                self.settings.newton,
             )
         except ConvergenceError as failure:
             self.trace.warnings.append(f"event {event.name!r}: {failure}")
@@ -280,8 +304,14 @@ class _Follower:
         curve = point.curve
         assert isinstance(curve, ResponseCurve)
         return Bifurcation(
-            event.name, orbit, sample.floquet, orbit.residual, orbit.amplitude(self.settings.observe), curve.name,
-            arclength=point.arclength, context=self.settings.context,
+            event.name,
+            orbit,
+            sample.floquet,
+            orbit.residual,
+            orbit.amplitude(self.settings.observe),
+            curve.name,
+            arclength=point.arclength,
+            context=self.settings.context,
         )
 
 

@@ -15,8 +15,8 @@ Report = Callable[[float, str], None]
 def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     """A function (share done, where) to report to, or None.
 
-    `progress` is None or False (silent), True (a bar on standard error, silent where that is not a terminal), or a callable that
-    takes the share done, 0 to 1, and a text.
+    `progress` is None or False (silent), True (a bar on standard error, silent where that is not a terminal), or a
+    callable that takes the share done, 0 to 1, and a text.
     """
     if progress is None or progress is False:
         yield None
@@ -25,7 +25,12 @@ def reporting(progress: Any, title: str) -> Iterator[Report | None]:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[where]}"), TimeElapsedColumn())
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[where]}"),
+            TimeElapsedColumn(),
+        )
         with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
             task = bar.add_task(title, total=1.0, where="")
             yield lambda share, where: bar.update(task, completed=share, where=where)

@@ -1,8 +1,8 @@
 """The first point of a branch.
 
-From a given motion, or, without one: Newton's method from the linear response; where that fails (it can cycle for ever on a contact
-that is closed at rest), a homotopy that switches the element forces on from 0 to 1 by continuation; where that fails, a short
-time integration from rest.
+From a given motion, or, without one: Newton's method from the linear response; where that fails (it can cycle for
+ever on a contact that is closed at rest), a homotopy that switches the element forces on from 0 to 1 by continuation;
+where that fails, a short time integration from rest.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ from suboctave.continuation.march import CurvePoint, March, SteppingOptions, mak
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.balance import BalanceState, HarmonicBalance, apply_blocks
+from suboctave.harmonic.balance import BalanceState, apply_blocks
 from suboctave.harmonic.basis import spectrum_to_real
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 from suboctave.timedomain import integrate
 
@@ -39,10 +38,10 @@ def linear_response(curve: ResponseCurve, value: float) -> Array:
     if state.compliance is not None:
         load = apply_blocks(state.compliance, load)
     try:
-        inverse = np.linalg.inv(state.blocks)
+        inverse = np.linalg.inv(state.blocks).astype(complex)
     except np.linalg.LinAlgError:
         # a free body or an undamped resonance: the least motion that balances what can be balanced
-        inverse = np.linalg.pinv(state.blocks)
+        inverse = np.linalg.pinv(state.blocks).astype(complex)
     return curve.join(apply_blocks(inverse, load), value)
 
 
@@ -54,8 +53,8 @@ def start_point(
     Parameters
     ----------
     given
-        None, a `PeriodicOrbit`, coefficients (2 H + 1, n), or a state `(x, dx/dt)` of shape (2 n,) from which time integration
-        leads to the motion.
+        None, a `PeriodicOrbit`, coefficients (2 H + 1, n), or a state `(x, dx/dt)` of shape (2 n,) from which time
+        integration leads to the motion.
 
     Raises
     ------
@@ -127,17 +126,19 @@ def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
         padded[: array.shape[0]] = array
         return curve.join(own.resized(padded, basis), value)
     raise InputError(
-        f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * size}, or coefficients of shape (2 H + 1, {size}); "
-        f"got an array of shape {array.shape}"
+        f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * size}, or coefficients of shape "
+        f"(2 H + 1, {size}); got an array of shape {array.shape}"
     )
 
 
 def _integrated(curve: ResponseCurve, value: float, state: Array | None) -> Array:
-    """Harmonics of the motion that time integration settles on: from a state for one period, from rest until it repeats."""
+    """Harmonics of the motion that time integration settles on: from a state for one period, from rest until it
+    repeats.
+    """
     balance = curve.balance
     if not isinstance(balance.system, System):
         raise ConvergenceError("time integration needs the full system")
-    x, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
+    _, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
     period = 2.0 * math.pi * balance.basis.nu / omega
     current = np.zeros(2 * balance.system.n) if state is None else state
     rounds = _SETTLING if state is None else 1
@@ -147,7 +148,7 @@ def _integrated(curve: ResponseCurve, value: float, state: Array | None) -> Arra
         trajectory = integrate(balance.system, current, times, omega, values, rtol=1e-6)
         displacement = np.asarray(trajectory.x).reshape(balance.system.n, -1)
         velocity = np.asarray(trajectory.v).reshape(balance.system.n, -1)
-        new = np.concatenate((displacement[:, -1], velocity[:, -1] ))
+        new = np.concatenate((displacement[:, -1], velocity[:, -1]))
         change = np.abs(new - current).max()
         current = new
         if change <= 1e-5 * max(np.abs(current).max(), 1e-300):
@@ -233,9 +234,7 @@ def _homotopy(curve: ResponseCurve, linear: Array, value: float, newton: NewtonO
     point = make_point(solve_at(problem, first, curve.size(linear), newton), problem, None, 0.0)
     stepping = SteppingOptions(max_step=0.2, initial_step=0.02, max_points=2000)
     march = March(point, 1.0, (0.0, 1.0), newton, stepping)
-    last = point
-    for last in march:
-        pass
+    *_, last = march
     if abs(last.parameter - 1.0) > 1e-12:
         raise ConvergenceError(march.ended)
     return curve.join(last.u[:-1], value)

@@ -49,12 +49,13 @@ def frequency_response(
     system
         What vibrates; it needs a load.
     omega
-        (from, to), rad per unit time. A branch that folds back inside is followed until it leaves at either end or closes.
+        (from, to), rad per unit time. A branch that folds back inside is followed until it leaves at either end or
+        closes.
     harmonics
         Highest multiple of omega kept, `"adaptive"`, or an `AdaptiveHarmonics`.
     start
-        Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a state `(x, dx/dt)` of shape (2 n,), or
-        coefficients of shape (2 H + 1, n).
+        Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a state `(x, dx/dt)` of shape (2
+        n,), or coefficients of shape (2 H + 1, n).
     max_step
         Largest distance between neighbours in scaled arclength (short for `stepping=SteppingOptions(max_step=...)`).
     observe
@@ -64,7 +65,8 @@ def frequency_response(
     progress
         None, True (a bar), or a callable taking (share done, text).
     linear
-        Another linear part with this system's elements and loads, for example one condensed onto the DOFs that elements touch.
+        Another linear part with this system's elements and loads, for example one condensed onto the DOFs that
+        elements touch.
 
     Raises
     ------
@@ -105,10 +107,11 @@ def continue_branch(
     Parameters
     ----------
     start
-        A motion (orbit, point of a branch, bifurcation), followed in both directions to the bounds; or a system with `omega=`, whose
-        motion at the first bound is looked for.
+        A motion (orbit, point of a branch, bifurcation), followed in both directions to the bounds; or a system with
+        `omega=`, whose motion at the first bound is looked for.
     parameter
-        "omega" or a parameter of the system. Unless it is "omega", the frequency is kept: that of the motion, or `omega`.
+        "omega" or a parameter of the system. Unless it is "omega", the frequency is kept: that of the motion, or
+        `omega`.
     bounds
         (from, to): the branch is reported in this order. A motion on a bound is followed one way.
     harmonics
@@ -124,7 +127,8 @@ def continue_branch(
         )
     if not isinstance(start, PeriodicOrbit):
         raise InputError(
-            f"continue_branch starts from a PeriodicOrbit, a point of a branch, a Bifurcation or a System, not {type(start).__name__}"
+            "continue_branch starts from a PeriodicOrbit, a point of a branch, a Bifurcation or a System, "
+            f"not {type(start).__name__}"
         )
     orbit = start
     system = orbit.system
@@ -157,8 +161,7 @@ def _both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], set
         return follow(point, ahead, bounds, settings)
     if abs(point.parameter - (high if ahead > 0 else low)) <= slack:
         back = follow(point, -ahead, bounds, settings)
-        only = Trace([point_ for point_ in back.points[:1]])
-        only.ended = back.ended
+        only = Trace(back.points[:1], ended=back.ended)
         return back.reversed_before(only)
     forward = follow(point, ahead, bounds, settings)
     if forward.closed:
@@ -182,8 +185,15 @@ def _from_system(
     wanted: Harmonics = "adaptive" if harmonics is None else harmonics
     if parameter == "omega":
         return frequency_response(
-            system, bounds, wanted, max_step=max_step, observe=observe, events=events, progress=progress,
-            newton=newton, stepping=stepping,
+            system,
+            bounds,
+            wanted,
+            max_step=max_step,
+            observe=observe,
+            events=events,
+            progress=progress,
+            newton=newton,
+            stepping=stepping,
         )
     _check_system(system)
     _check_parameter(system, parameter)
@@ -212,7 +222,9 @@ def _curve(
     elif harmonics == "adaptive":
         adaptive = AdaptiveHarmonics()
     elif isinstance(harmonics, bool) or not isinstance(harmonics, (int, np.integer)) or harmonics < 1:
-        raise InputError(f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}')
+        raise InputError(
+            f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
+        )
     else:
         adaptive = None
     loaded = max([1] + [c.harmonic for c in system.load_components()])
@@ -295,9 +307,25 @@ def _branch(system: System, name: str, trace: Trace, settings: Settings, options
     context = {"system": system, "parameter": name, **options}
     bifurcations = [replace(b, context=context) for b in trace.bifurcations]
     return Branch(
-        system, name, trace.points, bifurcations, trace.events, trace.closed, trace.ended, settings.observe, options,
+        system,
+        name,
+        trace.points,
+        bifurcations,
+        trace.events,
+        trace.closed,
+        trace.ended,
+        settings.observe,
+        options,
         tuple(trace.warnings),
     )
 
 
-__all__ = ["CurvePoint", "ConvergenceError", "check_range", "continue_branch", "frequency_response", "make_point", "solve_at"]
+__all__ = [
+    "ConvergenceError",
+    "CurvePoint",
+    "check_range",
+    "continue_branch",
+    "frequency_response",
+    "make_point",
+    "solve_at",
+]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import FloquetResult, floquet_multipliers
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -25,12 +25,15 @@ class Verification:
     """A harmonic-balance motion held against shooting.
 
     distance
-        Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement, velocities by
-        the largest velocity).
+        Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement,
+        velocities by the largest velocity).
     multiplier_error
         Largest difference between multipliers, paired.
+    stable
+        The verdict of shooting on the motion's stability, None if no motion was found.
     agrees
-        Whether shooting arrives at the same motion and gives the same verdict on its stability.
+        Whether shooting arrives at the same motion with the same verdict; at a bifurcation, where no verdict exists,
+        with the same critical multiplier.
     solution
         The motion found by shooting, None if it found none (`reason` says why).
     """
@@ -44,27 +47,31 @@ class Verification:
 
     def __repr__(self) -> str:
         verdict = "agrees" if self.agrees else "DISAGREES"
-        return f"Verification: {verdict}; distance {self.distance:.1e}, multipliers {self.multiplier_error:.1e}. {self.reason}"
+        errors = f"distance {self.distance:.1e}, multipliers {self.multiplier_error:.1e}"
+        return f"Verification: {verdict}; {errors}. {self.reason}"
 
 
-def verify(orbit: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3) -> Verification:
-    """Contradict a motion by shooting from its state at t = 0.
+def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3) -> Verification:
+    """Contradict a motion, or a located bifurcation, by shooting from its state at t = 0.
 
     Parameters
     ----------
+    what
+        A motion; for a `Bifurcation` its critical multiplier is held against that of the motion that shooting finds at
+        the same parameters.
     tolerance
-        Relative distance up to which two motions count as the same.
+        Relative distance up to which two motions count as the same, and distance up to which two multipliers do.
 
     Raises
     ------
     InputError
         If the orbit's unknowns are not all DOFs of its system (a condensed model has no state to shoot from).
     """
-    motion = _orbit(orbit)
+    motion = _orbit(what)
     system = motion.system
     if motion.coefficients.shape[1] != system.n:
         raise InputError("only motions with all DOFs of the system can be verified by shooting")
-    floquet = floquet_multipliers(motion.state())
+    floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else floquet_multipliers(motion.state())
     start = motion.start()
     try:
         solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
@@ -74,16 +81,24 @@ def verify(orbit: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 
     sizes = np.repeat([np.abs(motion.displacement(t)).max(), np.abs(motion.velocity(t)).max()], system.n)
     distance = float(np.max(np.abs(solution.state - start) / sizes))
     error = _pairing(floquet.multipliers, solution.multipliers)
-    same = floquet.stable == solution.stable
-    close = distance <= tolerance
-    reason = "the same motion, the same verdict"
-    if not close:
-        reason = f"shooting arrives at another motion (relative distance {distance:.1e})"
-    elif not same:
-        reason = f"shooting calls it {'stable' if solution.stable else 'unstable'}, harmonic balance the opposite"
-        if not floquet.decided:
-            reason += ": a multiplier lies within its error of the unit circle"
-    return Verification(distance, error, solution.stable, close and same, solution, reason)
+
+    def verdict(agrees: bool, reason: str) -> Verification:
+        return Verification(distance, error, solution.stable, agrees, solution, reason)
+
+    if distance > tolerance:
+        return verdict(False, f"Shooting arrives at another motion (relative distance {distance:.1e})")
+    if isinstance(what, Bifurcation) and what.kind in KINDS:
+        critical = what.critical_multiplier()
+        nearest = min(solution.multipliers, key=lambda mu: abs(mu - critical))
+        # near a fold the motion at fixed parameters, and its multiplier, move like the square root of a deviation
+        near = abs(nearest - critical) <= max(tolerance, 10.0 * math.sqrt(distance) if what.kind == "LP" else 0.0)
+        words = "the same" if near else "another"
+        return verdict(near, f"The same motion, {words} critical multiplier ({nearest:.6g} by shooting)")
+    if floquet.stable != solution.stable:
+        doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"
+        other = "stable" if solution.stable else "unstable"
+        return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite{doubt}")
+    return verdict(True, "The same motion, the same verdict")
 
 
 def _pairing(a: np.ndarray, b: np.ndarray) -> float:

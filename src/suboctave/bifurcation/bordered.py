@@ -5,12 +5,14 @@ With J = J_kappa(X, omega, parameters), bordered by vectors b, c,
     [J b; c^H 0] [v; g] = [0; 1],     [J b; c^H 0]^H [u; .] = [0; 1],
 
 g vanishes exactly where J is singular; v and u are then its right and left null vectors, and the gradient of g is
-`g_p = -u^H J_p v` (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 4). The minimally augmented system is
+`g_p = -u^H J_p v` (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 4). The
+minimally augmented system is
 
     [R; g] = 0            limit point (kappa = 0), period doubling (kappa = w0 / 2)
     [R; Re g; Im g] = 0   Neimark-Sacker (kappa free, one unknown more)
 
-Rows and columns are weighted by the square roots of the masses, so that b, c, and g (in 1/time^2) do not depend on the units of single DOFs.
+Rows and columns are weighted by the square roots of the masses, so that b, c, and g (in 1/time^2) do not depend on
+the units of single DOFs.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 
 @dataclass(frozen=True)
 class NullVectors:
-    """Null vectors of a (nearly) singular operator with its mass weights: right `v`, left `u`, unit length in weighted form."""
+    """Null vectors of a (nearly) singular operator with its mass weights: right `v`, left `u`, unit length in
+    weighted form.
+    """
 
     right: np.ndarray
     left: np.ndarray

@@ -1,9 +1,10 @@
 """Branch points: two branches of motions cross (a symmetry breaks, or by design).
 
-At a branch point `R_X` is singular with left null vector psi and `R_omega` lies in its range, `psi . R_omega = 0`. In one
-parameter that is one condition too many, so the equations are unfolded: `[R + beta b; g; u . R_omega] = 0` in (X, omega, beta). It converges
-as well where a broken symmetry leaves only the ghost of a branch point: then beta is not zero, and the point is none.
-With `[J b; c^T 0] [w; .] = [R_omega; 0]`, the gradient of the last equation is `u . R_omega,p - u . J_p w`.
+At a branch point `R_X` is singular with left null vector psi and `R_omega` lies in its range, `psi . R_omega = 0`. In
+one parameter that is one condition too many, so the equations are unfolded: `[R + beta b; g; u . R_omega] = 0` in (X,
+omega, beta). It converges as well where a broken symmetry leaves only the ghost of a branch point: then beta is not
+zero, and the point is none. With `[J b; c^T 0] [w; .] = [R_omega; 0]`, the gradient of the last equation is `u .
+R_omega,p - u . J_p w`.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ def locate_branch_point(guess: Guess) -> Singular:
     Raises
     ------
     ConvergenceError
-        If Newton's method fails, or converges to a point whose unfolding is not zero: an imperfect (broken) branch point.
+        If Newton's method fails, or converges to a point whose unfolding is not zero: an imperfect (broken) branch
+        point.
     """
     borders = null_vectors(guess.state(), Kind.INTEGER)
     start = guess.state()

@@ -1,8 +1,8 @@
 """From a change of a test function between two neighbours to a located bifurcation.
 
-First the bordered system from an interpolated start; where it does not converge into the step, the step is bisected on the test
-function and the solver tries again from a nearer point. If it never converges (at a grazing contact the equations are not smooth
-enough), the bracket itself is the answer, with its width.
+First the bordered system from an interpolated start; where it does not converge into the step, the step is bisected
+on the test function and the solver tries again from a nearer point. If it never converges (at a grazing contact the
+equations are not smooth enough), the bracket itself is the answer, with its width.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ _BISECTIONS = 34
 
 @dataclass(frozen=True)
 class Located:
-    """A bifurcation between two neighbours: solved (`solution`), or only bracketed (`sample`, with the bracket's width)."""
+    """A bifurcation between two neighbours: solved (`solution`), or only bracketed (`sample`, with the bracket's
+    width).
+    """
 
     kind: BifurcationKind
     fraction: float
@@ -112,7 +114,9 @@ def _try(
 
 
 def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
-    """Where between two neighbours a point u (in the discretisation of b) lies on the curve, or None if it lies elsewhere."""
+    """Where between two neighbours a point u (in the discretisation of b) lies on the curve, or None if it lies
+    elsewhere.
+    """
     ua = b.curve.transfer(a.u, a.curve)
     chord = b.weights * (b.u - ua)
     length = float(np.linalg.norm(chord))

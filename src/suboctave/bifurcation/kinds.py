@@ -1,7 +1,7 @@
 """What each kind of bifurcation is: its test function, where to start, and the system that locates it.
 
-A new kind is one class here (or in a file of its own) with four answers: how often it may have happened between two neighbours, where in
-between, how to solve for it, and whether a solution is one.
+A new kind is one class here (or in a file of its own) with four answers: how often it may have happened between two
+neighbours, where in between, how to solve for it, and whether a solution is one.
 
 - LP: the component of the tangent along the free parameter changes sign;
 - BP: the bordered determinant `det [R_X R_omega; t]` changes sign, the branch going straight on;

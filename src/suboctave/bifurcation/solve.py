@@ -1,7 +1,7 @@
 """Newton's method on the minimally augmented systems, for one free parameter: a bifurcation located to rounding.
 
-The bordering vectors are renewed at every iteration. Unknowns are weighted as in the continuation, so that convergence means
-the same in any units.
+The bordering vectors are renewed at every iteration. Unknowns are weighted as in the continuation, so that
+convergence means the same in any units.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ _STEP = 1e-9
 
 @dataclass(frozen=True)
 class Guess:
-    """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter, kappa."""
+    """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter,
+    kappa.
+    """
 
     balance: HarmonicBalance
     x: Array
@@ -47,7 +49,9 @@ class Guess:
 
 @dataclass(frozen=True)
 class Singular:
-    """A located singular motion: state, borders' null vectors, kappa, and the dimensionless residual of the whole system."""
+    """A located singular motion: state, borders' null vectors, kappa, and the dimensionless residual of the whole
+    system.
+    """
 
     state: BalanceState
     vectors: NullVectors
@@ -107,9 +111,9 @@ def newton(
         error = max([error] + [abs(e.value) / e.size for e in equations])
         if not np.isfinite(error):
             raise ConvergenceError("the bordered system is not finite")
-        if error <= _TOLERANCE and previous <= 1e-5:
-            if previous <= _STEP or error <= 1e-3 * _TOLERANCE:
-                return state, extra, error, iteration
+        settled = previous <= _STEP or (previous <= 1e-5 and error <= 1e-3 * _TOLERANCE)
+        if error <= _TOLERANCE and settled:
+            return state, extra, error, iteration
         if iteration == iterations:
             break
         q = len(extra)

@@ -1,9 +1,9 @@
 """Predictor-corrector continuation with scaled arclength.
 
-Predictor: tangent and curvature from the last two tangents. Corrector: Newton's method in the hyperplane orthogonal to the tangent.
-Step length: from the distance between prediction and solution, the angle between tangents and the rate at which Newton's method
-contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The engine hands out the points one by one; what is
-looked for along the curve is the caller's business.
+Predictor: tangent and curvature from the last two tangents. Corrector: Newton's method in the hyperplane orthogonal
+to the tangent. Step length: from the distance between prediction and solution, the angle between tangents and the
+rate at which Newton's method contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The
+engine hands out the points one by one; what is looked for along the curve is the caller's business.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class SteppingOptions:
     """How far the engine steps.
 
     max_step
-        Largest distance between neighbours in scaled arclength: parameters in units of their range, the solution in units of its
-        own current size (or of 1 % of the largest met so far, if that is larger).
+        Largest distance between neighbours in scaled arclength: parameters in units of their range, the solution in
+        units of its own current size (or of 1 % of the largest met so far, if that is larger).
     initial_step, min_step
         First step, and the step below which the curve ends with a reason.
     deviation
@@ -77,8 +77,8 @@ class CurvePoint:
 def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
     """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
     t = tangent(solved)
-    # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of F_u, so that
-    # det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
+    # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of
+    # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
     sign = solved.factor.sign
     if along is not None and (solved.weights * t) @ (solved.weights * along) < 0.0:
         t, sign = -t, -sign
@@ -132,8 +132,8 @@ class March:
     bounds
         (low, high) of the parameter; the curve ends exactly on them.
     inspect
-        Called with two neighbours before the second is accepted; returning False has the step halved (unless it is shorter than
-        `min_step` already).
+        Called with two neighbours before the second is accepted; returning False has the step halved (unless it is
+        shorter than `min_step` already).
     """
 
     def __init__(
@@ -259,7 +259,8 @@ class March:
             2.0 if new.iterations <= 4 else 4.0 / new.iterations,
         )
         step = step * min(2.0, max(0.3, factor))
-        # the predictor's curvature may carry a step a little beyond its length: keep the distance below the largest allowed
+        # the predictor's curvature may carry a step a little beyond its length: keep the distance below the largest
+        # allowed
         return min(0.98 * options.max_step, max(step, options.min_step))
 
     def _bound_passed(self, point: CurvePoint, new: CurvePoint) -> float | None:
@@ -307,9 +308,7 @@ class March:
             same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
             if not (ahead and same_way):
                 continue
-            fraction = length(from_point) / (
-                length(from_point) + length(to_new)
-            )
+            fraction = length(from_point) / (length(from_point) + length(to_new))
             miss = length(w * (between(point, new, fraction) - image))
             if miss < 0.05 * step + 1e-6:
                 return replace(first, arclength=point.arclength + length(from_point))

@@ -1,7 +1,8 @@
 """Newton's method for a point of a curve: the equations plus one scalar row.
 
 The row is either the hyperplane through a predicted point orthogonal to the tangent (arclength) or a fixed parameter.
-Convergence is judged on the residual (dimensionless) and on the correction (in scaled arclength), both at the final point.
+Convergence is judged on the residual (dimensionless) and on the correction (in scaled arclength), both at the final
+point.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import numpy as np
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
-
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 _SHORT = 1e-3
@@ -113,7 +113,8 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
         u = u - step / weights
         previous = size
     raise ConvergenceError(
-        f"Newton's method did not converge near {curve.where(guess)} (residual {error:.1e} after {iteration} iterations)"
+        f"Newton's method did not converge near {curve.where(guess)} "
+        f"(residual {error:.1e} after {iteration} iterations)"
     )
 
 

@@ -1,7 +1,8 @@
 """The contract between a curve and the engine that follows it.
 
-A curve is the solution set of `F(u) = 0` with `dim u = dim F + 1` (or `dim F + p` while p - 1 rows are added by the engine). The
-engine knows nothing of vibration: frequency responses, amplitude sweeps and tracked bifurcations are all curves to it.
+A curve is the solution set of `F(u) = 0` with `dim u = dim F + 1` (or `dim F + p` while p - 1 rows are added by the
+engine). The engine knows nothing of vibration: frequency responses, amplitude sweeps and tracked bifurcations are all
+curves to it.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ class Evaluation(Protocol):
 
 
 class Curve(Protocol):
-    """A curve as the engine sees it. `parameter` is the index in u of the parameter that bounds and directions refer to."""
+    """A curve as the engine sees it. `parameter` is the index in u of the parameter that bounds and directions refer
+    to.
+    """
 
     @property
     def parameter(self) -> int:

@@ -1,6 +1,7 @@
 """Compiled propagation of the linearised motion: products of matrix exponentials over steps.
 
-Every step of length h carries the linearisation at its two Gauss instants; the fourth-order commutator-free scheme takes
+Every step of length h carries the linearisation at its two Gauss instants; the fourth-order commutator-free scheme
+takes
 
     exp(h (a2 A1 + a1 A2)) exp(h (a1 A1 + a2 A2)),   a1 = 1/4 + sqrt(3)/6,  a2 = 1/4 - sqrt(3)/6
 
@@ -59,8 +60,9 @@ def propagate_single(stiffness, damping, h):
 
 @njit(cache=True)
 def propagate(base_k, base_c, shapes, stiffness, damping, h):
-    """Monodromy of `y'' + C(t) y' + K(t) y = 0`, `K(t) = base_k + sum_e stiffness_e(t) left_e right_e^T`, C(t) likewise.
+    """Monodromy of `y'' + C(t) y' + K(t) y = 0`, `K(t) = base_k + sum_e stiffness_e(t) left_e right_e^T`.
 
+    C(t) likewise, from base_c and damping_e.
     shapes (E, 2, n): left and right vectors; stiffness, damping (E, S, 2) at the Gauss instants of the steps h (S,).
     Exponentials act by their Taylor series on sub-steps short enough for twelve terms to reach rounding.
     """
@@ -96,7 +98,7 @@ def propagate(base_k, base_c, shapes, stiffness, damping, h):
                 size_c = max(size_c, row_c)
             # the time scale of the step, not the norm of A: displacements and velocities have different units
             rate = math.sqrt(size_k) + size_c
-            count = max(1, int(math.ceil(rate * t / 0.7)))
+            count = max(1, math.ceil(rate * t / 0.7))
             d = t / count
             for _ in range(count):
                 term = phi

@@ -1,10 +1,10 @@
 """Stability of a periodic motion from its monodromy matrix.
 
 The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 0` is propagated over one period by
-products of matrix exponentials (`floquet.kernels`). Steps follow the law: the exact contact instants of piecewise-linear elements are
-their ends (between contacts A is constant and the exponential exact), panels are graded towards the passage of a sharp law, and
-everything else is covered by uniform steps. The run with every step halved gives the multipliers, its distance from the
-first run their error estimate.
+products of matrix exponentials (`floquet.kernels`). Steps follow the law: the exact contact instants of piecewise-
+linear elements are their ends (between contacts A is constant and the exponential exact), panels are graded towards
+the passage of a sharp law, and everything else is covered by uniform steps. The run with every step halved gives the
+multipliers, its distance from the first run their error estimate.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class _Linearisation:
         return edges
 
     def _uniform(self) -> int:
-        """Uniform steps: enough for the highest harmonic that matters and for the natural frequencies met on the way."""
+        """Uniform steps: enough for the highest harmonic that matters."""
         basis = self.state.basis
         sizes = np.abs(self.state.x).max(axis=1)
         sizes = np.concatenate((sizes[:1], np.maximum(sizes[1::2], sizes[2::2])))

@@ -1,4 +1,6 @@
-"""How a periodic motion is written: harmonic bases, the alternating frequency/time method, harmonic balance, orbits as data."""
+"""How a periodic motion is written: harmonic bases, the alternating frequency/time method, harmonic balance, orbits
+as data.
+"""
 
 from suboctave.harmonic.balance import BalanceState, HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis

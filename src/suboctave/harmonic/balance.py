@@ -2,8 +2,9 @@
 
     R(X, omega, parameters) = A X + B S,    S = F(X, omega) - P(omega),
 
-with A, B from the linear part (stiffness form: A = Z, B = I, so that `R = Z X + F - P`), F the Fourier coefficients of the element
-forces (Galerkin projection) and P those of the loads. With `T(g)` the Galerkin matrix of a periodic g(t),
+with A, B from the linear part (stiffness form: A = Z, B = I, so that `R = Z X + F - P`), F the Fourier coefficients
+of the element forces (Galerkin projection) and P those of the loads. With `T(g)` the Galerkin matrix of a periodic
+g(t),
 
     dF/dX = T(f_x) + T(f_v) omega D,    F_omega = T(f_v) D X.
 
@@ -353,7 +354,9 @@ class BalanceState:
         return force if load is None else force + load
 
     def force_scale(self) -> float:
-        """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: what a residual is compared with."""
+        """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: what a residual is compared
+        with.
+        """
         weight = self.balance.scales()[1]
         parts = (self._linear_term, self.force, self.balance.load(self.values, self.omega))
         if self.compliance is not None:

@@ -4,8 +4,9 @@ A motion of period `nu * 2 pi / omega` is
 
     x(t) = a_0 + sum_k a_k cos(k tau) + b_k sin(k tau),    tau = omega t / nu,
 
-with `nu = 1` for a response at the period of the load, `nu = 2` after one period doubling, and so on. Its coefficients are
-stored harmonic by harmonic, `X = (a_0, a_1, b_1, a_2, b_2, ...)`, each entry of length n (the number of unknown DOFs).
+with `nu = 1` for a response at the period of the load, `nu = 2` after one period doubling, and so on. Its
+coefficients are stored harmonic by harmonic, `X = (a_0, a_1, b_1, a_2, b_2, ...)`, each entry of length n (the number
+of unknown DOFs).
 """
 
 from __future__ import annotations
@@ -72,7 +73,9 @@ class HarmonicBasis:
         return result
 
     def resized(self, coefficients: Array, other: HarmonicBasis) -> Array:
-        """Coefficients (2 H + 1, ...) of this basis in `other`: padded with zeros, truncated, or re-based to a multiple of nu."""
+        """Coefficients (2 H + 1, ...) of this basis in `other`: padded with zeros, truncated, or re-based to a
+        multiple of nu.
+        """
         if other.nu % self.nu:
             raise InputError(f"a motion of {self.nu} load periods cannot be written in a basis of {other.nu} of them")
         stride = other.nu // self.nu
@@ -86,7 +89,9 @@ class HarmonicBasis:
 
 
 def to_complex(coefficients: NDArray[Any]) -> ComplexArray:
-    """Real coefficients (2 H + 1, ...) to complex ones (H + 1, ...): `x = Re sum_k c_k exp(i k tau)`, `c_k = a_k - i b_k`."""
+    """Real coefficients (2 H + 1, ...) to complex ones (H + 1, ...): `x = Re sum_k c_k exp(i k tau)`, `c_k = a_k - i
+    b_k`.
+    """
     result = np.empty((coefficients.shape[0] // 2 + 1,) + coefficients.shape[1:], dtype=complex)
     result[0] = coefficients[0]
     result[1:] = coefficients[1::2]
@@ -95,7 +100,9 @@ def to_complex(coefficients: NDArray[Any]) -> ComplexArray:
 
 
 def spectrum_to_real(spectrum: ComplexArray, harmonics: int) -> Array:
-    """Fourier coefficients `g_q = mean(g exp(-i q tau))` to real ones `(a_0, a_1, b_1, ...)` up to `harmonics`; first axis."""
+    """Fourier coefficients `g_q = mean(g exp(-i q tau))` to real ones `(a_0, a_1, b_1, ...)` up to `harmonics`; first
+    axis.
+    """
     result = np.empty((2 * harmonics + 1,) + spectrum.shape[1:])
     result[0] = spectrum[0].real
     result[1::2] = 2.0 * spectrum[1 : harmonics + 1].real

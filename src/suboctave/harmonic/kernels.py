@@ -47,7 +47,9 @@ def motion(c, zr, zi):
 
 @njit(cache=True, fastmath=_FAST)
 def spectra(values, zr, zi, top):
-    """Fourier coefficients `1/(2 pi) sum_j values[r, j] z_j^-q`, q = 0 .. top (weights already in `values`); shape (R, top + 1)."""
+    """Fourier coefficients `1/(2 pi) sum_j values[r, j] z_j^-q`, q = 0 .. top (weights already in `values`); shape
+    (R, top + 1).
+    """
     rows, n = values.shape
     out = np.empty((rows, top + 1), dtype=np.complex128)
     pr = np.ones(n)
@@ -91,7 +93,9 @@ def _jet(c, zr, zi):
 
 @njit(cache=True)
 def _nearest(x, d, s, point, width):
-    """Distance from here to the nearest complex time at which the motion (value x, derivatives d, s) equals point +- i width."""
+    """Distance from here to the nearest complex time at which the motion (value x, derivatives d, s) equals point +-
+    i width.
+    """
     target = complex(x - point, -width)
     if abs(s) * abs(target) < 1e-6 * d * d:
         return abs(target) / abs(d)
@@ -107,16 +111,16 @@ def _nearest(x, d, s, point, width):
 def sharp_nodes(c, points, widths, cr, ci, hr, hi, weights, ratio):
     """Composite Gauss-Legendre nodes on a period, graded towards the instants at which a sharp law is passed.
 
-    A panel is halved until the nearest complex instant at which the motion meets a singularity of the law (point +- i width)
-    lies at least `ratio` half-lengths from its centre; the rule then converges geometrically on it.
-    Tables (`quadrature.panel_tables`): cr, ci (levels, order) hold the nodes of a panel of every level, relative to its centre,
-    as points on the circle; hr, hi (levels,) half its half-length; `weights` those of the rule on (-1, 1). Level 0 covers the
-    period with equal panels. Returns z (real, imaginary part) and weights, which add up to 2 pi.
+    A panel is halved until the nearest complex instant at which the motion meets a singularity of the law (point +- i
+    width) lies at least `ratio` half-lengths from its centre; the rule then converges geometrically on it. Tables
+    (`quadrature.panel_tables`): cr, ci (levels, order) hold the nodes of a panel of every level, relative to its
+    centre, as points on the circle; hr, hi (levels,) half its half-length; `weights` those of the rule on (-1, 1).
+    Level 0 covers the period with equal panels. Returns z (real, imaginary part) and weights, which add up to 2 pi.
     """
     order = weights.shape[0]
     depth = hr.shape[0] - 1
     half = 2.0 * math.atan2(hi[0], hr[0])
-    panels = int(round(math.pi / half))
+    panels = round(math.pi / half)
     capacity = order * panels * 4
     zr = np.empty(capacity)
     zi = np.empty(capacity)
@@ -193,7 +197,7 @@ def _refine(c, lo, hi, flo, level):
 
 @njit(cache=True)
 def crossings(c, level, zr, zi):
-    """Instants tau in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
+    """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
 
     Sampled on the uniform grid z; a pair hidden between two samples is looked for at every extremum near the level
     (whose parabola comes within half its own rise of it). Exact up to rounding.
@@ -274,7 +278,9 @@ def contact_spectrum(tau, above, side, top):
 
 @njit(cache=True)
 def product_spectrum(c, shift, chi, top):
-    """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top + H."""
+    """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
+    H.
+    """
     out = np.empty(top + 1, dtype=np.complex128)
     high = c.shape[0] - 1
     for k in range(top + 1):
@@ -292,9 +298,9 @@ def product_spectrum(c, shift, chi, top):
 def galerkin(stiffness, damping, rate, rows, cols, rows_mean, cols_mean):
     """Galerkin matrix `T(f_x) + T(f_v) d/dt` between two real bases.
 
-    rows, cols: twice the frequencies of the basis functions in units of the base frequency (even: integer basis, odd: half-odd
-    basis), one entry per harmonic; the mean, if any, comes first. `rate` is the base frequency. Spectra must reach
-    the largest sum of two frequencies.
+    rows, cols: twice the frequencies of the basis functions in units of the base frequency (even: integer basis, odd:
+    half-odd basis), one entry per harmonic; the mean, if any, comes first. `rate` is the base frequency. Spectra must
+    reach the largest sum of two frequencies.
     """
     nr = 2 * rows.shape[0] - (1 if rows_mean else 0)
     nc = 2 * cols.shape[0] - (1 if cols_mean else 0)
@@ -362,7 +368,7 @@ def polynomial(coefficients, zr, zi):
 
 @njit(cache=True)
 def add_linear(out, blocks, mean):
-    """Write complex blocks (one per harmonic, (h, n, n)) onto the block diagonal of a real matrix of the sine/cosine basis.
+    """Add complex blocks (h, n, n), one per harmonic, to the block diagonal of a real matrix of the sine/cosine basis.
 
     A complex amplitude `a - i b` stands for `a cos + b sin`: the block of a matrix `P + i Q` is [[P, Q], [-Q, P]].
     """
@@ -386,7 +392,9 @@ def add_linear(out, blocks, mean):
 
 @njit(cache=True)
 def add_element(out, matrix, rows, row_values, cols, col_values, n):
-    """Add `matrix` (per basis function) times the outer product of two sparse shapes over the DOFs to a real or complex matrix."""
+    """Add `matrix` (per basis function) times the outer product of two sparse shapes over the DOFs to a real or
+    complex matrix.
+    """
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             for p in range(rows.shape[0]):

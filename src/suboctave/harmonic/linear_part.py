@@ -1,15 +1,17 @@
 """The linear part of a structure, behind one small contract.
 
-Harmonic balance at a frequency Omega couples the unknown displacement amplitudes `x` (complex, `x exp(i Omega t)`) with the
-amplitudes `s` of element forces minus loads by
+Harmonic balance at a frequency Omega couples the unknown displacement amplitudes `x` (complex, `x exp(i Omega t)`)
+with the amplitudes `s` of element forces minus loads by
 
     A(Omega) x + B(Omega) s = 0.
 
 - stiffness form: `A = K - Omega^2 M + i Omega C`, `B = I` (returned as None);
-- flexibility form, for a model condensed onto the DOFs that elements touch: `A = I`, `B` = the dynamic flexibility there.
+- flexibility form, for a model condensed onto the DOFs that elements touch: `A = I`, `B` = the dynamic flexibility
+  there.
 
-Whatever is above asks for A, B and their derivatives with respect to Omega and the parameters, and for the matrices of an
-equation of motion with the same response (for monodromy and time integration); it never sees which form it is given.
+Whatever is above asks for A, B and their derivatives with respect to Omega and the parameters, and for the matrices
+of an equation of motion with the same response (for monodromy and time integration); it never sees which form it is
+given.
 """
 
 from __future__ import annotations
@@ -69,7 +71,7 @@ class StructuralMatrices:
 
     def compliance(self, frequency: Array, order: int = 0) -> None:
         """Identity."""
-        return None
+        return
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
@@ -82,7 +84,7 @@ class StructuralMatrices:
 
     def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> None:
         """Identity."""
-        return None
+        return
 
     def retain(self, direction: Array) -> Array:
         """All DOFs are unknowns."""

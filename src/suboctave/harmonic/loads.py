@@ -1,4 +1,6 @@
-"""Loads as harmonic coefficients: `amplitude cos(h omega t + phase)` with amplitude and phase free to depend on omega."""
+"""Loads as harmonic coefficients: `amplitude cos(h omega t + phase)` with amplitude and phase free to depend on
+omega.
+"""
 
 from __future__ import annotations
 

@@ -2,10 +2,11 @@
 
 Everything a harmonic-balance residual, its Jacobian, a bifurcation system or a normal form needs from an element:
 
-- `LocalForce`: Fourier coefficients of `f`, `f_u`, `f_v`. The same `f_u`, `f_v` serve every basis (integer, half-odd, shifted
-  by kappa) because the Galerkin matrices depend on differences and sums of frequencies only.
-- `Curvature`: second derivatives as weights at instants: `int f_uu h dtau = sum_j uu_j h(tau_j)`. For a sampled law these are its
-  nodes; for a piecewise-linear law `f_uu` is a comb of Dirac functions at the crossings, with weight `stiffness / |du/dtau|`.
+- `LocalForce`: Fourier coefficients of `f`, `f_u`, `f_v`. The same `f_u`, `f_v` serve every basis (integer, half-odd,
+  shifted by kappa) because the Galerkin matrices depend on differences and sums of frequencies only.
+- `Curvature`: second derivatives as weights at instants: `int f_uu h dtau = sum_j uu_j h(tau_j)`. For a sampled law
+  these are its nodes; for a piecewise-linear law `f_uu` is a comb of Dirac functions at the crossings, with weight
+  `stiffness / |du/dtau|`.
 - `CoefficientForce`: derivatives with respect to the element's coefficients (stiffness, gap, ...).
 
 Piecewise-linear laws are integrated in closed form over the contact intervals: no sampling, no regularisation.
@@ -29,7 +30,9 @@ _NONE = np.zeros(0, dtype=complex)
 
 @dataclass(frozen=True)
 class LocalForce:
-    """Fourier coefficients `g_q = mean(g exp(-i q tau))`, q = 0 .. top; `damping` is empty if the law has no velocity."""
+    """Fourier coefficients `g_q = mean(g exp(-i q tau))`, q = 0 .. top; `damping` is empty if the law has no
+    velocity.
+    """
 
     force: ComplexArray
     stiffness: ComplexArray
@@ -59,7 +62,9 @@ class CoefficientForce:
 
 @dataclass(frozen=True)
 class LocalMotion:
-    """An element on a motion: coefficients of the relative displacement (H + 1,), the base frequency, the element's numbers."""
+    """An element on a motion: coefficients of the relative displacement (H + 1,), the base frequency, the element's
+    numbers.
+    """
 
     element: Element
     motion: ComplexArray
@@ -95,8 +100,8 @@ class LocalMotion:
 class Contact:
     """Contact of one piece of a piecewise-linear law.
 
-    Indices of its coefficients, its side, the instants at which the gap is crossed (ascending), whether the motion lies above the gap
-    before the first of them, and the Fourier coefficients of the contact indicator.
+    Indices of its coefficients, its side, the instants at which the gap is crossed (ascending), whether the motion
+    lies above the gap before the first of them, and the Fourier coefficients of the contact indicator.
     """
 
     stiffness: int

@@ -25,7 +25,8 @@ class PeriodicOrbit:
     balance
         The equations it solves (system, basis, frozen samples).
     coefficients
-        `(a_0, a_1, b_1, ...)`, shape (2 H + 1, n): `x(t) = a_0 + sum_k a_k cos(k omega t / nu) + b_k sin(k omega t / nu)`.
+        `(a_0, a_1, b_1, ...)`, shape (2 H + 1, n): `x(t) = a_0 + sum_k a_k cos(k omega t / nu) + b_k sin(k omega t /
+        nu)`.
     omega
         Circular frequency of the load, rad per unit time.
     values

@@ -1,13 +1,15 @@
 """The operator behind every bifurcation: J_kappa, a motion's equations for perturbations at frequencies `k w0 + kappa`.
 
-    J_kappa[k, m] = A(k w0 + kappa) delta_km + B(k w0 + kappa) [ fx_{k-m} + i (m w0 + kappa) fv_{k-m} ],    w0 = omega / nu.
+    J_kappa[k, m] = A(k w0 + kappa) delta_km + B(k w0 + kappa) [ fx_{k-m} + i (m w0 + kappa) fv_{k-m} ],    w0 = omega
+    / nu.
 
 Its singularity at kappa = 0 is a limit or branch point, at kappa = w0 / 2 a period doubling, at any other kappa a
 Neimark-Sacker point. For the first two the set of frequencies is closed under conjugation: the matrices are real
 (`BalanceState.jacobian` and `BalanceState.half_jacobian`); otherwise complex, harmonics k = -H .. H.
 
-`bilinear_gradient` gives the derivative of `left^H J_kappa right` by the motion, omega, parameters and kappa with one pass over the
-sampling nodes: the adjoint gradient that bordered bifurcation systems need, without forming `(J right)_X`.
+`bilinear_gradient` gives the derivative of `left^H J_kappa right` by the motion, omega, parameters and kappa with one
+pass over the sampling nodes: the adjoint gradient that bordered bifurcation systems need, without forming `(J
+right)_X`.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivative of `left^H J_kappa right` by the coefficients (2 H + 1, size), by names, and by kappa; complex for Kind.FREE."""
+    """Derivative of `left^H J_kappa right` by the coefficients (2 H + 1, size), by names, and by kappa; complex for
+    Kind.FREE.
+    """
 
     x: np.ndarray
     rates: dict[str, complex]
@@ -42,14 +46,16 @@ class Gradient:
 
 
 def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
-    """J_kappa: real of size n (2 H + 1) or n (2 H + 2), complex of size n (2 H + 1) for Kind.FREE (kappa in rad per time)."""
+    """J_kappa: real of size n (2 H + 1) or n (2 H + 2), complex of size n (2 H + 1) for Kind.FREE (kappa in rad per
+    time).
+    """
     if kind is Kind.INTEGER:
         return state.jacobian
     if kind is Kind.HALF:
         return state.half_jacobian
     size, high = state.balance.size, state.basis.harmonics
     k = np.arange(-high, high + 1)
-    frequency = k * state.rate + kappa
+    frequency = np.asarray(k * state.rate + kappa, dtype=float)
     out = np.zeros((len(k) * size, len(k) * size), dtype=complex)
     for group, _, stiffness, damping in state.spectra:
         matrix = _two_sided(stiffness, k)
@@ -62,7 +68,7 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
         shaped[:] = np.matmul(compliance, shaped)
     four = out.reshape(len(k), size, len(k), size)
     index = np.arange(len(k))
-    four[index, :, index, :] += state.linear.stiffness(frequency)
+    four[index, :, index, :] = four[index, :, index, :] + state.linear.stiffness(frequency)
     return out
 
 
@@ -73,7 +79,7 @@ def _two_sided(spectrum: ComplexArray, k: np.ndarray) -> ComplexArray:
 
 
 def _as_waves(vector: np.ndarray, kind: Kind, size: int, left: bool) -> tuple[ComplexArray, np.ndarray]:
-    """A vector of the operator's basis as amplitudes of `exp(i f tau)`: shape (F, size) and frequencies f (F,), ascending.
+    """A vector of the operator's basis as amplitudes of `exp(i f tau)`, (F, size), and the frequencies f, ascending.
 
     Left vectors are scaled such that `left^H operator right` is the same number in both notations.
     """
@@ -115,9 +121,9 @@ def bilinear_gradient(
     # what the element part of the operator makes of `right`, and the left vector as the element forces see it
     u_force = u if compliance is None else np.einsum("fji,fj->fi", compliance.conj(), u)
     gx = np.zeros((basis.size, size), dtype=complex)
-    rates = {name: 0.0 + 0.0j for name in names}
+    rates: dict[str, complex] = dict.fromkeys(names, 0j)
     drive = np.zeros_like(v)  # T(f_x) v + T(f_v) v'
-    g_kappa = 0.0 + 0.0j
+    g_kappa = 0j
     for element, local, force in zip(state.balance.elements, state.local_motions, state.element_forces, strict=True):
         d = linear.retain(element.direction(state.balance.system.n))
         ue, ve = u_force @ d, v @ d
@@ -127,8 +133,8 @@ def bilinear_gradient(
         response = _toeplitz_apply(force.stiffness, ve)
         if force.damping.size:
             response = response + _toeplitz_apply(force.damping, rate_ve)
-            local_omega += np.vdot(ue, _toeplitz_apply(force.damping, 1j * by_omega * ve))
-            g_kappa += np.vdot(ue, _toeplitz_apply(force.damping, 1j * ve))
+            local_omega += _inner(ue, _toeplitz_apply(force.damping, 1j * by_omega * ve))
+            g_kappa += _inner(ue, _toeplitz_apply(force.damping, 1j * ve))
         if compliance is not None:
             drive += np.multiply.outer(response, d)
         for name in names:
@@ -138,28 +144,39 @@ def bilinear_gradient(
             change = coefficient_rates(element, state.values, {name: 1.0})
             if change.any():
                 c = coefficient_force(local)
-                rates[name] += np.vdot(ue, _toeplitz_apply(change @ c.stiffness, ve))
+                rates[name] += _inner(ue, _toeplitz_apply(change @ c.stiffness, ve))
                 if c.damping is not None:
-                    rates[name] += np.vdot(ue, _toeplitz_apply(change @ c.damping, rate_ve))
-    g_kappa += np.einsum("fi,fij,fj->", u.conj(), slope, v)
+                    rates[name] += _inner(ue, _toeplitz_apply(change @ c.damping, rate_ve))
+    g_kappa += _form(u, slope, v)
     compliance_slope = linear.compliance(frequency, 1)
     if compliance_slope is not None:
-        g_kappa += np.einsum("fi,fij,fj->", u.conj(), compliance_slope, drive)
+        g_kappa += _form(u, compliance_slope, drive)
     for name in names:
         if name == "omega":
-            rates[name] += np.einsum("fi,f,fij,fj->", u.conj(), by_omega, slope, v)
+            share = by_omega[:, None, None]
+            rates[name] += _form(u, share * slope, v)
             if compliance_slope is not None:
-                rates[name] += np.einsum("fi,f,fij,fj->", u.conj(), by_omega, compliance_slope, drive)
+                rates[name] += _form(u, share * compliance_slope, drive)
             continue
-        block = linear.stiffness_by(frequency, (name,))
-        if block is not None:
-            rates[name] += np.einsum("fi,fij,fj->", u.conj(), block, v)
-        block = linear.compliance_by(frequency, (name,))
-        if block is not None:
-            rates[name] += np.einsum("fi,fij,fj->", u.conj(), block, drive)
+        for block, vector in (
+            (linear.stiffness_by(frequency, (name,)), v),
+            (linear.compliance_by(frequency, (name,)), drive),
+        ):
+            if block is not None:
+                rates[name] += _form(u, block, vector)
     if kind is Kind.FREE:
         return Gradient(gx, rates, g_kappa)
     return Gradient(gx.real, {k: complex(r.real) for k, r in rates.items()}, g_kappa)
+
+
+def _inner(left: ComplexArray, right: ComplexArray) -> complex:
+    """`left^H right`."""
+    return complex(np.vdot(left, right))
+
+
+def _form(left: ComplexArray, blocks: ComplexArray, right: ComplexArray) -> complex:
+    """`left^H blocks right`, one block per frequency."""
+    return complex(np.einsum("fi,fij,fj->", left.conj(), blocks, right))
 
 
 def _toeplitz_apply(spectrum: ComplexArray, waves: ComplexArray) -> ComplexArray:
@@ -173,7 +190,9 @@ def _toeplitz_apply(spectrum: ComplexArray, waves: ComplexArray) -> ComplexArray
 def _element_gradient(
     local: LocalMotion, left: ComplexArray, right: ComplexArray, right_rate: ComplexArray, nu: int
 ) -> tuple[ComplexArray, complex]:
-    """Gradient of `int conj(left) (f_u right + f_v right') / (2 pi)` by the element's real coefficients and by omega through v."""
+    """Gradient of `int conj(left) (f_u right + f_v right') / (2 pi)` by the element's real coefficients and by omega
+    through v.
+    """
     bend = curvature(local)
     high = local.motion.shape[0] - 1
     if bend.zr.size == 0:
@@ -211,11 +230,14 @@ def _projection(spectrum: ComplexArray) -> Array:
 
 
 def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple[str, ...]) -> Gradient:
-    """Derivative of `left . R_name` by the coefficients and by names ("omega" or parameters); `left` of the residual's size."""
+    """Derivative of `left . R_name` by the coefficients and by names ("omega" or parameters); `left` of the
+    residual's size.
+    """
     linear, basis, size = state.linear, state.basis, state.balance.size
     freq, m = state.frequencies, basis.multiples[:, None, None]
     shaped = left.reshape(basis.size, size)
-    # A_name and B_name per harmonic, transposed in the sense of the real basis: conjugate transpose of the complex blocks
+    # A_name and B_name per harmonic, transposed in the sense of the real basis: conjugate transpose of the complex
+    # blocks
     if name == "omega":
         block: ComplexArray | None = linear.stiffness(freq, 1) * m
         slope = linear.compliance(freq, 1)

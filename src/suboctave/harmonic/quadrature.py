@@ -3,11 +3,13 @@
 Three rules, all of which converge faster than any power of the number of nodes for the laws they are meant for:
 
 - uniform (the trapezoidal rule), exact for laws that are polynomials in displacement and velocity;
-- composite Gauss-Legendre panels that grade themselves towards the instants at which a sharp law (a regularised contact) is
-  passed, so that no sampling error is left: sampling a sharp law uniformly bends the response curve into false folds;
+- composite Gauss-Legendre panels that grade themselves towards the instants at which a sharp law (a regularised
+  contact) is passed, so that no sampling error is left: sampling a sharp law uniformly bends the response curve into
+  false folds;
 - uniform with a number of samples that is doubled until force and tangent stop moving, for laws that tell nothing.
 
-The nodes follow the motion at each evaluation. That does no harm because the rule is accurate to rounding before and after.
+The nodes follow the motion at each evaluation. That does no harm because the rule is accurate to rounding before and
+after.
 """
 
 from __future__ import annotations
@@ -58,7 +60,9 @@ def uniform_nodes(count: int) -> Nodes:
 
 @lru_cache(maxsize=64)
 def panel_tables(panels: int, order: int) -> tuple[Array, ...]:
-    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `kernels.sharp_nodes` asks for."""
+    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `kernels.sharp_nodes`
+    asks for.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(order)
     half = math.pi / panels * 0.5 ** np.arange(_DEPTH + 1)
     angles = np.multiply.outer(half, nodes)
@@ -68,7 +72,9 @@ def panel_tables(panels: int, order: int) -> tuple[Array, ...]:
 def sharp_nodes(
     motion: ComplexArray, kind: SharpSampling, panels: int, order: int, ratio: float
 ) -> tuple[Array, Array, Array]:
-    """z (real, imaginary part) and weights of composite Gauss-Legendre panels graded towards the passages of a sharp law."""
+    """z (real, imaginary part) and weights of composite Gauss-Legendre panels graded towards the passages of a sharp
+    law.
+    """
     return kernels.sharp_nodes(
         motion, np.asarray(kind.points, float), np.asarray(kind.widths, float), *panel_tables(panels, order), ratio
     )
@@ -142,7 +148,9 @@ def _change(a: ComplexArray, b: ComplexArray) -> float:
 def sampled_spectra(
     element: Element, motion: ComplexArray, rate: float, coefficients: Array, nodes: Nodes, top: int
 ) -> tuple[ComplexArray, ...]:
-    """Fourier coefficients 0 .. top of force, stiffness and (if the law depends on velocity) damping at the given nodes."""
+    """Fourier coefficients 0 .. top of force, stiffness and (if the law depends on velocity) damping at the given
+    nodes.
+    """
     values = kernels.motion(motion, nodes.zr, nodes.zi)
     f, f_u, f_v = element.tangent(values[0], rate * values[1], coefficients)
     rows = (f, f_u) if f_v is None else (f, f_u, f_v)

@@ -1,11 +1,12 @@
 """Directional derivatives of the harmonic-balance equations, analytic, to second order.
 
-A direction is a change of the coefficients together with changes of omega and of parameters. With `v = omega D u`, the change of
-an element's velocity along a direction a is `v_a = omega D u_a + omega_a D u`, and to second order `v_ab = omega_a D u_b + omega_b D u_a`;
-hence
+A direction is a change of the coefficients together with changes of omega and of parameters. With `v = omega D u`,
+the change of an element's velocity along a direction a is `v_a = omega D u_a + omega_a D u`, and to second order
+`v_ab = omega_a D u_b + omega_b D u_a`; hence
 
-    F''[a, b] = < f_uu u_a u_b + f_uv (u_a v_b + v_a u_b) + f_vv v_a v_b + f_v v_ab >  + terms with the element's coefficients,
-    R''[a, b] = A''[a, b] X + A'[a] X_b + A'[b] X_a + B''[a, b] S + B'[a] S'[b] + B'[b] S'[a] + B S''[a, b].
+    F''[a, b] = < f_uu u_a u_b + f_uv (u_a v_b + v_a u_b) + f_vv v_a v_b + f_v v_ab >  + terms with the element's
+    coefficients, R''[a, b] = A''[a, b] X + A'[a] X_b + A'[b] X_a + B''[a, b] S + B'[a] S'[b] + B'[b] S'[a] + B S''[a,
+    b].
 
 For piecewise-linear laws `f_uu` is a Dirac comb at the crossings of the gap: the integrals become boundary terms.
 """

@@ -1,8 +1,9 @@
 """How many harmonics a motion needs: the energy of the force that the basis neglects.
 
-The element forces of a truncated motion have harmonics beyond the basis. To first order the motion they would excite is
-`x_k = -A(k w0)^-1 B(k w0) f_k`; its size relative to the motion is the truncation estimate stated on every orbit. It is the criterion of
-Ferri & Leamy (AIAA 2009-2667) carried from forces to displacements, so that it is dimensionless and weighs what matters.
+The element forces of a truncated motion have harmonics beyond the basis. To first order the motion they would excite
+is `x_k = -A(k w0)^-1 B(k w0) f_k`; its size relative to the motion is the truncation estimate stated on every orbit.
+It is the criterion of Ferri & Leamy (AIAA 2009-2667) carried from forces to displacements, so that it is
+dimensionless and weighs what matters.
 """
 
 from __future__ import annotations

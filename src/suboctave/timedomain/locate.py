@@ -185,7 +185,9 @@ def locate_by_shooting(
     return solution
 
 
-def _drive(curve: Curve, point: CurvePoint, kind: str, max_step: float, max_iterations: int) -> tuple[CurvePoint, float, int]:
+def _drive(
+    curve: Curve, point: CurvePoint, kind: str, max_step: float, max_iterations: int
+) -> tuple[CurvePoint, float, int]:
     """Secant iteration on the test function along the curve, kept inside a bracket once there is one."""
     measure = _test_function(kind, point)
     value = measure(point)
