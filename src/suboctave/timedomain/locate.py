@@ -34,6 +34,7 @@ _KINDS = ("LP", "PD", "NS", "BP")
 _FIRST_STEP = 1e-4  # along the curve, in units of the size of the motion
 _NEARLY_SINGULAR = 1e-5  # relative singular value below which a BP's second direction is left alone
 _NO_BRANCH_POINT = 1e-4
+_IDLE = 3  # iterations without a bracket in which the test function may fail to fall to half
 _REAL_MULTIPLIER = 1e-5  # imaginary part below which a pair on the unit circle is taken for two real multipliers
 
 
@@ -119,10 +120,7 @@ def _neimark_sacker(start: CurvePoint) -> Callable[[CurvePoint], float]:
     multipliers = np.linalg.eigvals(start.transition)
     upper = multipliers[multipliers.imag > 1e-6 * np.abs(multipliers)]
     if upper.size == 0:
-        raise ConvergenceError(
-            "no complex pair of multipliers at the start, so that no NS can be followed from there: start closer to it "
-            "(two real multipliers whose product is 1 are a neutral saddle, not an NS)"
-        )
+        return lambda point: 1.0
     current = [upper[np.argmin(np.abs(np.abs(upper) - 1.0))]]
 
     def value(point: CurvePoint) -> float:
@@ -154,7 +152,7 @@ def locate_by_shooting(
     values: Mapping[str, float] | None = None,
     tol: float = 1e-11,
     max_step: float = 0.05,
-    max_iterations: int = 60,
+    max_iterations: int = 40,
     observe: int | None = None,
     rtol: float = 1e-12,
 ) -> PeriodicSolution:
@@ -186,42 +184,102 @@ def locate_by_shooting(
 
 
 def _drive(
-    curve: Curve, point: CurvePoint, kind: str, max_step: float, max_iterations: int
+    curve: Curve, start: CurvePoint, kind: str, max_step: float, max_iterations: int
 ) -> tuple[CurvePoint, float, int]:
-    """Secant iteration on the test function along the curve, kept inside a bracket once there is one."""
-    measure = _test_function(kind, point)
-    value = measure(point)
+    """The bifurcation on the curve: by secants from the start; if they lead nowhere, between two scanned points."""
+    try:
+        found = _secants(curve, kind, start, None, max_step, max_iterations)
+    except ConvergenceError:  # a step too far
+        found = None
+    if found is not None:
+        return found
+    pair = _scan(curve, kind, start, max_step, max_iterations)
+    if pair is not None:
+        found = _secants(curve, kind, pair[1], pair[0], max_step, max_iterations)
+        if found is not None:
+            return found
+    raise ConvergenceError(
+        f"no {kind} found along the curve of periodic motions from omega = {start.u[-1] * curve.model.reference:.9g} "
+        f"within {max_iterations} steps either way: start closer, or allow longer steps (max_step = {max_step:g})"
+    )
+
+
+def _secants(
+    curve: Curve, kind: str, start: CurvePoint, other: CurvePoint | None, max_step: float, max_iterations: int
+) -> tuple[CurvePoint, float, int] | None:
+    """Secant iteration on the test function along the curve, kept inside a bracket once there is one.
+
+    `other`: a neighbour on the far side, where one is known. None when the test function does not get smaller.
+    """
+    measure = _test_function(kind, start)
+    point, value = start, measure(start)
     best = (abs(value), point, value)
-    step = _FIRST_STEP
-    bracket: CurvePoint | None = None  # a point with the other sign of the test function
+    step, bracket = _FIRST_STEP, other
+    if other is not None:  # first guess in the middle
+        step = 0.5 * float(point.tangent @ (other.u - point.u))
+    idle = 0
     for count in range(1, max_iterations + 1):
         following = curve.onto(point.u + step * point.tangent, point.tangent)
         new = measure(following)
         moved = float(point.tangent @ (following.u - point.u))
+        idle = 0 if abs(new) < 0.5 * best[0] else idle + 1
         if abs(new) < best[0]:
             best = (abs(new), following, new)
         if new == 0.0:
             return following, new, count
         if new * value < 0.0:
             bracket = point
+        elif bracket is None and idle > _IDLE:
+            return None
         slope = (new - value) / moved if moved != 0.0 else 0.0
-        wanted = -new / slope if slope != 0.0 else np.copysign(max_step, step)
-        if abs(wanted * following.tangent[-1]) <= 2e-13 and abs(wanted) <= 1e-9:
+        wanted = -new / slope if slope != 0.0 else float(np.copysign(max_step, step))
+        in_omega = abs(wanted * following.tangent[-1])
+        if in_omega <= 2e-13 and abs(wanted) <= 1e-9:
             return best[1], best[2], count
-        if count > 5 and abs(wanted * following.tangent[-1]) <= 1e-10 and abs(wanted) <= 1e-7 and abs(new) >= best[0]:
+        if count > 5 and in_omega <= 1e-10 and abs(wanted) <= 1e-7 and abs(new) >= best[0]:
             return best[1], best[2], count  # the noise of the integration: no further digit to be had
-        limit = max_step if count > 1 else min(max_step, 100.0 * _FIRST_STEP)
+        limit = max_step if count > 1 or other is not None else min(max_step, 100.0 * _FIRST_STEP)
         if bracket is not None:
             room = float(following.tangent @ (bracket.u - following.u))
-            if not 0.0 <= wanted / room <= 1.0:
+            if room == 0.0 or not 0.0 <= wanted / room <= 1.0:
                 wanted = 0.5 * room
         step = float(np.clip(wanted, -limit, limit))
         point, value = following, new
-    raise ConvergenceError(
-        f"no {kind} found within {max_iterations} steps: test function {best[2]:.2e} at best, at omega = "
-        f"{best[1].u[-1] * curve.model.reference:.9g}, {value:.2e} at the last point. Start closer, or allow longer "
-        "steps (max_step)"
-    )
+    return None
+
+
+def _scan(
+    curve: Curve, kind: str, start: CurvePoint, max_step: float, max_iterations: int
+) -> tuple[CurvePoint, CurvePoint] | None:
+    """The first two neighbours between which the kind of bifurcation lies, walking both ways with growing steps."""
+    step = 10.0 * _FIRST_STEP
+    ends = [start, start]
+    sides = [_side(kind, start)] * 2
+    for _ in range(max_iterations):
+        for way, sign in enumerate((1.0, -1.0)):
+            last = ends[way]
+            try:
+                following = curve.onto(last.u + sign * step * last.tangent, last.tangent)
+            except ConvergenceError:
+                continue
+            side = _side(kind, following)
+            if side != sides[way]:
+                return last, following
+            ends[way] = following
+        step = min(max_step, 1.5 * step)
+    return None
+
+
+def _side(kind: str, point: CurvePoint) -> float:
+    """What changes at a bifurcation of this kind, and has no pole: a sign, or for NS a number of pairs."""
+    if kind == "LP":
+        return float(np.sign(point.tangent[-1]))
+    if kind == "PD":
+        return float(np.linalg.slogdet(point.transition + np.eye(len(point.transition)))[0])
+    if kind == "BP":
+        return float(np.linalg.slogdet(np.vstack([point.slopes, point.tangent]))[0])
+    multipliers = np.linalg.eigvals(point.transition)
+    return float(np.sum((np.abs(multipliers) > 1.0) & (multipliers.imag != 0.0)) // 2)
 
 
 def _confirm(kind: str, solution: PeriodicSolution, point: CurvePoint) -> None:
