@@ -118,6 +118,10 @@ class HarmonicBalance:
             return self
         return HarmonicBalance(self.system, basis, self.values, self.linear, self.samples)
 
+    @cached_property
+    def _completed(self) -> HarmonicBalance:
+        return self.with_basis(HarmonicBasis(self.top, self.basis.nu))
+
     def at(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> BalanceState:
         """Evaluate at coefficients x, frequency omega and, where given, other parameter values.
 
@@ -167,16 +171,19 @@ class HarmonicBalance:
 
     @cached_property
     def _scales(self) -> tuple[Array, Array]:
-        mass = np.diag(self.linear.equation_of_motion()[0])
-        weight = np.sqrt(np.maximum(mass, 0.0))
-        if not np.all(weight > 0.0):
-            raise InputError("every unknown DOF needs a positive mass on the diagonal")
+        mass = self.linear.equation_of_motion()[0]
+        shapes = np.array([self.linear.expand(unit) for unit in np.eye(self.size)])
+        mobility = np.einsum("ij,ji->i", shapes, np.linalg.solve(mass, shapes.T))
+        if not np.all(mobility > 0.0):
+            raise InputError("every unknown DOF needs a mass behind it")
+        weight = 1.0 / np.sqrt(mobility)
         return weight, 1.0 / weight
 
     def scales(self) -> tuple[Array, Array]:
-        """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_ii)` and its inverse.
+        """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_i)` and its inverse.
 
-        They make norms independent of the units of single DOFs. Shape (size,) each.
+        `m_i` is the mass that a DOF shows to a sudden force, `1 / (M^-1)_ii`. The weights make norms independent of
+        the units of single DOFs. Shape (size,) each.
         """
         return self._scales
 
@@ -352,6 +359,38 @@ class BalanceState:
         if force is None:
             return load
         return force if load is None else force + load
+
+    @cached_property
+    def neglected(self) -> ComplexArray:
+        """Amplitudes of the harmonics k = H + 1 .. 2 H + 1 that the force on the motion would excite, shape (H + 1, size).
+
+        To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
+        """
+        basis, size = self.basis, self.balance.size
+        high = basis.harmonics
+        force = np.zeros((high + 1, size), dtype=complex)
+        for group, spectrum, _, _ in self.spectra:
+            force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
+        frequency = np.arange(high + 1, 2 * high + 2) / basis.nu * self.omega
+        compliance = self.linear.compliance(frequency)
+        if compliance is not None:
+            force = np.einsum("kij,kj->ki", compliance, force)
+        blocks = self.linear.stiffness(frequency)
+        if size == 1:
+            return -force / blocks[:, :, 0]
+        return -np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+
+    @cached_property
+    def completed(self) -> BalanceState:
+        """The motion together with the harmonics it neglects, in the basis of 2 H + 1 harmonics.
+
+        It solves the equations no better within the basis, but as a function of time it lies closer to the true motion.
+        """
+        balance, high = self.balance._completed, self.basis.harmonics
+        x = self.basis.resized(self.x, balance.basis)
+        x[2 * high + 1 :: 2] = self.neglected.real
+        x[2 * high + 2 :: 2] = -self.neglected.imag
+        return BalanceState(balance, self.linear, x, self.omega, self.values)
 
     def force_scale(self) -> float:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: what a residual is compared

@@ -6,12 +6,13 @@ with the amplitudes `s` of element forces minus loads by
     A(Omega) x + B(Omega) s = 0.
 
 - stiffness form: `A = K - Omega^2 M + i Omega C`, `B = I` (returned as None);
-- flexibility form, for a model condensed onto the DOFs that elements touch: `A = I`, `B` = the dynamic flexibility
-  there.
+- flexibility form, for a model condensed onto the DOFs that elements and loads touch: `A = S`, `B = S G` with G the
+  dynamic flexibility there and S a constant diagonal matrix of stiffnesses, which gives residuals the unit of forces
+  in this form too. (`S = I` will do where masses and frequencies are of the order of one.)
 
 Whatever is above asks for A, B and their derivatives with respect to Omega and the parameters, and for the matrices
-of an equation of motion with the same response (for monodromy and time integration); it never sees which form it is
-given.
+of an equation of motion with the same response (for monodromy and scaling); it never sees which form it is given. The
+equation of motion may have more DOFs than there are unknowns: `expand` takes directions from these to those.
 """
 
 from __future__ import annotations
@@ -49,7 +50,10 @@ class LinearPart(Protocol):
         """A direction or load shape in the structure's DOFs (n,) as one in the unknown DOFs (size,)."""
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
-        """Mass, damping, stiffness (size, size) of an equation of motion with this response."""
+        """Mass, damping, stiffness (N, N) of an equation of motion with this response, N >= size."""
+
+    def expand(self, direction: Array) -> Array:
+        """A direction in the unknown DOFs (size,) as one in those of the equation of motion (N,)."""
 
 
 class StructuralMatrices:
@@ -93,6 +97,10 @@ class StructuralMatrices:
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """M, C, K of the system."""
         return self._mass, self._damping, self._stiffness
+
+    def expand(self, direction: Array) -> Array:
+        """The unknowns are the DOFs of the equation of motion."""
+        return direction
 
 
 def _dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, frequency: Array, order: int) -> ComplexArray:
