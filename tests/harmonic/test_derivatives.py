@@ -1,0 +1,175 @@
+"""Every derivative of the harmonic-balance equations against central differences of what it is the derivative of.
+
+Two DOFs with a coupled, unsymmetric linear part, two contacts, a cubic spring and a damper that depends on velocity
+and position; parameters enter matrices, elements and loads nonlinearly; one load's amplitude and phase depend on
+omega. Each case in a plain and in a doubled basis, and each also in flexibility form.
+"""
+
+import numpy as np
+import pytest
+
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator, parameter_gradient
+from suboctave.harmonic.second import Direction, second_derivative
+from suboctave.model import CubicSpring, ElasticStop, HarmonicLoad, System, check_derivatives
+
+OMEGA, KAPPA, STEP = 1.7, 0.37, 1e-6
+NAMES = ("zeta", "alpha", "Kc", "j", "p", "k")
+
+
+def contacts(regularization):
+    """A stop between two DOFs and one to ground, sharing a parameter and the gap."""
+    return [
+        ElasticStop((0, 1), stiffness="Kc*k", gap="j", regularization=regularization),
+        ElasticStop(1, stiffness="Kc", gap="-1+j", side="left", regularization=regularization),
+    ]
+
+
+@pytest.fixture(scope="module", params=["exact", "regularised", "damper"])
+def elements(request, damper):
+    cubic = CubicSpring(0, "alpha")
+    return {
+        "exact": [cubic, *contacts(None)],
+        "regularised": [cubic, *contacts(30.0)],
+        # in one direction with the cubic spring, and in one of its own
+        "damper": [cubic, damper(0, ["zeta*k", "j**2"]), damper((0, 1), ["alpha", "zeta+Kc*j"])],
+    }[request.param]
+
+
+class Case:
+    """Equations at a random motion, and as functions of everything they depend on."""
+
+    def __init__(self, elements, nu, linear):
+        self.system = System(
+            mass=[[1.0, 0.1], [0.1, 2.0]],
+            damping=[["2*zeta", -0.01], [0.02, "0.05*k"]],
+            stiffness=[["2+k", -1], [-1, "1+k**2"]],
+            elements=elements,
+            loads=[
+                HarmonicLoad(dof=0, amplitude="p*omega**2", phase="0.1*omega*k"),
+                HarmonicLoad(dof=1, amplitude="p*k", harmonic=2, static="0.1*p"),
+            ],
+            parameters={"zeta": 0.03, "alpha": 0.16, "Kc": 4.7, "j": 0.2, "p": 0.5, "k": 1.3},
+        )
+        self.values = dict(self.system.parameters)
+        self.basis = HarmonicBasis(6 * nu, nu)
+        self.random = np.random.default_rng(0)
+        self.x = self.vector() / (1 + np.arange(self.basis.size)[:, None])
+        form = None if linear is None else linear(self.system)
+        self.balance = HarmonicBalance(self.system, self.basis, linear=form).settle(self.x, OMEGA)
+        self.state = self.at(0.0)
+
+    def vector(self):
+        return self.random.normal(size=(self.basis.size, 2))
+
+    def at(self, h, dx=0.0, **rates):
+        """The state at a distance h along a direction."""
+        values = {name: value + h * rates.get(name, 0.0) for name, value in self.values.items()}
+        return self.balance.at(self.x + h * dx, OMEGA + h * rates.get("omega", 0.0), values)
+
+
+@pytest.fixture(scope="module", params=[(1, "stiffness"), (2, "stiffness"), (1, "flexibility")], ids=str)
+def case(request, elements, condensed):
+    nu, form = request.param
+    return Case(elements, nu, None if form == "stiffness" else lambda system: condensed(system, (0, 1), scale=3.0))
+
+
+def difference(function, step=STEP):
+    return (function(step) - function(-step)) / (2 * step)
+
+
+def assert_close(exact, function, step=STEP):
+    """`exact` is the derivative of `function` at 0: to 1e-6 of its size, and to the rounding of the quotient."""
+    rough = difference(function, step)
+    rounding = 1e-14 * np.abs(function(0.0)).max() / step
+    assert np.abs(rough - exact).max() <= 1e-6 * np.abs(exact).max() + 10 * rounding + 1e-9
+
+
+def test_the_damper_used_here_is_right(damper):
+    assert check_derivatives(damper(0, [0.1, 0.7])).ok
+
+
+def test_jacobian(case):
+    dx = case.vector()
+    assert_close(case.state.jacobian @ dx.ravel(), lambda h: case.at(h, dx).residual)
+
+
+@pytest.mark.parametrize("name", ["omega", *NAMES])
+def test_parameter_derivatives(case, name):
+    assert_close(case.state.residual_by(name), lambda h: case.at(h, **{name: 1.0}).residual)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ({}, {}),
+        ({"omega": 0.3}, {"omega": -0.7}),
+        ({}, {"omega": 1.0}),
+        ({"j": 0.4, "Kc": 0.2, "omega": 0.3}, {"k": 0.5, "p": 0.1, "j": -0.3, "omega": 0.2, "zeta": 0.3}),
+        ({"k": 1.0}, {"k": 1.0}),
+        ({"alpha": 0.3, "zeta": -0.2}, {"omega": 0.5, "j": 0.3}),
+    ],
+)
+def test_second_derivative(case, first, second):
+    da, db = case.vector(), case.vector()
+
+    def slope(h):
+        state = case.at(h, db, **second)
+        return state.jacobian @ da.ravel() + sum(rate * state.residual_by(name) for name, rate in first.items())
+
+    exact = second_derivative(case.state, Direction(da, first), Direction(db, second))
+    assert_close(exact, slope)
+    swapped = second_derivative(case.state, Direction(db, second), Direction(da, first))
+    assert np.abs(swapped - exact).max() <= 1e-11 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_gradient_of_a_bilinear_form_of_the_operator(case, kind):
+    n = operator(case.state, kind, KAPPA).shape[0]
+    left, right = case.random.normal(size=(2, n))
+    if kind is Kind.FREE:
+        left, right = left + 1j * case.random.normal(size=n), right + 1j * case.random.normal(size=n)
+    gradient = bilinear_gradient(case.state, kind, left, right, ("omega", *NAMES), KAPPA)
+    dx = case.vector()
+
+    def form(state, kappa=KAPPA):
+        return np.vdot(left, operator(state, kind, kappa) @ right)
+
+    assert_close((gradient.x * dx).sum(), lambda h: form(case.at(h, dx)))
+    for name in ("omega", *NAMES):
+        assert_close(gradient.rates[name], lambda h, name=name: form(case.at(h, **{name: 1.0})))
+    if kind is Kind.FREE:
+        assert_close(gradient.kappa, lambda h: form(case.state, KAPPA + h))
+
+
+@pytest.mark.parametrize("name", ["omega", *NAMES])
+def test_gradient_of_a_parameter_derivative(case, name):
+    left, dx = case.random.normal(size=case.balance.dimension), case.vector()
+    others = ("omega", "j", "k", "Kc", "zeta")
+    gradient = parameter_gradient(case.state, left, name, others)
+
+    def form(state):
+        return left @ state.residual_by(name)
+
+    assert_close((gradient.x * dx).sum(), lambda h: form(case.at(h, dx)))
+    for other in others:
+        assert_close(gradient.rates[other].real, lambda h, other=other: form(case.at(h, **{other: 1.0})))
+
+
+def test_the_free_operator_contains_the_real_ones(case):
+    """J_kappa at kappa = 0 is the Jacobian in another basis, and a change of basis keeps the determinant."""
+    sign, size = np.linalg.slogdet(operator(case.state, Kind.FREE, 0.0))
+    real_sign, real_size = np.linalg.slogdet(case.state.jacobian)
+    assert sign.real == pytest.approx(real_sign, abs=1e-9)
+    assert size == pytest.approx(real_size, rel=1e-12)
+
+
+def test_the_flexibility_form_has_the_same_motions(elements, condensed):
+    """R of the flexibility form is S G(k w0) R of the stiffness form, harmonic by harmonic."""
+    plain = Case(elements, 1, None)
+    other = Case(elements, 1, lambda system: condensed(system, (0, 1), scale=3.0))
+    r = plain.state.residual.reshape(plain.x.shape)
+    c = np.vstack((r[:1], r[1::2] - 1j * r[2::2]))
+    flexible = np.einsum("kij,kj->ki", other.state.compliance, c)
+    s = other.state.residual.reshape(plain.x.shape)
+    np.testing.assert_allclose(np.vstack((s[:1], s[1::2] - 1j * s[2::2])), flexible, atol=1e-11)
