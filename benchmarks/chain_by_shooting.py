@@ -2,8 +2,9 @@
 
 Unit masses on a line, unit springs between neighbours and from the first one to the ground, damping
 `0.01 M + 0.02 K`, a force `0.15 cos(omega t)` on the first mass, and an exact elastic stop (stiffness 1, gap 1) on the
-right of the last one. Between omega = 0.40 and 0.60, around the second natural frequency 0.445, its response doubles
-its period and returns, folds back twice, and is quasi-periodic over two stretches.
+right of the last one. Between omega = 0.40 and 0.60, around the second natural frequency 0.445, its response is
+unstable from one period doubling to the next, folds back twice, and has a complex pair of multipliers outside the unit
+circle from a Neimark-Sacker point between the folds to one just after the second.
 
 The curve of periodic motions is followed in short steps (least-norm shooting with free omega, tolerance 1e-9), the
 events are read from the multipliers and from the direction of the curve, and each is located at full accuracy. No
