@@ -17,12 +17,15 @@ from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.floquet import floquet_multipliers
+from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import choose_harmonics, neglected_motion, truncation
+from suboctave.harmonic.selection import choose_harmonics, truncation
 
 #: two changes in one step are separated by halving it, down to this distance in scaled arclength
 _SEPARATE = 2e-3
+#: steps shorter than this, in scaled arclength, are not halved for the multipliers' sake
+_EXAMINED = 0.01
 #: multipliers of modulus above one half may move by this much per step (relative to their modulus where it exceeds one)
 _MOVEMENT = 0.4
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
@@ -128,7 +131,11 @@ class _Follower:
         changed = [kind.name for kind in ALL_KINDS if kind.changed(old, new)]
         if len(changed) > 1 or abs(old.floquet.unstable - new.floquet.unstable) > 2:
             return False
+        self._changed = changed
         moved = _movement(old.floquet.multipliers, new.floquet.multipliers)
+        self._next_speed = moved / step
+        if step < _EXAMINED:
+            return True
         # how far they went, seen directly and at the speed of the step before (a fast rotation may look like none)
         speed = max(moved, self._speed * step)
         if moved > _MOVEMENT or speed > 1.5 * _MOVEMENT:
@@ -139,11 +146,7 @@ class _Follower:
             gap = sum(float(np.abs(s.floquet.multipliers - target).min()) for s in (old, new))
             if gap < 1.3 * speed:
                 return False
-        if _height(old.floquet.multipliers, new.floquet.multipliers) < 1.3 * speed:
-            return False
-        self._next_speed = moved / step
-        self._changed = changed
-        return True
+        return _height(old.floquet.multipliers, new.floquet.multipliers) >= 1.3 * speed
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
@@ -163,10 +166,9 @@ class _Follower:
     def _orbit(self, sample: Sample) -> PeriodicOrbit:
         evaluation = sample.point.evaluation
         assert isinstance(evaluation, ResponseEvaluation)
-        state = sample.state
-        return PeriodicOrbit(
-            state.balance, state.x.copy(), state.omega, dict(state.values), evaluation.error, evaluation.truncation
-        )
+        curve = sample.point.curve
+        assert isinstance(curve, ResponseCurve)
+        return _as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
 
     def _search(self, a: Sample, b: Sample) -> None:
         found: list[tuple[float, Bifurcation]] = []
@@ -235,10 +237,7 @@ class _Follower:
             )
         solution = self._refined(located, located.solution, curve)
         state = solution.state
-        neglected = truncation(state, neglected_motion(state))
-        orbit = PeriodicOrbit(
-            state.balance, state.x.copy(), state.omega, dict(state.values), solution.residual, neglected
-        )
+        orbit = _as_orbit(state, solution.residual, truncation(state), curve)
         return Bifurcation(
             located.kind.name,
             orbit,
@@ -259,7 +258,7 @@ class _Follower:
             return solution
         for _ in range(8):
             state = solution.state
-            basis = choose_harmonics(state, neglected_motion(state), adaptive, adaptive.event_tolerance)
+            basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
             if basis.harmonics <= state.basis.harmonics:
                 break
             finer = curve.with_basis(basis)
@@ -313,6 +312,11 @@ class _Follower:
             arclength=point.arclength,
             context=self.settings.context,
         )
+
+
+def _as_orbit(state: BalanceState, residual: float, neglected: float, curve: ResponseCurve) -> PeriodicOrbit:
+    values = dict(state.values)
+    return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, residual, neglected, curve.adaptive)
 
 
 def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:

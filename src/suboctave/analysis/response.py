@@ -13,7 +13,7 @@ from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import BalanceState, HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, neglected_motion, truncation
+from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, truncation
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,9 @@ class ResponseEvaluation:
         return size / max(state.force_scale(), np.finfo(float).tiny)
 
     @cached_property
-    def neglected(self) -> Array:
-        """Sizes of the harmonics of the motion that the basis neglects, shape (H + 1,)."""
-        return neglected_motion(self.state)
-
-    @property
     def truncation(self) -> float:
         """Estimated size of the neglected harmonics relative to the motion."""
-        return truncation(self.state, self.neglected)
+        return truncation(self.state)
 
 
 class ResponseCurve:
@@ -131,7 +126,7 @@ class ResponseCurve:
         assert isinstance(evaluation, ResponseEvaluation)
         basis = self.balance.basis
         if self.adaptive is not None:
-            basis = choose_harmonics(evaluation.state, evaluation.neglected, self.adaptive, self.adaptive.tolerance)
+            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance)
         balance = self._in_basis(basis)
         x, omega, values = self.split(u)
         balance = balance.settle(self.balance.basis.resized(x, basis), omega, values)

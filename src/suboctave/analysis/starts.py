@@ -62,15 +62,14 @@ def start_point(
         If no motion is found; says what was tried.
     """
     tried = []
+    linear = linear_response(curve, value)
+    curve.reference = max(curve.reference, curve.size(linear))
     if given is not None:
         guess = _from_given(curve, value, given)
         try:
             return _settled(curve, guess, newton, largest)
         except ConvergenceError as failure:
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
-    linear = linear_response(curve, value)
-    size = curve.size(linear)
-    curve.reference = max(curve.reference, size)
     patient = NewtonOptions(newton.tolerance, newton.correction, max(newton.iterations, 20))
     for name, attempt in (
         ("linear response", lambda: linear),

@@ -115,7 +115,7 @@ def continue_branch(
     bounds
         (from, to): the branch is reported in this order. A motion on a bound is followed one way.
     harmonics
-        As in `frequency_response`; default: as many as the motion has, or "adaptive" from a system.
+        As in `frequency_response`; default: as the motion was computed, or "adaptive" from a system.
 
     Other parameters, and errors, as `frequency_response`.
     """
@@ -143,7 +143,7 @@ def continue_branch(
         raise InputError(f"omega={omega:g} differs from the motion's {orbit.omega:g}: give one or the other")
     settings = _settings(system, max_step, observe, events, newton, stepping)
     basis = orbit.basis
-    wanted: Harmonics = harmonics if harmonics is not None else max(1, basis.harmonics // basis.nu)
+    wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, None)
     with reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)

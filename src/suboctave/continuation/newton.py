@@ -122,5 +122,7 @@ def tangent(solved: Solved) -> Array:
     """Unit tangent in u, normalised in scaled arclength, oriented along the row the point was solved with."""
     rhs = np.zeros(len(solved.u))
     rhs[-1] = 1.0
+    if solved.factor.singular:
+        raise ConvergenceError("the equations are singular (an undamped resonance, or a body free to move)")
     direction = solved.factor.solve(rhs)
     return direction / length(direction) / solved.weights

@@ -362,7 +362,7 @@ class BalanceState:
 
     @cached_property
     def neglected(self) -> ComplexArray:
-        """Amplitudes of the harmonics k = H + 1 .. 2 H + 1 that the force on the motion would excite, shape (H + 1, size).
+        """Amplitudes of the harmonics H + 1 .. 2 H + 1 that the force on the motion would excite, shape (H + 1, size).
 
         To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
         """
@@ -376,9 +376,8 @@ class BalanceState:
         if compliance is not None:
             force = np.einsum("kij,kj->ki", compliance, force)
         blocks = self.linear.stiffness(frequency)
-        if size == 1:
-            return -force / blocks[:, :, 0]
-        return -np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+        motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+        return -motion.astype(complex, copy=False)
 
     @cached_property
     def completed(self) -> BalanceState:

@@ -13,6 +13,7 @@ from suboctave.errors import InputError
 from suboctave.harmonic import kernels
 from suboctave.harmonic.balance import BalanceState, HarmonicBalance
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
+from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 
 
@@ -35,6 +36,8 @@ class PeriodicOrbit:
         Size of the residual in units of the forces that balance.
     truncation
         Estimated size of the neglected harmonics of the motion, relative to the motion (0 if not estimated).
+    adaptive
+        The rule its harmonics were chosen by, None if their number was given; curves continued from it inherit it.
     """
 
     balance: HarmonicBalance
@@ -43,6 +46,7 @@ class PeriodicOrbit:
     values: Mapping[str, float]
     residual: float
     truncation: float = 0.0
+    adaptive: AdaptiveHarmonics | None = None
 
     @property
     def basis(self) -> HarmonicBasis:

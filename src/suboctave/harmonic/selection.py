@@ -48,40 +48,25 @@ class AdaptiveHarmonics:
             )
 
 
-def neglected_motion(state: BalanceState) -> Array:
-    """Sizes of the motion's harmonics k = H + 1 .. 2 H + 1 that the neglected force would excite, shape (H + 1,)."""
-    basis, size = state.basis, state.balance.size
-    high = basis.harmonics
-    force = np.zeros((high + 1, size), dtype=complex)
-    for group, spectrum, _, _ in state.spectra:
-        force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
-    frequency = np.arange(high + 1, 2 * high + 2) / basis.nu * state.omega
-    compliance = state.linear.compliance(frequency)
-    if compliance is not None:
-        force = np.einsum("kij,kj->ki", compliance, force)
-    blocks = state.linear.stiffness(frequency)
-    motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
-    return np.linalg.norm(np.abs(motion) * state.balance.scales()[0], axis=1)
-
-
 def motion_size(state: BalanceState) -> float:
     """Size of a motion with the DOF weights of `HarmonicBalance.scales`."""
     return float(np.linalg.norm(state.x * state.balance.scales()[0]))
 
 
-def truncation(state: BalanceState, neglected: Array) -> float:
-    """Estimated size of the neglected harmonics (`neglected_motion`) relative to the motion."""
+def truncation(state: BalanceState) -> float:
+    """Estimated size of the neglected harmonics relative to the motion."""
     size = motion_size(state)
-    return float(np.linalg.norm(neglected)) / size if size > 0.0 else 0.0
+    return float(np.linalg.norm(_neglected_sizes(state))) / size if size > 0.0 else 0.0
 
 
-def choose_harmonics(
-    state: BalanceState, neglected: Array, options: AdaptiveHarmonics, tolerance: float
-) -> HarmonicBasis:
-    """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis.
+def _neglected_sizes(state: BalanceState) -> Array:
+    """Sizes of the neglected harmonics k = H + 1 .. 2 H + 1, shape (H + 1,)."""
+    sizes: Array = np.linalg.norm(np.abs(state.neglected) * state.balance.scales()[0], axis=1)
+    return sizes
 
-    `neglected` as from `neglected_motion`.
-    """
+
+def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
+    """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
     basis = state.basis
     nu, high = basis.nu, basis.harmonics
     size = motion_size(state)
@@ -90,7 +75,7 @@ def choose_harmonics(
     weight = state.balance.scales()[0]
     kept = np.linalg.norm(state.x * weight, axis=1)
     kept = np.concatenate((kept[:1], np.hypot(kept[1::2], kept[2::2])))
-    sizes = np.concatenate((kept, neglected))
+    sizes = np.concatenate((kept, _neglected_sizes(state)))
     # tail[k]: size of all harmonics above k
     tail = np.sqrt(np.append(np.cumsum(sizes[::-1] ** 2)[::-1][1:], 0.0)) / size
     lowest = max([options.minimum] + [c.harmonic for c in state.balance.system.load_components()])
