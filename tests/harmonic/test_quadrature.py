@@ -1,0 +1,172 @@
+"""Sampling rules: sharp laws against adaptive quadrature, polynomial laws against products of series, blind sampling."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis, kernels
+from suboctave.harmonic.local_force import LocalMotion, coefficient_force, local_force
+from suboctave.harmonic.quadrature import nodes_for, samples_for
+from suboctave.model import (
+    AdaptiveSampling,
+    CubicSpring,
+    ElasticStop,
+    HarmonicLoad,
+    PolynomialSpring,
+    System,
+    library,
+)
+
+MOTIONS = {
+    "one harmonic": [0.1, 1.0 - 0.3j],
+    "rest": [0.2, 0.0],
+    "rough": [-0.2, 0.4, 0.5j, -0.3 + 0.2j, 0.0, 0.25, 0.1j, -0.1],
+    "slow passage": [0.0, 0.0, 0.02j, 1.0],
+}
+
+
+def motion_of(name):
+    return np.array(MOTIONS[name], complex)
+
+
+def value(c, tau):
+    return np.real(np.exp(1j * np.multiply.outer(np.asarray(tau, float), np.arange(len(c)))) @ c)
+
+
+def gaps(c):
+    """A gap passed at speed, one that is grazed, one just missed."""
+    tau = np.linspace(0, 2 * np.pi, 20001)
+    x = value(c, tau)
+    return {"passed": 0.35 * x.max() + 0.65 * x.min(), "grazed": x.max(), "missed": x.max() + 1e-3 * np.ptp(x) + 1e-3}
+
+
+@pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
+@pytest.mark.parametrize("sharpness", [30.0, 3e3, 3e5])
+@pytest.mark.parametrize("where", ["passed", "grazed", "missed"])
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_sharp_stop_against_adaptive_quadrature(motion, where, sharpness):
+    """Integrals that residual, Jacobian and parameter derivatives consist of; the stop's own stiffness is 1."""
+    c, top = motion_of(motion), 2 * len(MOTIONS[motion]) + 1
+    gap = gaps(c)[where]
+    stop = ElasticStop(0, 1.0, gap, side="right", regularization=sharpness)
+    numbers = stop.coefficient_values({})
+    local = LocalMotion(stop, c, 1.0, numbers, top)
+    spectra, by = local_force(local), coefficient_force(local)
+    near = kernels.crossings(c, gap, *np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 257)[:-1]]).T)
+    ends = [0.0, *near[0], 2 * np.pi]
+    if where != "passed" and motion != "rest":
+        tau = np.linspace(0, 2 * np.pi, 20001)
+        ends = sorted([*ends, float(tau[np.argmax(value(c, tau))])])
+
+    def integral(law, q):
+        def integrand(tau):
+            u = value(c, [tau])
+            return law(u)[0] * np.exp(-1j * q * tau)
+
+        total = 0.0
+        for a, b in zip(ends[:-1], ends[1:], strict=True):
+            if b > a:
+                # graded towards the passages at both ends
+                cuts = np.unique([a, *(a + (b - a) * 0.5 * 10.0 ** -np.arange(0, 6)), b - (b - a) * 1e-2, b])
+                cuts = np.unique([*cuts, *(b - (b - a) * 0.5 * 10.0 ** -np.arange(1, 6))])
+                total += sum(
+                    quad(integrand, p, r, epsabs=1e-12, epsrel=1e-10, limit=200, complex_func=True)[0]
+                    for p, r in zip(cuts[:-1], cuts[1:], strict=True)
+                )
+        return total / (2 * np.pi)
+
+    zero = np.zeros(1)
+    for q in (0, top):
+        assert spectra.force[q] == pytest.approx(integral(lambda u: stop.tangent(u, zero, numbers)[0], q), abs=1e-11)
+        assert spectra.stiffness[q] == pytest.approx(
+            integral(lambda u: stop.tangent(u, zero, numbers)[1], q), abs=1e-10
+        )
+        assert by.force[1, q] == pytest.approx(
+            integral(lambda u: stop.coefficient_tangent(u, zero, numbers)[0][1], q), abs=1e-10
+        )
+
+
+@pytest.mark.parametrize("powers", [{3: 0.7}, {2: -0.4, 5: 0.3}, {1: 1.0, 7: 0.2}])
+def test_polynomial_laws_are_integrated_exactly(powers):
+    """Against products of Fourier series: a power of the motion is a repeated convolution of its coefficients."""
+    c = motion_of("rough")
+    top = 2 * len(c) + 1
+    series = np.concatenate((0.5 * c[:0:-1].conj(), c[:1], 0.5 * c[1:]))
+
+    def power(n):
+        result = np.ones(1, complex)
+        for _ in range(n):
+            result = np.convolve(result, series)
+        centre = len(result) // 2
+        padded = np.concatenate((result[centre:], np.zeros(top + 1, complex)))
+        return padded[: top + 1]
+
+    spring = PolynomialSpring(0, powers)
+    spectra = local_force(LocalMotion(spring, c, 1.0, spring.coefficient_values({}), top))
+    force = sum(a * power(n) for n, a in powers.items())
+    slope = sum(a * n * power(n - 1) for n, a in powers.items())
+    np.testing.assert_allclose(spectra.force, force, atol=1e-13 * np.abs(force).max())
+    np.testing.assert_allclose(spectra.stiffness, slope, atol=1e-13 * np.abs(slope).max())
+
+
+def test_weights_add_up_to_the_period():
+    for element in (CubicSpring(0, 1.0), ElasticStop(0, 1.0, 0.4, regularization=1e4)):
+        nodes = nodes_for(element, motion_of("rough"), element.coefficient_values({}), 15, None)
+        assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
+        assert np.abs(nodes.zr**2 + nodes.zi**2 - 1.0).max() < 1e-13
+        assert len(nodes.tau) == len(np.unique(nodes.tau))
+
+
+class Silent(ElasticStop):
+    """A stop that tells nothing of its law."""
+
+    def sampling(self, c):
+        return AdaptiveSampling()
+
+
+class Broken(CubicSpring):
+    """A spring that breaks at u = 1."""
+
+    def sampling(self, c):
+        return AdaptiveSampling()
+
+    def tangent(self, u, v, c):
+        intact = np.abs(u) < 1.0
+        return intact * u, intact.astype(float), None
+
+
+def test_blind_sampling_settles_on_a_smooth_law_and_agrees_with_the_told_one():
+    told = ElasticStop(0, 1.0, 0.3, side="right", regularization=20.0)
+    blind = Silent(0, 1.0, 0.3, side="right", regularization=20.0)
+    c, numbers = motion_of("rough"), told.coefficient_values({})
+    samples = samples_for(blind, c, 1.0, numbers, 17)
+    a, b = (local_force(LocalMotion(e, c, 1.0, numbers, 17, samples)) for e in (told, blind))
+    np.testing.assert_allclose(a.force, b.force, atol=1e-10)
+    np.testing.assert_allclose(a.stiffness, b.stiffness, atol=1e-10)
+    assert samples_for(told, c, 1.0, numbers, 17) is None
+    # harmonics of a smooth law fall off: fewer samples than for the sharp one
+    spring = Silent(0, 1.0, 0.3, side="right", regularization=2.0)
+    assert samples_for(spring, c, 1.0, spring.coefficient_values({}), 17) < samples
+
+
+@pytest.mark.parametrize("element", [Broken(0, 1.0), Silent(0, 1.0, 0.3, regularization=1e6)], ids=["broken", "sharp"])
+def test_a_law_too_sharp_to_be_sampled_blindly_is_refused(element):
+    system = System(1.0, 0.1, 1.0, elements=[element], loads=[HarmonicLoad(0, 1.0)])
+    balance = HarmonicBalance(system, HarmonicBasis(5))
+    x = np.zeros((11, 1))
+    x[1] = 1.7
+    with pytest.raises(ConvergenceError, match=r"dof=0.*does not settle.*SharpSampling"):
+        balance.settle(x, 1.0)
+
+
+def test_samples_stay_frozen_until_settled_again(damper):
+    system = System(1.0, 0.1, 1.0, elements=[damper(0, [0.1, 0.5])], loads=[HarmonicLoad(0, 1.0)])
+    small, large = np.zeros((11, 1)), np.zeros((11, 1))
+    small[1], large[1:6] = 0.1, 2.0
+    balance = HarmonicBalance(system, HarmonicBasis(5)).settle(small, 1.0)
+    assert balance.at(large, 1.0).local_motions[0].samples == balance.samples[0]
+    assert balance.settle(large, 1.0).samples[0] >= balance.samples[0]
+    # a system whose laws are all known is not touched
+    known = HarmonicBalance(library.duffing(0.1, 1.0, 1.0, 1.0), HarmonicBasis(5))
+    assert known.settle(small, 1.0) is known
