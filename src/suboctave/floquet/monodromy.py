@@ -81,7 +81,8 @@ class FloquetResult:
 def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
     mass, damping, stiffness = state.linear.equation_of_motion()
-    truncated, linearised = _Linearisation(state), _Linearisation(state.completed)
+    truncated = _Linearisation(state, state.local_motions)
+    linearised = _Linearisation(state.completed, state.local_motions)
     edges = linearised.edges()
     coarse = _monodromy(linearised, mass, damping, stiffness, edges)
     if linearised.constant:
@@ -113,12 +114,17 @@ def _result(phi: Array, changes: tuple[Array, ...]) -> FloquetResult:
 
 
 class _Linearisation:
-    """The elements' tangents along a motion, at any instant, and the steps they ask for."""
+    """The elements' tangents along a motion, at any instant, and the steps they ask for.
 
-    def __init__(self, state: BalanceState) -> None:
+    `guides` are the motions that sharp laws grade their steps by: where to step need not be known as well as the
+    motion.
+    """
+
+    def __init__(self, state: BalanceState, guides: list[LocalMotion]) -> None:
         self.state = state
+        self.guides = guides
         self.locals = state.local_motions
-        self.kinds = [local.element.sampling(local.coefficients) for local in self.locals]
+        self.kinds = [local.kind for local in self.locals]
         self.constant = all(isinstance(kind, PiecewiseLinear) for kind in self.kinds)
         self._contacts = {
             i: local.contacts() for i, local in enumerate(self.locals) if isinstance(self.kinds[i], PiecewiseLinear)
@@ -131,9 +137,11 @@ class _Linearisation:
             parts += [contact.instants for contact in contacts]
         if not self.constant:
             parts.append(np.linspace(0.0, 2.0 * math.pi, self._uniform() + 1))
-        for local, kind in zip(self.locals, self.kinds, strict=True):
+        sharp: dict[bytes, list[tuple[LocalMotion, SharpSampling]]] = {}
+        for local, kind in zip(self.guides, self.kinds, strict=True):
             if isinstance(kind, SharpSampling):
-                parts.append(_panel_edges(local, kind))
+                sharp.setdefault(local.motion.tobytes(), []).append((local, kind))
+        parts += [_panel_edges(together) for together in sharp.values()]
         edges = np.unique(np.concatenate(parts))
         kept = np.append(True, np.diff(edges) > 1e-12)
         edges = edges[kept]
@@ -173,8 +181,12 @@ class _Linearisation:
         return stiffness, damping
 
 
-def _panel_edges(local: LocalMotion, kind: SharpSampling) -> Array:
-    """Ends of panels graded towards the passages of a sharp law."""
+def _panel_edges(together: list[tuple[LocalMotion, SharpSampling]]) -> Array:
+    """Ends of panels graded towards the passages of the sharp laws of elements that share a motion."""
+    local = together[0][0]
+    kind = SharpSampling(
+        tuple(p for _, k in together for p in k.points), tuple(w for _, k in together for w in k.widths)
+    )
     weights = sharp_nodes(local.motion, kind, 8, 1, _RATIO)[2]
     return np.minimum(np.append(0.0, np.cumsum(weights)), 2.0 * math.pi)
 

@@ -29,6 +29,7 @@ from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.local_force import LocalForce, LocalMotion, local_force
 from suboctave.harmonic.quadrature import samples_for
 from suboctave.model.element import Element
+from suboctave.model.sampling import AdaptiveSampling, Sampling
 from suboctave.model.system import System
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
@@ -86,7 +87,7 @@ class HarmonicBalance:
         self.loads = LoadSpectrum(system, basis, shapes)
         self._load_cache: tuple[tuple, Array] | None = None
         self._load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
-        self._coefficients: tuple[tuple, list[Array]] | None = None
+        self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling]]] | None = None
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -149,11 +150,8 @@ class HarmonicBalance:
 
     @cached_property
     def _blind(self) -> bool:
-        from suboctave.model.sampling import AdaptiveSampling
-
-        return any(
-            isinstance(e.sampling(e.coefficient_values(self.values)), AdaptiveSampling) for e in self.system.elements
-        )
+        """True if an element tells nothing of its law."""
+        return any(isinstance(kind, AdaptiveSampling) for kind in self.coefficients(self.values)[1])
 
     def load(self, values: Mapping[str, float], omega: float) -> Array:
         """Load coefficients P, shape (2 H + 1, size)."""
@@ -162,11 +160,13 @@ class HarmonicBalance:
             self._load_cache = (key, self.loads.value({**values, "omega": omega}, self.size))
         return self._load_cache[1]
 
-    def coefficients(self, values: Mapping[str, float]) -> list[Array]:
-        """Coefficient values of every element."""
+    def coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling]]:
+        """Coefficient values of every element, and what it tells of its law at them."""
         key = tuple(values.values())
         if self._coefficients is None or self._coefficients[0] != key:
-            self._coefficients = (key, [e.coefficient_values(values) for e in self.system.elements])
+            numbers = [e.coefficient_values(values) for e in self.system.elements]
+            kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
+            self._coefficients = (key, (numbers, kinds))
         return self._coefficients[1]
 
     @cached_property
@@ -221,7 +221,7 @@ class BalanceState:
     def local_motions(self) -> list[LocalMotion]:
         """Every element's relative displacement, in the order of the system's elements."""
         result: list[LocalMotion | None] = [None] * len(self.balance.elements)
-        coefficients = self.balance.coefficients(self.values)
+        coefficients, kinds = self.balance.coefficients(self.values)
         for group in self.balance._groups:
             motion = to_complex(self.x @ group.direction)
             for i in group.members:
@@ -232,6 +232,7 @@ class BalanceState:
                     coefficients[i],
                     self.balance.top,
                     self.balance.samples[i],
+                    kinds[i],
                 )
         return result  # type: ignore[return-value]
 

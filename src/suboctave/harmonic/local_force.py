@@ -23,7 +23,7 @@ from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import Nodes, nodes_for, sampled_spectra, uniform_nodes
 from suboctave.model.element import Element
-from suboctave.model.sampling import PiecewiseLinear
+from suboctave.model.sampling import Piece, PiecewiseLinear, Sampling
 
 _NONE = np.zeros(0, dtype=complex)
 
@@ -72,16 +72,22 @@ class LocalMotion:
     coefficients: Array
     top: int
     samples: int | None = None
+    told: Sampling | None = None
 
     @property
-    def pieces(self) -> tuple | None:
+    def kind(self) -> Sampling:
+        """What the element tells of its law at these coefficients (`told`, where that has been asked before)."""
+        return self.element.sampling(self.coefficients) if self.told is None else self.told
+
+    @property
+    def pieces(self) -> tuple[Piece, ...] | None:
         """The pieces of a piecewise-linear law, else None."""
-        kind = self.element.sampling(self.coefficients)
+        kind = self.kind
         return kind.pieces if isinstance(kind, PiecewiseLinear) else None
 
     def nodes(self) -> Nodes:
         """Sampling nodes of a law that is not piecewise linear."""
-        return nodes_for(self.element, self.motion, self.coefficients, self.top, self.samples)
+        return nodes_for(self.kind, self.motion, self.top, self.samples)
 
     def contacts(self) -> list[Contact]:
         """Contact intervals of every piece of a piecewise-linear law."""

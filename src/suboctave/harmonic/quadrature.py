@@ -25,7 +25,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.element import Element
-from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, SharpSampling
+from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, Sampling, SharpSampling
 
 #: Gauss-Legendre nodes per panel, and how many half-lengths a singularity must keep from a panel's centre: with 12
 #: nodes the error of a panel is about (1.4 + sqrt(0.96))^-24 = 7e-10 at worst, and typically the square of that.
@@ -75,26 +75,29 @@ def sharp_nodes(
     """z (real, imaginary part) and weights of composite Gauss-Legendre panels graded towards the passages of a sharp
     law.
     """
-    return kernels.sharp_nodes(
-        motion, np.asarray(kind.points, float), np.asarray(kind.widths, float), *panel_tables(panels, order), ratio
-    )
+    points, widths = _arrays(kind)
+    return kernels.sharp_nodes(motion, points, widths, *panel_tables(panels, order), ratio)
 
 
-def nodes_for(element: Element, motion: ComplexArray, coefficients: Array, top: int, samples: int | None) -> Nodes:
+@lru_cache(maxsize=256)
+def _arrays(kind: SharpSampling) -> tuple[Array, Array]:
+    return np.asarray(kind.points, float), np.asarray(kind.widths, float)
+
+
+def nodes_for(kind: Sampling, motion: ComplexArray, top: int, samples: int | None) -> Nodes:
     """Nodes for an element whose relative displacement is `Re sum_k motion_k exp(i k tau)`.
 
     Parameters
     ----------
+    kind
+        What the element tells of its law.
     motion
         Complex coefficients, shape (H + 1,).
-    coefficients
-        Values of the element's coefficients.
     top
         Highest Fourier coefficient of the tangent that is wanted.
     samples
         Frozen number of samples of an element that tells nothing (`samples_for`), else ignored.
     """
-    kind = element.sampling(coefficients)
     high = motion.shape[0] - 1
     if isinstance(kind, PolynomialSampling):
         # a force of degree d has harmonics up to d H; none of them may alias onto those up to `top`

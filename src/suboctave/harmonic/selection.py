@@ -33,7 +33,7 @@ class AdaptiveHarmonics:
     """
 
     tolerance: float = 1e-5
-    event_tolerance: float = 1e-7
+    event_tolerance: float = 3e-7
     minimum: int = 5
     maximum: int = 127
 
