@@ -16,8 +16,8 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import start_point
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
-from suboctave.continuation.march import make_point, solve_at
-from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.continuation.linear import one_thread
+from suboctave.errors import InputError, suggest
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart
@@ -80,7 +80,7 @@ def frequency_response(
     settings = _settings(system, max_step, observe, events, newton, stepping)
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
     curve = _curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
-    with reporting(progress, "frequency response") as report:
+    with one_thread(), reporting(progress, "frequency response") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, first, start, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
@@ -145,7 +145,7 @@ def continue_branch(
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, None)
-    with reporting(progress, f"along {parameter}") as report:
+    with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
         ahead = float(np.sign(last - first))
@@ -206,7 +206,7 @@ def _from_system(
     from suboctave.analysis.starts import linear_response
 
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
-    with reporting(progress, f"along {parameter}") as report:
+    with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, first, None, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
@@ -320,12 +320,4 @@ def _branch(system: System, name: str, trace: Trace, settings: Settings, options
     )
 
 
-__all__ = [
-    "ConvergenceError",
-    "CurvePoint",
-    "check_range",
-    "continue_branch",
-    "frequency_response",
-    "make_point",
-    "solve_at",
-]
+__all__ = ["check_range", "continue_branch", "frequency_response"]
