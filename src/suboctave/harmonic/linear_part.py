@@ -47,7 +47,10 @@ class LinearPart(Protocol):
         """The same for B; None if zero."""
 
     def retain(self, direction: Array) -> Array:
-        """A direction or load shape in the structure's DOFs (n,) as one in the unknown DOFs (size,)."""
+        """A direction or load shape in the structure's DOFs (n,) as one in the unknown DOFs (size,).
+
+        Raises InputError for a direction that the unknown DOFs do not hold.
+        """
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """Mass, damping, stiffness (N, N) of an equation of motion with this response, N >= size."""

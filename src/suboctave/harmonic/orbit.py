@@ -105,26 +105,28 @@ class PeriodicOrbit:
             raise InputError(
                 f"k={k:g} is no harmonic of a motion of {self.basis.nu} load periods: k * {self.basis.nu} must be whole"
             )
-        dof = self._dof(dof)
-        at = round(index)
-        return complex(self.amplitudes[at, dof]) if at <= self.basis.harmonics else 0.0 + 0.0j
+        amplitudes, at = self._along(dof), round(index)
+        return complex(amplitudes[at]) if at <= self.basis.harmonics else 0.0 + 0.0j
 
     def amplitude(self, dof: int = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
-        c = np.ascontiguousarray(self.amplitudes[:, self._dof(dof)])
+        c = np.ascontiguousarray(self._along(dof))
         return float(kernels.peak(c, 8 * self.basis.harmonics + 8)[0])
 
     def start(self) -> Array:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""
         return np.concatenate((self.displacement(0.0), self.velocity(0.0)))
 
-    def _dof(self, dof: int) -> int:
-        n = self.coefficients.shape[1]
+    def _along(self, dof: int) -> ComplexArray:
+        """Complex amplitudes of one of the structure's DOFs, shape (H + 1,)."""
+        n = self.balance.system.n
         if not -n <= dof < n:
             raise InputError(
                 f"dof={dof} is out of range: the motion has {n} DOF{'s' if n > 1 else ''}, numbered from 0"
             )
-        return dof
+        unit = np.zeros(n)
+        unit[dof] = 1.0
+        return self.amplitudes @ self.balance.linear.retain(unit)
 
     def __repr__(self) -> str:
         period = "" if self.basis.nu == 1 else f", {self.basis.nu}T"
