@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from suboctave.errors import InputError
 from suboctave.harmonic import StructuralMatrices
 from suboctave.model import AdaptiveSampling, Element
 
@@ -85,7 +86,8 @@ class Condensed:
         return np.zeros((len(frequency), self.full.size, self.full.size)) if block is None else block
 
     def retain(self, direction):
-        assert not np.delete(direction, self.dofs).any()
+        if np.delete(direction, self.dofs).any():
+            raise InputError("a DOF not among the unknown ones")
         return direction[self.dofs]
 
     def equation_of_motion(self):

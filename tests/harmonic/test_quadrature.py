@@ -1,4 +1,5 @@
-"""Sampling rules: sharp laws against adaptive quadrature, polynomial laws against products of series, blind sampling."""
+"""Sampling rules: sharp laws against adaptive quadrature, polynomial laws against products of series, blind sampling.
+"""
 
 import numpy as np
 import pytest

@@ -23,7 +23,9 @@ def with_harmonics(solve, system, high, omega, start):
 
 @pytest.mark.parametrize("name", CASES)
 def test_estimate_is_honest(solve, name):
-    """The estimate is of first order in what is neglected: within a third of the true error, wherever that can be seen."""
+    """The estimate is of first order in what is neglected: within a third of the true error, wherever that can be
+    seen.
+    """
     system, frequencies, many = CASES[name]
     for omega in frequencies:
         branch = so.frequency_response(system, (5.0, omega), harmonics=5)

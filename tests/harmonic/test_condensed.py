@@ -1,0 +1,98 @@
+"""A model condensed onto the one DOF that stop and load touch: nothing above may notice.
+
+Six masses in a row; the condensed linear part is in flexibility form, by direct inversion of the dynamic stiffness.
+Curve, multipliers and located bifurcations must be those of the full model: the equations are the same, only the
+unknowns that could be eliminated are gone.
+"""
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.errors import InputError
+from suboctave.floquet import floquet_multipliers
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+
+N = 6
+
+
+def chain(dof, unit=1.0):
+    """A chain between two walls with a stop at one mass. `unit` multiplies all masses, stiffnesses and loads."""
+    k = unit * (2.0 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
+    return so.System(
+        mass=unit * np.eye(N),
+        damping=0.06 * k,
+        stiffness=k,
+        elements=[so.ElasticStop(dof, stiffness="Kc", gap=0.5), so.CubicSpring(dof, 0.05 * unit)],
+        loads=[so.HarmonicLoad(dof, amplitude="p")],
+        parameters={"Kc": 3.0 * unit, "p": 0.4 * unit},
+    )
+
+
+@pytest.fixture(scope="module")
+def full():
+    return so.frequency_response(chain(0), (0.35, 1.0), harmonics=9)
+
+
+@pytest.fixture(scope="module", params=[1.0, 2.0], ids=["S = 1", "S = 2"])
+def condensed_branch(request, condensed):
+    system = chain(0)
+    return so.frequency_response(system, (0.35, 1.0), harmonics=9, linear=condensed(system, [0], request.param))
+
+
+def test_same_bifurcations(full, condensed_branch):
+    assert len(full.bifurcations) >= 2
+    assert [b.kind for b in condensed_branch.bifurcations] == [b.kind for b in full.bifurcations]
+    for one, other in zip(condensed_branch.bifurcations, full.bifurcations, strict=True):
+        assert one.omega == pytest.approx(other.omega, rel=1e-9)
+        assert one.amplitude == pytest.approx(other.amplitude, rel=1e-6)
+        np.testing.assert_allclose(one.multipliers[0], other.multipliers[0], atol=1e-5)
+
+
+def test_same_curve(full, condensed_branch):
+    """Every point of the condensed curve, expanded to all DOFs, solves the full model; stability is the same there."""
+    balance = HarmonicBalance(chain(0), HarmonicBasis(9))
+    for i in range(0, len(condensed_branch), 5):
+        point = condensed_branch.points[i]
+        orbit = point.orbit
+        assert orbit.coefficients.shape == (19, 1)
+        # the other masses follow from the forces at the first
+        state = orbit.state()
+        start = np.zeros((19, N))
+        start[:, :1] = orbit.coefficients
+        force = state.unbalanced
+        c = -(force[1::2] - 1j * force[2::2])[:, 0]
+        z = balance.linear.stiffness(np.arange(10) * orbit.omega)
+        x = np.linalg.solve(z[1:], np.eye(N)[None, :, :1] * c[:, None, None])[:, :, 0]
+        start[0] = np.linalg.solve(z[0].real, -force[0, 0] * np.eye(N)[0])
+        start[1::2], start[2::2] = x.real, -x.imag
+        assert start[:, 0] == pytest.approx(orbit.coefficients[:, 0], abs=1e-9)
+        whole = balance.at(start, orbit.omega)
+        assert np.abs(whole.residual).max() < 1e-9
+        verdict = floquet_multipliers(whole)
+        np.testing.assert_allclose(np.abs(point.floquet.multipliers), np.abs(verdict.multipliers), atol=1e-7)
+        assert point.floquet.stable == verdict.stable
+    assert 0 < condensed_branch.stable.sum() < len(condensed_branch)
+    assert condensed_branch.ended == full.ended
+
+
+def test_units_do_not_matter(condensed):
+    """Masses, stiffnesses and loads a million times larger, S chosen likewise: the same points, to rounding."""
+    curves = []
+    for unit in (1.0, 1e6):
+        system = chain(0, unit)
+        curves.append(so.frequency_response(system, (0.5, 0.7), harmonics=5, linear=condensed(system, [0], unit)))
+    assert len(curves[0]) == len(curves[1])
+    np.testing.assert_allclose(curves[1].amplitude, curves[0].amplitude, rtol=1e-6)
+    assert [b.kind for b in curves[0].bifurcations] == [b.kind for b in curves[1].bifurcations]
+
+
+def test_the_observed_dof_is_one_of_the_structure(condensed):
+    """A stop at the last mass: `observe`, `amplitude` and `harmonic` count the structure's DOFs."""
+    system = chain(N - 1)
+    branch = so.frequency_response(system, (0.3, 0.4), harmonics=5, linear=condensed(system, [N - 1]))
+    whole = so.frequency_response(system, (0.3, 0.4), harmonics=5)
+    assert branch.amplitude[-1] == pytest.approx(whole.amplitude[-1], rel=1e-8)
+    with pytest.raises(InputError, match="not among"):
+        branch.orbits[-1].amplitude(0)
+    assert branch.orbits[-1].harmonic(1, N - 1) == pytest.approx(whole.orbits[-1].harmonic(1, N - 1), rel=1e-7)
