@@ -64,7 +64,7 @@ def propagate(base_k, base_c, shapes, stiffness, damping, h):
 
     C(t) likewise, from base_c and damping_e.
     shapes (E, 2, n): left and right vectors; stiffness, damping (E, S, 2) at the Gauss instants of the steps h (S,).
-    Exponentials act by their Taylor series on sub-steps short enough for twelve terms to reach rounding.
+    Exponentials act by their Taylor series on sub-steps short enough for fourteen terms to reach rounding.
     """
     n = base_k.shape[0]
     elements = shapes.shape[0]
@@ -102,7 +102,7 @@ def propagate(base_k, base_c, shapes, stiffness, damping, h):
             d = t / count
             for _ in range(count):
                 term = phi
-                for order in range(1, 13):
+                for order in range(1, 15):
                     upper = term[:n]
                     lower = term[n:]
                     new = np.empty((2 * n, 2 * n))

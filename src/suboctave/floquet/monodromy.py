@@ -87,12 +87,12 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
     coarse = _monodromy(linearised, mass, damping, stiffness, edges)
     if linearised.constant:
         fine, stepping = coarse, np.zeros_like(coarse)
-        plain = _monodromy(truncated, mass, damping, stiffness, truncated.edges())
     else:
         halved = np.sort(np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))))
         fine = _monodromy(linearised, mass, damping, stiffness, halved)
         stepping = (fine - coarse) / 15.0
-        plain = _monodromy(truncated, mass, damping, stiffness, edges)
+    # with the contact instants of its own: between steps that end at the other's, the two would look alike
+    plain = _monodromy(truncated, mass, damping, stiffness, truncated.edges())
     return _result(fine + stepping, (stepping, coarse - plain))
 
 
