@@ -160,8 +160,9 @@ def test_orbit_as_data(solve):
     c = 1.5 / (4 - omega**2 + 0.2j * omega)
     t = np.linspace(0, 3, 7)
     for series, order in ((orbit.displacement, 0), (orbit.velocity, 1), (orbit.acceleration, 2)):
-        np.testing.assert_allclose(series(t)[0], np.real(c * (1j * omega) ** order * np.exp(1j * omega * t)),
-        atol=1e-13) assert series(0.4).shape == (1,)
+        expected = np.real(c * (1j * omega) ** order * np.exp(1j * omega * t))
+        np.testing.assert_allclose(series(t)[0], expected, atol=1e-13)
+        assert series(0.4).shape == (1,)
     assert orbit.period == pytest.approx(4 * np.pi / omega)
     assert orbit.harmonic(1) == pytest.approx(c)
     assert orbit.harmonic(0.5) == pytest.approx(0.0, abs=1e-14)

@@ -1,5 +1,7 @@
 """Exact integration of one-sided springs: against polynomial roots, quadrature between them, and closed forms."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -51,7 +53,7 @@ def quadrature(c, level, side, q, stiffness):
     ends = np.append(ends, ends[:1] + 2 * np.pi) if len(ends) else np.array([0.0, 2 * np.pi])
     nodes, weights = np.polynomial.legendre.leggauss(60)
     force, tangent = np.zeros(len(q), complex), np.zeros(len(q), complex)
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         for part in range(4):
             half = (b - a) / 8
             tau = a + (2 * part + 1) * half + half * nodes

@@ -1,5 +1,6 @@
-"""Sampling rules: sharp laws against adaptive quadrature, polynomial laws against products of series, blind sampling.
-"""
+"""Sampling: sharp laws against adaptive quadrature, polynomial laws against products of series, blind sampling."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.integrate import quad
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis, kernels
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, local_force
-from suboctave.harmonic.quadrature import nodes_for, samples_for
+from suboctave.harmonic.quadrature import samples_for
 from suboctave.model import (
     AdaptiveSampling,
     CubicSpring,
@@ -66,14 +67,14 @@ def test_sharp_stop_against_adaptive_quadrature(motion, where, sharpness):
             return law(u)[0] * np.exp(-1j * q * tau)
 
         total = 0.0
-        for a, b in zip(ends[:-1], ends[1:], strict=True):
+        for a, b in pairwise(ends):
             if b > a:
                 # graded towards the passages at both ends
                 cuts = np.unique([a, *(a + (b - a) * 0.5 * 10.0 ** -np.arange(0, 6)), b - (b - a) * 1e-2, b])
                 cuts = np.unique([*cuts, *(b - (b - a) * 0.5 * 10.0 ** -np.arange(1, 6))])
                 total += sum(
                     quad(integrand, p, r, epsabs=1e-12, epsrel=1e-10, limit=200, complex_func=True)[0]
-                    for p, r in zip(cuts[:-1], cuts[1:], strict=True)
+                    for p, r in pairwise(cuts)
                 )
         return total / (2 * np.pi)
 
@@ -113,7 +114,7 @@ def test_polynomial_laws_are_integrated_exactly(powers):
 
 def test_weights_add_up_to_the_period():
     for element in (CubicSpring(0, 1.0), ElasticStop(0, 1.0, 0.4, regularization=1e4)):
-        nodes = nodes_for(element, motion_of("rough"), element.coefficient_values({}), 15, None)
+        nodes = LocalMotion(element, motion_of("rough"), 1.0, element.coefficient_values({}), 15).nodes()
         assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
         assert np.abs(nodes.zr**2 + nodes.zi**2 - 1.0).max() < 1e-13
         assert len(nodes.tau) == len(np.unique(nodes.tau))

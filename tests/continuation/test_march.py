@@ -1,0 +1,338 @@
+"""The engine on plane curves with closed forms: no vibration anywhere."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
+from suboctave.continuation.events import locate_zero
+from suboctave.continuation.linear import Factor
+from suboctave.continuation.march import between, make_point, point_between, solve_at
+from suboctave.continuation.newton import correct
+from suboctave.errors import ConvergenceError, InputError
+
+NEWTON = NewtonOptions()
+
+
+@dataclass
+class Evaluated:
+    residual: np.ndarray
+    jacobian: np.ndarray
+
+    @property
+    def error(self):
+        return float(np.abs(self.residual).max())
+
+
+@dataclass
+class Plane:
+    """`f(x, parameter) = 0` in the plane; u = (x, parameter), no scaling."""
+
+    f: object
+    gradient: object
+    parameter: int = 1
+    copies: tuple = ((1, 1),)
+    calls: list = field(default_factory=list)
+
+    def evaluate(self, u):
+        self.calls.append(u.copy())
+        return Evaluated(np.array([self.f(*u)]), np.array([self.gradient(*u)]))
+
+    def weights(self, u, largest):
+        return np.ones(2)
+
+    def size(self, u):
+        return abs(u[0])
+
+    def adapted(self, u, evaluation):
+        return self
+
+    def transfer(self, u, origin):
+        return u
+
+    def images(self, u):
+        return [u * copy for copy in self.copies]
+
+    def where(self, u):
+        return f"p = {u[1]:.6g}"
+
+
+def circle(**options):
+    return Plane(lambda x, p: x**2 + p**2 - 1.0, lambda x, p: (2 * x, 2 * p), **options)
+
+
+def cubic():
+    """p = x - x^3: folds at x = +-1/sqrt(3), p = +-2/(3 sqrt(3))."""
+    return Plane(lambda x, p: p - x + x**3, lambda x, p: (3 * x**2 - 1.0, 1.0))
+
+
+def start(curve, x, p):
+    return make_point(solve_at(curve, np.array([x, p]), 0.0, NEWTON), curve, None, 0.0)
+
+
+def march(curve, x, p, direction, bounds, inspect=None, **stepping):
+    engine = March(start(curve, x, p), direction, bounds, NEWTON, SteppingOptions(**stepping), inspect)
+    points = list(engine)
+    return engine, points, np.array([point.u for point in points])
+
+
+@pytest.mark.parametrize("max_step", [0.02, 0.05, 0.3])
+def test_s_curve_between_its_bounds(max_step):
+    """Both folds are passed, the ends are met exactly, every point lies on the curve, no step is too long."""
+    engine, points, u = march(cubic(), 1.4, -1.3, 1.0, (-1.344, 1.344), max_step=max_step)
+    x, p = u.T
+    assert p[0] == -1.3
+    assert p[-1] == 1.344
+    np.testing.assert_allclose(p, x - x**3, atol=1e-9)
+    assert np.all(np.diff(x) < 0.0)
+    steps = np.linalg.norm(np.diff(u, axis=0), axis=1)
+    assert steps.max() <= max_step * (1 + 1e-6)
+    np.testing.assert_allclose(np.diff([point.arclength for point in points]), steps, rtol=1e-9)
+    assert p.max() == pytest.approx(1.344)
+    fold = 2 / (3 * math.sqrt(3))
+    assert p[x > -0.5].max() == pytest.approx(fold, abs=max_step**2)
+    assert (engine.ended, engine.closed) == ("reached the end of the range at p = 1.344", False)
+    # the tangent is the curve's, of unit length, and goes ahead
+    for point in points:
+        t = np.array([-1.0, -(1 - 3 * point.u[0] ** 2)])
+        np.testing.assert_allclose(point.tangent, t / np.linalg.norm(t), atol=1e-7)
+        # [F_u; t] has a determinant of one sign all along: no branch point
+        assert point.orientation == points[0].orientation != 0.0
+
+
+def test_the_other_way_ends_on_the_lower_bound():
+    engine, points, u = march(cubic(), -1.4, 1.3, -1.0, (-1.344, 1.344))
+    assert u[-1, 1] == -1.344
+    assert engine.ended.endswith("p = -1.344")
+    assert len(points) > 50
+
+
+def test_bounds_inside_a_fold():
+    """A bound that the curve crosses before its fold, and one just short of touching it."""
+    fold = 2 / (3 * math.sqrt(3))
+    _, _, u = march(cubic(), 0.0, 0.0, 1.0, (-0.2, 0.3))
+    assert u[-1, 1] == 0.3
+    assert u[-1, 0] == pytest.approx(np.sort(np.roots([-1, 0, 1, -0.3]))[1], abs=1e-9)
+    _, _, u = march(cubic(), 0.0, 0.0, 1.0, (-0.2, fold + 1e-6), max_step=0.05)
+    assert u[-1, 1] == -0.2
+    assert u[-1, 0] > 1.0
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("max_step", [0.05, 0.3])
+def test_a_circle_closes(direction, max_step):
+    engine, points, u = march(circle(), 0.6, 0.8, direction, (-2.0, 2.0), max_step=max_step)
+    assert engine.closed
+    assert engine.ended == "the curve closed on itself"
+    np.testing.assert_array_equal(u[0], u[-1])
+    # once around: chords add up to a little less than 2 pi
+    assert points[-1].arclength == pytest.approx(2 * np.pi, rel=max_step**2 / 10)
+    assert (u[1, 1] - u[0, 1]) * direction > 0
+    np.testing.assert_allclose(np.hypot(*u.T), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("copy", "length"), [((-1, -1), np.pi), ((-1, 1), 2 * np.pi)])
+def test_images_of_the_start_count_as_the_start(copy, length):
+    """Where u and -u are one solution the circle is closed after half a turn. The mirror image of the start is passed
+    in the wrong direction, so that the whole circle is needed.
+    """
+    engine, points, _ = march(circle(copies=((1, 1), copy)), 0.6, 0.8, 1.0, (-2.0, 2.0))
+    assert engine.closed
+    assert points[-1].arclength == pytest.approx(length, rel=1e-3)
+
+
+def test_a_closed_loop_cut_by_the_bounds_does_not_close():
+    engine, _, u = march(circle(), 1.0, 0.0, 1.0, (-0.5, 2.0))
+    assert not engine.closed
+    assert u[-1, 1] == -0.5
+    assert u[-1, 0] == pytest.approx(-math.sqrt(0.75), abs=1e-9)
+
+
+def test_a_figure_of_eight_does_not_close_at_its_crossing():
+    """Lemniscate (x^2 + p^2)^2 = x^2 - p^2, from near the crossing: it passes its start's neighbourhood on the other
+    branch, and closes when it is back on its own. At the crossing the determinant [F_u; t] changes sign.
+    """
+
+    def f(x, p):
+        return (x**2 + p**2) ** 2 - x**2 + p**2
+
+    def gradient(x, p):
+        return 4 * x * (x**2 + p**2) - 2 * x, 4 * p * (x**2 + p**2) + 2 * p
+
+    angle = 0.7
+    r = math.sqrt(math.cos(2 * angle))
+    engine, points, u = march(
+        Plane(f, gradient), r * math.cos(angle), r * math.sin(angle), -1.0, (-2, 2), max_step=0.06
+    )
+    assert engine.closed
+    # length of the lemniscate: 5.2441151 (Gauss's constant)
+    assert points[-1].arclength == pytest.approx(5.244115108584239, rel=2e-3)
+    signs = np.array([point.orientation for point in points])
+    assert np.count_nonzero(np.diff(signs)) == 2
+    assert u[:, 0].min() < -0.99 < 0.99 < u[:, 0].max()
+
+
+def test_inspection_may_ask_for_shorter_steps():
+    """Refused steps are halved, and taken all the same once they are as short as allowed."""
+    seen = []
+
+    def inspect(a, b):
+        seen.append(np.linalg.norm(b.u - a.u))
+        return seen[-1] < 0.011
+
+    _, _, u = march(cubic(), 0.2, 0.192, 1.0, (-0.2, 0.3), inspect, max_step=0.05)
+    assert np.linalg.norm(np.diff(u, axis=0), axis=1)[:-1].max() < 0.011
+    assert max(seen) > 0.011
+    _, points, _ = march(cubic(), 0.2, 0.192, 1.0, (-0.2, 0.3), lambda a, b: False, min_step=1e-3, max_step=0.05)
+    assert len(points) > 90
+
+
+def test_no_way_on_is_said_with_the_place():
+    """A curve that ends in the plane: x = sqrt(1 - p) exists for p <= 1 only and is taken with its positive sign, so
+    that its tangent points out of what there is.
+    """
+
+    def f(x, p):
+        return x - (math.sqrt(1.0 - p) if p < 1.0 else math.nan)
+
+    def gradient(x, p):
+        return 1.0, 0.5 / math.sqrt(1.0 - p) if p < 1.0 else math.nan
+
+    engine, _, u = march(Plane(f, gradient), 1.0, 0.0, 1.0, (-1.0, 2.0))
+    assert not engine.closed
+    assert engine.ended.startswith("step size fell below 1e-07 at p = ")
+    assert "min_step" in engine.ended
+    assert u[-1, 1] == pytest.approx(1.0, abs=1e-5)
+    np.testing.assert_allclose(u[:, 0], np.sqrt(1 - u[:, 1]), atol=1e-8)
+
+
+def test_too_many_points_is_said():
+    engine, points, _ = march(circle(), 0.6, 0.8, 1.0, (-2.0, 2.0), max_points=10)
+    assert len(points) == 10
+    assert engine.ended.startswith("10 points computed at p = ")
+    assert "max_points" in engine.ended
+
+
+def test_an_abandoned_march_says_so():
+    engine = March(start(circle(), 0.6, 0.8), 1.0, (-2.0, 2.0), NEWTON, SteppingOptions())
+    assert engine.ended == "not started"
+
+
+# -------------------------------------------------------------------------------------------------- pieces
+def test_points_between_neighbours():
+    """Hermite interpolation is of fourth order in the distance, the corrected point lies on the curve."""
+    curve = circle()
+    errors = []
+    for step in (0.4, 0.2):
+        ends = []
+        for angle in (0.3, 0.3 + step):
+            ends.append(start(curve, math.cos(angle), math.sin(angle)))
+        a, b = (CurvePoint(curve, e.u, np.array([-e.u[1], e.u[0]]), e.weights, e.evaluation, 1.0, 0.0, 0) for e in ends)
+        errors.append(abs(np.linalg.norm(between(a, b, 0.4)) - 1.0))
+        corrected = point_between(a, b, 0.4, NEWTON)
+        assert np.linalg.norm(corrected.u) == pytest.approx(1.0, abs=1e-10)
+        np.testing.assert_array_equal(between(a, b, 0.0), a.u)
+        np.testing.assert_array_equal(between(a, b, 1.0), b.u)
+    assert errors[0] / errors[1] > 12
+
+
+def test_a_zero_along_the_curve():
+    _, points, _ = march(cubic(), 1.2, 1.2 - 1.2**3, 1.0, (-2.0, 2.0))
+
+    def height(point):
+        return point.u[0] - 0.123
+
+    at = next(i for i in range(len(points)) if height(points[i + 1]) < 0)
+    a, b = points[at : at + 2]
+    zero = locate_zero(a, b, height(a), height(b), height, NEWTON)
+    assert zero.u[0] == pytest.approx(0.123, abs=1e-11)
+    assert zero.u[1] == pytest.approx(0.123 - 0.123**3, abs=1e-10)
+    assert a.arclength < zero.arclength < b.arclength
+    assert locate_zero(a, b, 0.0, 1.0, height, NEWTON) is a
+    assert locate_zero(a, b, 1.0, 0.0, height, NEWTON) is b
+
+
+@pytest.mark.parametrize("power", [1, 3, 9])
+def test_a_flat_or_steep_function_has_its_zero_too(power):
+    """Located to a value of 1e-14 of those at the ends, or to rounding along the curve."""
+    curve = cubic()
+    a, b = start(curve, -0.3, -0.273), start(curve, 0.5, 0.375)
+
+    def function(point):
+        return (point.u[0] - 0.1) ** power
+
+    zero = locate_zero(a, b, function(a), function(b), function, NEWTON)
+    assert zero.u[0] == pytest.approx(0.1, abs=2e-2 if power > 3 else 1e-4 if power > 1 else 1e-11)
+
+
+def test_newton_converges_quadratically_and_stops_when_it_may():
+    curve = circle()
+    solved = solve_at(curve, np.array([0.9, 0.6]), 0.0, NEWTON)
+    assert solved.u == pytest.approx([0.8, 0.6], abs=1e-12)
+    assert solved.u[1] == 0.6
+    assert solved.iterations <= 5
+    assert solved.distance == pytest.approx(0.1, rel=1e-9)
+    assert solve_at(curve, solved.u, 0.0, NEWTON).iterations == 0
+
+
+@pytest.mark.parametrize(
+    ("guess", "message"),
+    [
+        ([0.3, 1.5], r"did not converge near p = 1\.5 \(residual .* after \d+ iterations\)"),
+        ([np.nan, 0.5], "not finite"),
+    ],
+)
+def test_newton_gives_up_with_the_place(guess, message):
+    row = np.array([0.0, 1.0])
+    with pytest.raises(ConvergenceError, match=message):
+        correct(circle(), np.array(guess), row, np.ones(2), NEWTON)
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_factor_solves_and_knows_the_determinant(kind):
+    rng = np.random.default_rng(0)
+    for n in (1, 2, 7, 30):
+        a = rng.normal(size=(n, n)) + (1j * rng.normal(size=(n, n)) if kind is complex else 0.0)
+        b = rng.normal(size=n).astype(a.dtype)
+        factor = Factor.of(np.asfortranarray(a))
+        np.testing.assert_allclose(a @ factor.solve(b), b, atol=1e-10)
+        np.testing.assert_allclose(a.conj().T @ factor.solve(b, adjoint=True), b, atol=1e-10)
+        sign, log = np.linalg.slogdet(a)
+        assert factor.log_determinant == pytest.approx(log, abs=1e-10)
+        if kind is float:
+            assert factor.sign == sign
+    assert Factor.of(np.zeros((2, 2))).singular
+    assert Factor.of(np.zeros((2, 2))).sign == 0.0
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"initial_step": 0.0}, "initial_step=0"),
+        ({"min_step": 0.1, "initial_step": 0.01}, "min_step=0.1"),
+        ({"max_step": math.inf}, "max_step=inf"),
+        ({"max_step": 1e-9}, "max_step=1e-09"),
+        ({"angle": 2.0}, "angle=2.0"),
+        ({"deviation": -1.0}, "deviation=-1.0"),
+        ({"max_points": 1}, "max_points=1"),
+    ],
+)
+def test_stepping_options_that_make_no_sense(wrong, message):
+    with pytest.raises(InputError, match=message):
+        SteppingOptions(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"tolerance": 1.0}, {"correction": -1.0}, {"iterations": 0}])
+def test_newton_options_that_make_no_sense(wrong):
+    with pytest.raises(InputError, match="out of range"):
+        NewtonOptions(**wrong)
+
+
+def test_events_that_make_no_sense():
+    with pytest.raises(InputError, match="needs a name"):
+        Event("", abs)
+    with pytest.raises(InputError, match=r"'peak'.*callable"):
+        Event("peak", 3.0)
