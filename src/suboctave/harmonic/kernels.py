@@ -196,11 +196,50 @@ def _refine(c, lo, hi, flo, level):
 
 
 @njit(cache=True)
+def _search(c, level, lo, hi, f0, d0, f1, d1, found, count):
+    """Append the crossings of `level` in (lo, hi), an interval with one extremum at most; returns the new count.
+
+    f, d: the motion minus level and its derivative at both ends.
+    """
+    if (f0 > 0.0) != (f1 > 0.0):
+        found[count] = _refine(c, lo, hi, f0, level)
+        return count + 1
+    if not ((f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0)):
+        return count
+    # an extremum towards the level lies in between: does it reach across?
+    if min(abs(f0), abs(f1)) > (hi - lo) * (abs(d0) + abs(d1)):
+        return count
+    first, last = lo, hi
+    tau = lo + (hi - lo) * d0 / (d0 - d1)
+    for _ in range(60):
+        x, d, s = _jet(c, math.cos(tau), math.sin(tau))
+        if (x - level > 0.0) != (f0 > 0.0):
+            break
+        if (d > 0.0) == (d0 > 0.0):
+            lo = tau
+        else:
+            hi = tau
+        new = tau - d / s if s != 0.0 else 0.5 * (lo + hi)
+        if not (lo < new < hi):
+            new = 0.5 * (lo + hi)
+        if abs(new - tau) < 1e-14:
+            break
+        tau = new
+    x, d, s = _jet(c, math.cos(tau), math.sin(tau))
+    if (x - level > 0.0) != (f0 > 0.0):
+        found[count] = _refine(c, first, tau, f0, level)
+        found[count + 1] = _refine(c, tau, last, x - level, level)
+        count += 2
+    return count
+
+
+@njit(cache=True)
 def crossings(c, level, zr, zi):
     """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
 
     Sampled on the uniform grid z; a pair hidden between two samples is looked for at every extremum near the level
-    (whose parabola comes within half its own rise of it). Exact up to rounding.
+    (whose parabola comes within half its own rise of it), and two extrema between two samples where the cubic through
+    them slows down. Exact up to rounding.
     """
     n = zr.shape[0]
     h = 2.0 * math.pi / n
@@ -212,34 +251,27 @@ def crossings(c, level, zr, zi):
         f1 = values[0, (j + 1) % n] - level
         d0 = values[1, j]
         d1 = values[1, (j + 1) % n]
-        if (f0 > 0.0) != (f1 > 0.0):
-            found[count] = _refine(c, j * h, (j + 1) * h, f0, level)
-            count += 1
-        elif (f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0):
-            # an extremum towards the level lies in between: does it reach across?
-            if min(abs(f0), abs(f1)) > h * (abs(d0) + abs(d1)):
-                continue
-            lo, hi = j * h, (j + 1) * h
-            tau = lo + h * d0 / (d0 - d1)
-            for _ in range(60):
+        near = min(abs(f0), abs(f1)) <= h * (abs(d0) + abs(d1))
+        if d0 * d1 > 0.0 and near:
+            # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
+            mean = (f1 - f0) / h
+            a = 3.0 * (d0 + d1 - 2.0 * mean)
+            b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
+            # its extremum towards zero lies inside, and is less than half of the lesser slope at the ends
+            if a * d0 > 0.0 and 0.0 < -b / a < 2.0 and abs(d0) - b * b / (4.0 * abs(a)) < 0.5 * min(abs(d0), abs(d1)):
+                lo, hi = j * h, (j + 1) * h
+                tau = lo - 0.5 * h * b / a
                 x, d, s = _jet(c, math.cos(tau), math.sin(tau))
-                if (x - level > 0.0) != (f0 > 0.0):
-                    break
-                if (d > 0.0) == (d0 > 0.0):
-                    lo = tau
-                else:
-                    hi = tau
-                new = tau - d / s if s != 0.0 else 0.5 * (lo + hi)
-                if not (lo < new < hi):
-                    new = 0.5 * (lo + hi)
-                if abs(new - tau) < 1e-14:
-                    break
-                tau = new
-            x, d, s = _jet(c, math.cos(tau), math.sin(tau))
-            if (x - level > 0.0) != (f0 > 0.0):
-                found[count] = _refine(c, j * h, tau, f0, level)
-                found[count + 1] = _refine(c, tau, (j + 1) * h, x - level, level)
-                count += 2
+                new = tau - 0.5 * h * h * s / a
+                if lo < new < hi:
+                    tau = new
+                    x, d, s = _jet(c, math.cos(tau), math.sin(tau))
+                if d * d0 < 0.0:
+                    count = _search(c, level, lo, tau, f0, d0, x - level, d, found, count)
+                    count = _search(c, level, tau, hi, x - level, d, f1, d1, found, count)
+                    continue
+        if (f0 > 0.0) != (f1 > 0.0) or (near and d0 * d1 < 0.0):
+            count = _search(c, level, j * h, (j + 1) * h, f0, d0, f1, d1, found, count)
     return found[:count], values[0, 0] - level > 0.0
 
 
