@@ -77,7 +77,7 @@ def test_crossings_are_the_roots_of_the_companion_matrix(harmonics, decay):
         np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("harmonics", [2, 7, 15, 23])
+@pytest.mark.parametrize("harmonics", [2, 7, 15, 31, 63])
 @pytest.mark.parametrize("eps", [1e-5, 1e-8, 1e-11])
 def test_pairs_hidden_between_samples_are_found(harmonics, eps):
     """Around every extremum of a rough motion: just beyond the level there is one more pair than just short of it,
