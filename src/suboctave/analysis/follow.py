@@ -15,7 +15,7 @@ from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
-from suboctave.errors import ConvergenceError
+from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import floquet_multipliers
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import ComplexArray
@@ -261,9 +261,10 @@ class _Follower:
             basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
             if basis.harmonics <= state.basis.harmonics:
                 break
-            finer = curve.with_basis(basis)
             x = state.basis.resized(state.x, basis)
-            guess = Guess(finer.balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)
+            # more harmonics need more samples of a law that tells nothing of itself
+            balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)
             try:
                 better = located.kind.solve(guess)
             except ConvergenceError as failure:
@@ -282,8 +283,19 @@ class _Follower:
             solution = better
         return solution
 
+    def _event_value(self, event: Event, sample: Sample) -> float:
+        value = event.function(self._orbit(sample))
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = float("nan")
+        if not np.isfinite(number):
+            where = sample.point.curve.where(sample.point.u)
+            raise InputError(f"event {event.name!r} returned {value!r} at {where}; it must return a finite number")
+        return number
+
     def _event(self, event: Event, a: Sample, b: Sample) -> Bifurcation | None:
-        value_a, value_b = event.function(self._orbit(a)), event.function(self._orbit(b))
+        value_a, value_b = (self._event_value(event, sample) for sample in (a, b))
         if not (value_a == 0.0 and a.point.arclength == 0.0) and not value_a * value_b < 0.0 and value_b != 0.0:
             return None
         try:
@@ -292,7 +304,7 @@ class _Follower:
                 b.point,
                 value_a,
                 value_b,
-                lambda p: event.function(self._orbit(self._sample(p))),
+                lambda p: self._event_value(event, self._sample(p)),
                 self.settings.newton,
             )
         except ConvergenceError as failure:
