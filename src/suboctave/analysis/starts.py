@@ -8,6 +8,8 @@ where that fails, a short time integration from rest.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,13 +18,12 @@ import numpy as np
 
 from suboctave.analysis.response import ResponseCurve
 from suboctave.continuation.march import CurvePoint, March, SteppingOptions, make_point, solve_at
-from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import BalanceState, apply_blocks
 from suboctave.harmonic.basis import spectrum_to_real
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.model.system import System
 from suboctave.timedomain import integrate
 
 _SETTLING = 200
@@ -65,10 +66,16 @@ def start_point(
     linear = linear_response(curve, value)
     curve.reference = max(curve.reference, curve.size(linear))
     if given is not None:
+        if isinstance(given, PeriodicOrbit) and curve.adaptive is not None and given.basis.nu == curve.balance.basis.nu:
+            curve = curve.with_basis(given.basis)
         guess = _from_given(curve, value, given)
         try:
             return _settled(curve, guess, newton, largest)
         except ConvergenceError as failure:
+            if isinstance(given, PeriodicOrbit):
+                # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
+                with suppress(ConvergenceError):
+                    return _settled(curve, guess, newton, largest, _solve_nearest)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = NewtonOptions(newton.tolerance, newton.correction, max(newton.iterations, 20))
     for name, attempt in (
@@ -86,14 +93,16 @@ def start_point(
     )
 
 
-def _settled(curve: ResponseCurve, u: Array, newton: NewtonOptions, largest: float) -> CurvePoint:
-    """Solve at the guess's parameter value, again with more harmonics while the motion asks for them."""
+def _settled(
+    curve: ResponseCurve, u: Array, newton: NewtonOptions, largest: float, solve: Callable[..., Solved] = solve_at
+) -> CurvePoint:
+    """Solve at the guess's parameter value (unless told otherwise), again with more harmonics while the motion asks."""
     for _ in range(12):
         x, omega, values = curve.split(u)
         settled = curve.balance.settle(x, omega, values)
         if settled is not curve.balance:
             curve = curve.with_balance(settled)
-        solved = solve_at(curve, u, largest, newton)
+        solved = solve(curve, u, largest, newton)
         adapted = curve.adapted(solved.u, solved.evaluation)
         if adapted is curve:
             break
@@ -103,6 +112,13 @@ def _settled(curve: ResponseCurve, u: Array, newton: NewtonOptions, largest: flo
     return make_point(solved, curve, None, 0.0)
 
 
+def _solve_nearest(curve: ResponseCurve, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
+    """The point of the curve nearest to a guess close to it, whatever its parameter value."""
+    weights = curve.weights(guess, largest)
+    row = np.linalg.svd(curve.evaluate(guess).jacobian / weights)[2][-1]
+    return correct(curve, guess, row, weights, newton)
+
+
 def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
     balance = curve.balance
     basis, size = balance.basis, balance.size
@@ -110,7 +126,13 @@ def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
         if given.coefficients.shape[1] != size:
             raise InputError(f"start has {given.coefficients.shape[1]} DOFs, the system has {size}")
         return curve.join(given.basis.resized(given.coefficients, basis), value)
-    array = np.asarray(given, dtype=float)
+    try:
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            "start must be a PeriodicOrbit, a point of a branch, a Bifurcation, a state (x, dx/dt) or coefficients, "
+            f"not {type(given).__name__}{' (one of its .orbits?)' if hasattr(given, 'orbits') else ''}"
+        ) from None
     if not np.isfinite(array).all():
         raise InputError("start contains numbers that are not finite")
     if array.ndim == 1 and array.size == 2 * size:
@@ -135,8 +157,8 @@ def _integrated(curve: ResponseCurve, value: float, state: Array | None) -> Arra
     repeats.
     """
     balance = curve.balance
-    if not isinstance(balance.system, System):
-        raise ConvergenceError("time integration needs the full system")
+    if balance.size != balance.system.n:
+        raise ConvergenceError("time integration needs the full system, not a condensed one")
     _, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
     period = 2.0 * math.pi * balance.basis.nu / omega
     current = np.zeros(2 * balance.system.n) if state is None else state
