@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.errors import InputError
+from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import floquet_multipliers
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 
@@ -96,3 +96,10 @@ def test_the_observed_dof_is_one_of_the_structure(condensed):
     with pytest.raises(InputError, match="not among"):
         branch.orbits[-1].amplitude(0)
     assert branch.orbits[-1].harmonic(1, N - 1) == pytest.approx(whole.orbits[-1].harmonic(1, N - 1), rel=1e-7)
+
+
+def test_time_integration_is_refused(condensed):
+    """A state of the condensed unknowns is no state of the structure."""
+    system = chain(0)
+    with pytest.raises(ConvergenceError, match="full system"):
+        so.frequency_response(system, (0.3, 0.4), harmonics=5, linear=condensed(system, [0]), start=[0.1, 0.0])

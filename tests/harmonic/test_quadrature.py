@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+import suboctave as so
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import HarmonicBalance, HarmonicBasis, kernels
+from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, kernels
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, local_force
 from suboctave.harmonic.quadrature import samples_for
 from suboctave.model import (
@@ -172,3 +173,18 @@ def test_samples_stay_frozen_until_settled_again(damper):
     # a system whose laws are all known is not touched
     known = HarmonicBalance(library.duffing(0.1, 1.0, 1.0, 1.0), HarmonicBasis(5))
     assert known.settle(small, 1.0) is known
+
+
+def test_events_do_not_depend_on_what_a_law_tells():
+    """A stop whose law is told and the same sampled blindly: the same event, solved again with many more harmonics than
+    the curve has, and so with more samples.
+    """
+    found = []
+    for stop in (ElasticStop, Silent):
+        stops = [stop(0, 4.7, 0.0, side="right", regularization=60.0), stop(0, 4.7, -1.0, regularization=60.0)]
+        system = System(1.0, 0.06, 1.0, elements=[CubicSpring(0, 0.16), *stops], loads=[HarmonicLoad(0, 0.55)])
+        rule = AdaptiveHarmonics(tolerance=3e-3, event_tolerance=1e-8)
+        (event,) = so.frequency_response(system, (0.95, 1.1), rule).bifurcations
+        found.append(event)
+    assert found[1].omega == pytest.approx(found[0].omega, rel=1e-10)
+    assert found[1].orbit.basis == found[0].orbit.basis
