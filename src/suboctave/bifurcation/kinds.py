@@ -27,6 +27,10 @@ from suboctave.floquet import FloquetResult, floquet_multipliers
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.perturbation import Kind
 
+#: a pair of multipliers crosses the unit circle if its modulus changes by more than this share of its error (errors of
+#: neighbours are nearly the same, so that much less than the error is a change)
+_SIGNIFICANT = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Sample:
@@ -149,7 +153,10 @@ class NeimarkSacker(BifurcationKind):
             if mu.imag <= 1e-9 * abs(mu):
                 continue
             other = min(b.floquet.multipliers, key=lambda m: abs(m - mu))
-            if (abs(mu) > 1.0) != (abs(other) > 1.0) and (best is None or abs(abs(mu) - 1.0) < abs(abs(best[0]) - 1.0)):
+            # without damping, pairs stay on the circle and rounding alone carries them across
+            significant = abs(abs(mu) - abs(other)) > _SIGNIFICANT * min(a.floquet.error, b.floquet.error)
+            crosses = significant and (abs(mu) > 1.0) != (abs(other) > 1.0)
+            if crosses and (best is None or abs(abs(mu) - 1.0) < abs(abs(best[0]) - 1.0)):
                 best = (complex(mu), complex(other))
         return best
 
