@@ -15,6 +15,9 @@ from suboctave.harmonic.balance import BalanceState, HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, truncation
 
+#: motions of less than this share of the reference count as rest
+_REST = 1e-8
+
 
 @dataclass(frozen=True, eq=False)
 class ResponseEvaluation:
@@ -22,6 +25,7 @@ class ResponseEvaluation:
 
     state: BalanceState
     name: str
+    floor: float
 
     @property
     def residual(self) -> Array:
@@ -39,11 +43,11 @@ class ResponseEvaluation:
 
     @cached_property
     def error(self) -> float:
-        """Residual in units of the forces that balance."""
+        """Residual in units of the forces that balance (or of `floor`: at rest there are none)."""
         state = self.state
         weight = state.balance.scales()[1]
         size = length(state.residual.reshape(state.x.shape) * weight)
-        return size / max(state.force_scale(), np.finfo(float).tiny)
+        return size / max(state.force_scale(), self.floor, np.finfo(float).tiny)
 
     @cached_property
     def truncation(self) -> float:
@@ -110,7 +114,7 @@ class ResponseCurve:
         x, omega, values = self.split(u)
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
-        return ResponseEvaluation(self.balance.at(x, omega, values), self.name)
+        return ResponseEvaluation(self.balance.at(x, omega, values), self.name, _REST * omega**2 * self.reference)
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""

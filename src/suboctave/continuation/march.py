@@ -191,7 +191,11 @@ class March:
                 if landed is not None:
                     self.ended = f"reached the end of the range at {landed.curve.where(landed.u)}"
                     yield landed
-                    return
+                else:
+                    self.ended = (
+                        f"left the range after {point.curve.where(point.u)}; no solution was found exactly on its end"
+                    )
+                return
             taken = new.arclength - point.arclength
             yield new
             count += 1
