@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from suboctave.analysis.follow import Settings, Trace, follow
 from suboctave.analysis.progress import reporting
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import start_point
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError, suggest
@@ -54,8 +54,8 @@ def frequency_response(
     harmonics
         Highest multiple of omega kept, `"adaptive"`, or an `AdaptiveHarmonics`.
     start
-        Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a state `(x, dx/dt)` of shape (2
-        n,), or coefficients of shape (2 H + 1, n).
+        Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a point of a branch, a
+        `Bifurcation`, a state `(x, dx/dt)` of shape (2 n,), or coefficients of shape (2 H + 1, n).
     max_step
         Largest distance between neighbours in scaled arclength (short for `stepping=SteppingOptions(max_step=...)`).
     observe
@@ -78,6 +78,8 @@ def frequency_response(
     _check_system(system)
     first, last = check_range("omega", omega, positive=True)
     settings = _settings(system, max_step, observe, events, newton, stepping)
+    if isinstance(start, BranchPoint | Bifurcation):
+        start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
     curve = _curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
     with one_thread(), reporting(progress, "frequency response") as report:
@@ -133,14 +135,14 @@ def continue_branch(
     orbit = start
     system = orbit.system
     _check_parameter(system, parameter)
-    first, last = check_range(parameter, bounds, positive=parameter == "omega")
+    first, last = _check_bounds(system, parameter, bounds)
     value = orbit.omega if parameter == "omega" else orbit.values[parameter]
     low, high = min(first, last), max(first, last)
     slack = 1e-12 * (high - low)
     if not low - slack <= value <= high + slack:
         raise InputError(f"the motion has {parameter}={value:.6g}, outside the bounds ({low:g}, {high:g})")
-    if omega is not None and abs(omega - orbit.omega) > 1e-12 * orbit.omega:
-        raise InputError(f"omega={omega:g} differs from the motion's {orbit.omega:g}: give one or the other")
+    if omega is not None and not (_is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
+        raise InputError(f"omega={omega!r} differs from the motion's {orbit.omega:g}: leave it out")
     settings = _settings(system, max_step, observe, events, newton, stepping)
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
@@ -184,6 +186,8 @@ def _from_system(
 ) -> Branch:
     wanted: Harmonics = "adaptive" if harmonics is None else harmonics
     if parameter == "omega":
+        if omega is not None:
+            raise InputError("along omega, omega= cannot be kept as well: leave it out, the range is in bounds")
         return frequency_response(
             system,
             bounds,
@@ -197,8 +201,8 @@ def _from_system(
         )
     _check_system(system)
     _check_parameter(system, parameter)
-    first, last = check_range(parameter, bounds)
-    if omega is None or not (math.isfinite(omega) and omega > 0.0):
+    first, last = _check_bounds(system, parameter, bounds)
+    if omega is None or not (_is_number(omega) and omega > 0.0):
         raise InputError(f"continue_branch from a system along {parameter!r} needs a positive omega=, got {omega!r}")
     settings = _settings(system, max_step, observe, events, newton, stepping)
     curve = _curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
@@ -241,25 +245,29 @@ def _settings(
     newton: NewtonOptions | None,
     stepping: SteppingOptions | None,
 ) -> Settings:
-    if isinstance(events, Event):
+    if isinstance(events, Event) or not isinstance(events, Iterable):
         events = (events,)
+    events = tuple(events)
     for event in events:
         if not isinstance(event, Event):
             raise InputError(f"events must be Event objects, got {event!r}")
     if len({e.name for e in events}) < len(events):
         raise InputError("two events have the same name")
+    for event in events:
+        if event.name in KINDS:
+            raise InputError(f"an event cannot be called {event.name!r}: that is the name of a kind of bifurcation")
     for name, given, kind in (("newton", newton, NewtonOptions), ("stepping", stepping, SteppingOptions)):
         if given is not None and not isinstance(given, kind):
             raise InputError(f"{name} must be a {kind.__name__}, not {type(given).__name__}")
     stepping = stepping or SteppingOptions()
     if max_step is not None:
-        if not (isinstance(max_step, (int, float)) and math.isfinite(max_step) and max_step > 0.0):
+        if not (_is_number(max_step) and max_step > 0.0):
             raise InputError(f"max_step must be a positive number, not {max_step!r}")
         stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
     dof = system.observed_dof if observe is None else observe
     if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
         raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
-    return Settings(newton or NewtonOptions(), stepping, tuple(events), int(dof))
+    return Settings(newton or NewtonOptions(), stepping, events, int(dof))
 
 
 def _check_system(system: System) -> None:
@@ -272,6 +280,22 @@ def _check_system(system: System) -> None:
 def _check_parameter(system: System, name: str) -> None:
     if name != "omega" and name not in system.parameters:
         raise InputError(f"unknown parameter {name!r}{suggest(str(name), ['omega', *system.parameters])}")
+
+
+def _check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
+    """Two ends at each of which the system exists (a mass that vanishes or turns negative does not)."""
+    first, last = check_range(name, bounds, positive=name == "omega")
+    if name != "omega":
+        for end in (first, last):
+            try:
+                system.with_parameters({name: end})
+            except InputError as failure:
+                raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
+    return first, last
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
 
 
 def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +69,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         If the orbit's unknowns are not all DOFs of its system (a condensed model has no state to shoot from).
     """
     motion = _orbit(what)
+    if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
+        raise InputError(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
     system = motion.system
     if motion.coefficients.shape[1] != system.n:
         raise InputError("only motions with all DOFs of the system can be verified by shooting")
@@ -110,9 +113,10 @@ def _pairing(a: np.ndarray, b: np.ndarray) -> float:
     return float(cost[rows, columns].max())
 
 
-def _orbit(what: PeriodicOrbit | BranchPoint | Bifurcation) -> PeriodicOrbit:
+def _orbit(what: Any | BranchPoint | Bifurcation) -> PeriodicOrbit:
     if isinstance(what, PeriodicOrbit):
         return what
     if isinstance(what, BranchPoint | Bifurcation):
         return what.orbit
-    raise InputError(f"expected a PeriodicOrbit, a point of a branch or a Bifurcation, not {type(what).__name__}")
+    hint = ": take one of its .orbits or .bifurcations" if hasattr(what, "orbits") else ""
+    raise InputError(f"expected a PeriodicOrbit, a point of a branch or a Bifurcation, not {type(what).__name__}{hint}")
