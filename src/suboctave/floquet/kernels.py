@@ -30,24 +30,28 @@ def propagate_single(stiffness, damping, h):
             k = 2.0 * (first * stiffness[i, 0] + second * stiffness[i, 1])
             c = 2.0 * (first * damping[i, 0] + second * damping[i, 1])
             t = 0.5 * h[i]
-            # exp of t [[0, 1], [-k, -c]] in closed form
-            e = math.exp(-0.5 * c * t)
+            # exp of t [[0, 1], [-k, -c]] in closed form: co, si are exp(-c t / 2) cos(w t), exp(-c t / 2) sin(w t) / w
             q = k - 0.25 * c * c
             if q * t * t > 1e-8:
+                e = math.exp(-0.5 * c * t)
                 w = math.sqrt(q)
-                co = math.cos(w * t)
-                si = math.sin(w * t) / w
+                co = e * math.cos(w * t)
+                si = e * math.sin(w * t) / w
             elif q * t * t < -1e-8:
+                # both exponents on their own, so that heavy damping neither overflows nor cancels
                 w = math.sqrt(-q)
-                co = math.cosh(w * t)
-                si = math.sinh(w * t) / w
+                slow = math.exp(-k / (w + 0.5 * c) * t) if c > 0.0 else math.exp((w - 0.5 * c) * t)
+                fast = math.exp(-(w + 0.5 * c) * t)
+                co = 0.5 * (slow + fast)
+                si = 0.5 * (slow - fast) / w
             else:
-                co = 1.0 - 0.5 * q * t * t
-                si = t * (1.0 - q * t * t / 6.0)
-            m11 = e * (co + 0.5 * c * si)
-            m12 = e * si
-            m21 = -e * k * si
-            m22 = e * (co - 0.5 * c * si)
+                e = math.exp(-0.5 * c * t)
+                co = e * (1.0 - 0.5 * q * t * t)
+                si = e * t * (1.0 - q * t * t / 6.0)
+            m11 = co + 0.5 * c * si
+            m12 = si
+            m21 = -k * si
+            m22 = co - 0.5 * c * si
             n11 = m11 * p11 + m12 * p21
             n12 = m11 * p12 + m12 * p22
             n21 = m21 * p11 + m22 * p21
