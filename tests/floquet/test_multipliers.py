@@ -47,9 +47,11 @@ def test_linear_system(n, nu):
     assert result.unstable == 0
 
 
-@pytest.mark.parametrize(("damping", "stiffness"), [(5.0, 1.0), (2.0, 1.0), (0.1, -0.3), (0.0, 0.0)])
+@pytest.mark.parametrize(("damping", "stiffness"), [(5.0, 1.0), (2.0, 1.0), (0.1, -0.3), (0.0, 0.0), (3e3, 1e4), (1e3, 1.0), (-3.0, 1.0)])
 def test_overdamped_critical_and_unstable(damping, stiffness):
-    """Real multipliers, at critical damping double; statically unstable; a free mass."""
+    """Real multipliers: at critical damping double, statically unstable, a free mass, damping heavy enough for the
+    hyperbolic functions to overflow, negative damping.
+    """
     system = so.System(1.0, damping, stiffness, loads=[so.HarmonicLoad(0, 1.0)])
     result = floquet_multipliers(state_of(system, np.zeros(3), 2.0))
     roots = np.roots([1.0, damping, stiffness])
