@@ -104,6 +104,8 @@ def _result(phi: Array, changes: tuple[Array, ...]) -> FloquetResult:
         left = np.linalg.inv(vectors)
         for change in changes:
             shift += np.abs(((left @ change) * vectors.T).sum(axis=1))
+        # rounding, in any units of the DOFs: beside a large multiplier the small ones have fewer digits
+        shift += 1e-15 * ((np.abs(left) @ np.abs(phi)) * np.abs(vectors).T).sum(axis=1)
     except np.linalg.LinAlgError:
         shift[:] = np.inf
     # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
