@@ -47,7 +47,9 @@ def test_linear_system(n, nu):
     assert result.unstable == 0
 
 
-@pytest.mark.parametrize(("damping", "stiffness"), [(5.0, 1.0), (2.0, 1.0), (0.1, -0.3), (0.0, 0.0), (3e3, 1e4), (1e3, 1.0), (-3.0, 1.0)])
+@pytest.mark.parametrize(
+    ("damping", "stiffness"), [(5.0, 1.0), (2.0, 1.0), (0.1, -0.3), (0.0, 0.0), (3e3, 1e4), (1e3, 1.0), (-3.0, 1.0)]
+)
 def test_overdamped_critical_and_unstable(damping, stiffness):
     """Real multipliers: at critical damping double, statically unstable, a free mass, damping heavy enough for the
     hyperbolic functions to overflow, negative damping.
@@ -63,6 +65,22 @@ def test_overdamped_critical_and_unstable(damping, stiffness):
         assert result.unstable == 1
         assert result.unstable_pairs == 0
         assert result.margin == pytest.approx(expected.real.max() - 1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [-1.0, -3.0, -6.0])
+def test_small_multipliers_beside_a_large_one_say_what_digits_they_have(stiffness):
+    """An unstable direction mixed with two stable ones: multipliers up to 3e9 beside 0.91. All stated errors are from
+    rounding here, and hold up to the rounding of the expected values themselves.
+    """
+    q = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    k = q @ np.diag([stiffness, 2.0, 4.0]) @ q.T
+    system = so.System(np.eye(3), 0.02 * np.eye(3), k, loads=[so.HarmonicLoad(0, 1.0)])
+    result = floquet_multipliers(state_of(system, np.zeros((7, 3)), 0.7))
+    roots = np.concatenate([np.roots([1.0, 0.02, value]) for value in (stiffness, 2.0, 4.0)])
+    expected = np.exp(roots * 2 * np.pi / 0.7)
+    difference = np.abs(result.multipliers[:, None] - expected[None, :]).min(axis=1)
+    assert np.all(difference <= 3 * result.errors + 3e-14 * np.abs(result.multipliers))
+    assert result.errors[1] < 1e-13 * abs(result.multipliers[0])
 
 
 def mathieu(delta, epsilon, damping):
