@@ -12,10 +12,10 @@ import numpy as np
 from suboctave.bifurcation import Bifurcation, BifurcationList
 from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, suggest
-from suboctave.floquet import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
+from suboctave.stability import FloquetResult
 
 if TYPE_CHECKING:
     import pandas

@@ -16,11 +16,11 @@ from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, Step
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.floquet import floquet_multipliers
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, truncation
+from suboctave.stability import floquet_multipliers
 
 #: two changes in one step are separated by halving it, down to this distance in scaled arclength
 _SEPARATE = 2e-3

@@ -11,9 +11,9 @@ import numpy as np
 from suboctave.analysis.branch import BranchPoint
 from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.floquet import FloquetResult, floquet_multipliers
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.timedomain import PeriodicSolution, shoot
+from suboctave.stability import FloquetResult, floquet_multipliers
+from suboctave.timedomain import PeriodicSolution, locate_by_shooting, shoot
 
 
 def stability(orbit: PeriodicOrbit | BranchPoint | Bifurcation) -> FloquetResult:
@@ -27,14 +27,14 @@ class Verification:
 
     distance
         Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement,
-        velocities by the largest velocity).
+        velocities by the largest velocity); for a bifurcation also the relative difference in omega, if larger.
     multiplier_error
         Largest difference between multipliers, paired.
     stable
         The verdict of shooting on the motion's stability, None if no motion was found.
     agrees
         Whether shooting arrives at the same motion with the same verdict; at a bifurcation, where no verdict exists,
-        with the same critical multiplier.
+        whether it locates one of the same kind at the same place.
     solution
         The motion found by shooting, None if it found none (`reason` says why).
     """
@@ -58,10 +58,9 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     Parameters
     ----------
     what
-        A motion; for a `Bifurcation` its critical multiplier is held against that of the motion that shooting finds at
-        the same parameters.
+        A motion; a `Bifurcation` is located again by shooting, with free omega.
     tolerance
-        Relative distance up to which two motions count as the same, and distance up to which two multipliers do.
+        Relative distance up to which two motions, and two frequencies, count as the same.
 
     Raises
     ------
@@ -76,27 +75,29 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         raise InputError("only motions with all DOFs of the system can be verified by shooting")
     floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else floquet_multipliers(motion.state())
     start = motion.start()
+    kind = what.kind if isinstance(what, Bifurcation) and what.kind in KINDS else None
     try:
-        solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
+        if kind is None:
+            solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
+        else:
+            solution = locate_by_shooting(system, kind, start, motion.omega, periods=motion.basis.nu)
     except ConvergenceError as failure:
         return Verification(math.inf, math.inf, None, False, None, f"shooting found no motion from here: {failure}")
     t = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
     sizes = np.repeat([np.abs(motion.displacement(t)).max(), np.abs(motion.velocity(t)).max()], system.n)
     distance = float(np.max(np.abs(solution.state - start) / sizes))
+    distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
     error = _pairing(floquet.multipliers, solution.multipliers)
 
     def verdict(agrees: bool, reason: str) -> Verification:
         return Verification(distance, error, solution.stable, agrees, solution, reason)
 
+    if kind is not None:
+        words = f"Shooting finds {KINDS[kind]} at omega = {solution.omega:.9g}"
+        same = distance <= tolerance
+        return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if distance > tolerance:
         return verdict(False, f"Shooting arrives at another motion (relative distance {distance:.1e})")
-    if isinstance(what, Bifurcation) and what.kind in KINDS:
-        critical = what.critical_multiplier()
-        nearest = min(solution.multipliers, key=lambda mu: abs(mu - critical))
-        # near a fold the motion at fixed parameters, and its multiplier, move like the square root of a deviation
-        near = abs(nearest - critical) <= max(tolerance, 10.0 * math.sqrt(distance) if what.kind == "LP" else 0.0)
-        words = "the same" if near else "another"
-        return verdict(near, f"The same motion, {words} critical multiplier ({nearest:.6g} by shooting)")
     if floquet.stable != solution.stable:
         doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"
         other = "stable" if solution.stable else "unstable"

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, overload
 
 from suboctave.errors import InputError, suggest
-from suboctave.floquet import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.stability import FloquetResult
 
 #: what the kinds mean
 KINDS = {

@@ -23,9 +23,9 @@ from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
-from suboctave.floquet import FloquetResult, floquet_multipliers
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.perturbation import Kind
+from suboctave.stability import FloquetResult, floquet_multipliers
 
 #: a pair of multipliers crosses the unit circle if its modulus changes by more than this share of its error (errors of
 #: neighbours are nearly the same, so that much less than the error is a change)

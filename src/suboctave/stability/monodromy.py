@@ -1,7 +1,7 @@
 """Stability of a periodic motion from its monodromy matrix.
 
 The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 0` is propagated over one period by
-products of matrix exponentials (`floquet.kernels`). The motion is taken with the harmonics that it neglects
+products of matrix exponentials (`stability.kernels`). The motion is taken with the harmonics that it neglects
 (`BalanceState.completed`): where contacts make the series converge slowly, that brings the multipliers ten times
 closer to the true ones, and the distance from those of the truncated motion is part of their error estimate. Steps
 follow the law: the exact contact instants of piecewise- linear elements are their ends (between contacts A is
@@ -18,13 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.floquet import kernels
 from suboctave.harmonic import kernels as harmonic_kernels
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import LocalMotion
 from suboctave.harmonic.quadrature import sharp_nodes
 from suboctave.model.sampling import PiecewiseLinear, SharpSampling
+from suboctave.stability import kernels
 
 _GAUSS = np.array([-1.0, 1.0]) / math.sqrt(3.0)
 _RATIO = 2.5

@@ -6,10 +6,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import suboctave as so
-from suboctave.floquet import FloquetResult, floquet_multipliers
-from suboctave.floquet.kernels import propagate, propagate_single
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.model import Element, PolynomialSampling
+from suboctave.stability import FloquetResult, floquet_multipliers
+from suboctave.stability.kernels import propagate, propagate_single
 from suboctave.timedomain import shoot
 
 
