@@ -168,7 +168,13 @@ def _both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], set
     forward = follow(point, ahead, bounds, settings)
     if forward.closed:
         return forward
-    return follow(point, -ahead, bounds, settings).reversed_before(forward)
+    back = follow(point, -ahead, bounds, settings)
+    # between two folds the curve runs the other way: what matters is where it ends
+    assert isinstance(point.curve, ResponseCurve)
+    name, target = point.curve.name, high if ahead > 0 else low
+    ends = [t.points[-1].orbit for t in (forward, back)]
+    misses = [abs((o.omega if name == "omega" else o.values[name]) - target) for o in ends]
+    return back.reversed_before(forward) if misses[0] <= misses[1] else forward.reversed_before(back)
 
 
 def _from_system(
