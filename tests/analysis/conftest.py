@@ -1,0 +1,19 @@
+"""Curves and motions that several tests look at, each computed once."""
+
+from __future__ import annotations
+
+import pytest
+
+import suboctave as so
+
+
+@pytest.fixture(scope="session")
+def duffing_curve():
+    """A hardening Duffing oscillator swept down over its fold, from 3 to 0.5: LP, LP."""
+    return so.frequency_response(so.library.duffing(c=0.1, F=0.3), (3.0, 0.5))
+
+
+@pytest.fixture(scope="session")
+def rattling_curve():
+    """The reference oscillator with the exact law: PD, PD, LP, LP."""
+    return so.frequency_response(so.library.reference_oscillator(), (4.5, 1.3))

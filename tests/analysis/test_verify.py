@@ -1,0 +1,91 @@
+"""`verify` contradicts: motions and bifurcations that are right agree with shooting, planted errors do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import suboctave as so
+
+
+def test_right_motions_agree(rattling_curve, duffing_curve):
+    for curve in (rattling_curve, duffing_curve):
+        for at in np.linspace(3, len(curve) - 3, 5).astype(int):
+            check = so.verify(curve.orbits[at])
+            assert check.agrees, check
+            assert check.distance < 3e-4
+            assert check.stable == curve.stable[at]
+            assert check.solution.amplitude == pytest.approx(curve.amplitude[at], rel=3e-5)
+            point = so.verify(curve.points[at])
+            assert point.agrees
+            assert "agrees" in repr(point)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.1, 1.0])
+def test_a_planted_error_is_seen(duffing_curve, size):
+    orbit = duffing_curve.orbits[len(duffing_curve) // 2]
+    wrong = replace(orbit, coefficients=orbit.coefficients * (1.0 + size))
+    check = so.verify(wrong)
+    assert not check.agrees
+    assert check.distance > 1e-3
+    assert "DISAGREES" in repr(check)
+
+
+def test_a_missing_harmonic_is_seen(duffing_curve):
+    orbit = duffing_curve.orbits[int(duffing_curve.amplitude.argmax())]
+    coefficients = orbit.coefficients.copy()
+    coefficients[5:] = 0.0
+    assert not so.verify(replace(orbit, coefficients=coefficients)).agrees
+
+
+def test_too_few_harmonics_are_seen():
+    """With one harmonic a motion of the order of the strong spring's length is a percent off."""
+    curve = so.frequency_response(so.library.duffing(c=0.1, F=5.0), (1.2, 1.5), 1)
+    check = so.verify(curve.orbits[0])
+    assert not check.agrees
+    assert check.distance > 1e-3
+
+
+def test_wrong_parameters_are_seen(duffing_curve):
+    orbit = duffing_curve.orbits[int(duffing_curve.amplitude.argmax()) - 20]
+    assert not so.verify(replace(orbit, values={**orbit.values, "alpha": 1.5})).agrees
+
+
+@pytest.fixture(scope="module")
+def each_kind(duffing_curve, rattling_curve):
+    symmetric = so.frequency_response(so.library.duffing(), (0.65, 0.8))
+    absorber = so.frequency_response(so.library.nltva(0.11), (1.0, 1.15))
+    return {
+        "LP": duffing_curve.bifurcations["LP"][0],
+        "PD": rattling_curve.bifurcations["PD"][0],
+        "BP": symmetric.bifurcations["BP"][0],
+        "NS": absorber.bifurcations["NS"][0],
+    }
+
+
+@pytest.mark.parametrize("kind", ["LP", "BP", "PD", "NS"])
+def test_bifurcations(each_kind, kind):
+    b = each_kind[kind]
+    check = so.verify(b)
+    assert check.agrees, check
+    assert check.solution.omega == pytest.approx(b.omega, abs=1e-6)
+    assert check.solution.kind == kind
+
+
+@pytest.mark.parametrize("kind", ["LP", "PD", "NS"])
+def test_misplaced_bifurcations_are_seen(each_kind, kind):
+    """A motion beside the bifurcation, 1 % off in frequency, is none."""
+    b = each_kind[kind]
+    shifted = so.continue_branch(b, "omega", tuple(sorted((b.omega * 0.9, b.omega * 1.1))))
+    far = np.argmin(np.abs(np.abs(shifted.omega / b.omega - 1.0) - 0.02))
+    assert not so.verify(replace(b, orbit=shifted.orbits[far])).agrees
+
+
+def test_stability_of_one_motion(rattling_curve):
+    for at in (5, len(rattling_curve) // 2):
+        result = so.stability(rattling_curve.orbits[at])
+        assert result.multipliers == pytest.approx(rattling_curve.multipliers[at], abs=1e-12)
+        assert result.stable == rattling_curve.stable[at]
+        assert so.stability(rattling_curve.points[at]).stable == result.stable
