@@ -9,7 +9,7 @@ import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.bifurcation import ALL_KINDS, Bifurcation, Sample
+from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
@@ -28,6 +28,9 @@ _SEPARATE = 2e-3
 _EXAMINED = 0.01
 #: multipliers of modulus above one half may move by this much per step (relative to their modulus where it exceeds one)
 _MOVEMENT = 0.4
+#: steps shorter than this are not halved to tell a branch point from a jump between branches
+_JUMP = 1e-5
+_BRANCH_POINT = next(kind for kind in ALL_KINDS if kind.name == "BP")
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
 _NEAR_CIRCLE = 0.02
 
@@ -94,6 +97,7 @@ class _Follower:
         self._recent: list[str] = []
         self._changed: list[str] = []
         self._counted: Sample | None = None
+        self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._since: list[Bifurcation] = []
 
     def run(self) -> Trace:
@@ -126,10 +130,17 @@ class _Follower:
         """
         self._candidate = new = self._sample(b)
         old, step = self.previous, b.arclength - a.arclength
-        if old is None or step < _SEPARATE:
+        if old is None:
+            return True
+        # along one branch the orientation changes at branch points only; where there is none, the step has jumped
+        # from one branch to another that passes close by
+        if _BRANCH_POINT.changed(old, new) and step > _JUMP and self._located(_BRANCH_POINT, old, new) is None:
+            return False
+        if step < _SEPARATE:
             return True
         changed = [kind.name for kind in ALL_KINDS if kind.changed(old, new)]
-        if len(changed) > 1 or abs(old.floquet.unstable - new.floquet.unstable) > 2:
+        crossed = abs(old.floquet.unstable - new.floquet.unstable)
+        if len(changed) > 1 or crossed > 2 or (crossed == 2 and not changed):
             return False
         self._changed = changed
         moved = _movement(old.floquet.multipliers, new.floquet.multipliers)
@@ -179,7 +190,12 @@ class _Follower:
             if kind.name == "LP" and branch_point is not None:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
                 continue
-            located = locate(kind, a, b, self.settings.newton, self._sample, _guess)
+            located = self._located(kind, a, b)
+            if located is None and kind is _BRANCH_POINT:
+                self.trace.warnings.append(
+                    f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)} the curve may have "
+                    "jumped to another branch: its orientation changes without a branch point; try a smaller max_step"
+                )
             if located is None:
                 continue
             item = self._bifurcation(located, a, b)
@@ -192,6 +208,18 @@ class _Follower:
             crossed = self._event(event, a, b)
             if crossed is not None:
                 self.trace.events.append(crossed)
+
+    def _located(self, kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
+        """A bifurcation between two neighbours; a branch point only if its system was solved."""
+        known = self._last_located
+        if known is not None and known[0] is kind and known[1] is a and known[2] is b:
+            return known[3]
+        must_solve = kind is _BRANCH_POINT
+        found = locate(kind, a, b, self.settings.newton, self._sample, _guess, 9 if must_solve else 34)
+        if must_solve and found is not None and found.solution is None:
+            found = None
+        self._last_located = (kind, a, b, found)
+        return found
 
     def _check_count(self, b: Sample, found: list[Bifurcation]) -> None:
         """The number of unstable multipliers must have changed by what the bifurcations explain."""
@@ -222,7 +250,7 @@ class _Follower:
             orbit = self._orbit(located.sample)
             self.trace.warnings.append(
                 f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
-                f"to +- {located.width:.1e}: the motion probably grazes a contact there"
+                f"to +- {located.width:.1e}: the motion grazes a contact there, or too few harmonics are kept"
             )
             return Bifurcation(
                 located.kind.name,

@@ -8,10 +8,10 @@ where that fails, a short time integration from rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import BalanceState, apply_blocks
-from suboctave.harmonic.basis import spectrum_to_real
+from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.timedomain import integrate
 
@@ -77,20 +77,32 @@ def start_point(
                 with suppress(ConvergenceError):
                     return _settled(curve, guess, newton, largest, _solve_nearest)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
-    patient = NewtonOptions(newton.tolerance, newton.correction, max(newton.iterations, 20))
-    for name, attempt in (
-        ("linear response", lambda: linear),
-        ("homotopy in the element forces", lambda: _homotopy(curve, linear, value, newton)),
-        ("time integration from rest", lambda: _integrated(curve, value, None)),
-    ):
-        try:
-            return _settled(curve, attempt(), patient, largest)
-        except ConvergenceError as failure:
-            tried.append(f"{name}: {failure}")
+    patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
+    for finer in _with_more_harmonics(curve):
+        for name, guess_by in (
+            ("linear response", linear_response),
+            ("homotopy in the element forces", partial(_homotopy, newton=newton)),
+            ("time integration from rest", partial(_integrated, state=None)),
+        ):
+            try:
+                return _settled(finer, guess_by(finer, value), patient, largest)
+            except ConvergenceError as failure:
+                tried.append(f"{name} ({finer.balance.basis.harmonics} harmonics): {failure}")
     raise ConvergenceError(
         f"no motion found to start from at {curve.where(linear)}. Tried " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
+
+
+def _with_more_harmonics(curve: ResponseCurve) -> Iterator[ResponseCurve]:
+    """The curve, and where the number of harmonics is free, with more of them: too few may have no motion at all."""
+    yield curve
+    if curve.adaptive is None:
+        return
+    nu = curve.balance.basis.nu
+    for harmonics in (15, 31, 63):
+        if curve.balance.basis.harmonics < harmonics * nu and harmonics <= curve.adaptive.maximum:
+            yield curve.with_basis(HarmonicBasis(harmonics * nu, nu))
 
 
 def _settled(
@@ -140,8 +152,6 @@ def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
     if array.ndim == 1 and size == 1:
         array = array[:, None]
     if array.ndim == 2 and array.shape[1] == size and array.shape[0] % 2 == 1:
-        from suboctave.harmonic.basis import HarmonicBasis
-
         own = HarmonicBasis(max(1, array.shape[0] // 2), basis.nu)
         padded = np.zeros((own.size, size))
         padded[: array.shape[0]] = array
@@ -247,8 +257,9 @@ class _Homotopy:
         return f"{u[-1]:.1%} of the element forces at {self.curve.name} = {self.value:.6g}"
 
 
-def _homotopy(curve: ResponseCurve, linear: Array, value: float, newton: NewtonOptions) -> Array:
+def _homotopy(curve: ResponseCurve, value: float, newton: NewtonOptions) -> Array:
     """u with all element forces, followed from the linear response."""
+    linear = linear_response(curve, value)
     problem = _Homotopy(curve, value)
     first = linear.copy()
     first[-1] = 0.0

@@ -92,6 +92,9 @@ class Bifurcation:
         if target is None and self.kind == "NS":
             target = cmath.exp(1j * self.kappa * self.orbit.period)  # type: ignore[assignment]
         mu = self.multipliers
+        if self.kind == "NS" and self.kappa == 0.0:  # only bracketed: the complex pair nearest to the circle
+            pairs = mu[mu.imag > 0.0]
+            return complex(min(pairs if pairs.size else mu, key=lambda m: abs(abs(m) - 1.0)))
         if target is None:
             return complex(mu[0])
         return complex(min(mu, key=lambda m: abs(m - target)))

@@ -19,8 +19,6 @@ from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 
-_BISECTIONS = 34
-
 
 @dataclass(frozen=True)
 class Located:
@@ -42,6 +40,7 @@ def locate(
     newton: NewtonOptions,
     make_sample: Callable[[CurvePoint], Sample],
     make_guess: Callable[[Array, CurvePoint, float], Guess],
+    bisections: int = 34,
 ) -> Located | None:
     """Locate a bifurcation of a kind whose test changed between two neighbours.
 
@@ -51,6 +50,8 @@ def locate(
         Turns a solved curve point into a sample.
     make_guess
         Turns a vector u in the discretisation of a curve point, and kappa, into a start of the bordered system.
+    bisections
+        Halvings after which the bracket is taken for the answer.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def locate(
     """
     low, high = 0.0, 1.0
     at_low, at_high = a, b
-    for depth in range(_BISECTIONS):
+    for depth in range(bisections):
         share = kind.fraction(at_low, at_high)
         fraction = low + share * (high - low)
         nearer = at_low if share < 0.5 else at_high

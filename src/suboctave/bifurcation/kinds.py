@@ -27,9 +27,8 @@ from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.perturbation import Kind
 from suboctave.stability import FloquetResult, floquet_multipliers
 
-#: a pair of multipliers crosses the unit circle if its modulus changes by more than this share of its error (errors of
-#: neighbours are nearly the same, so that much less than the error is a change)
-_SIGNIFICANT = 0.1
+#: logarithm of the product of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
+_UNDAMPED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,22 +142,23 @@ class NeimarkSacker(BifurcationKind):
         real_doubling = a.half_sign * b.half_sign < 0.0
         branch = a.point.orientation * b.point.orientation < 0.0
         accounted = int(real != branch or (real and branch)) + int(real_doubling)
-        return abs(a.floquet.unstable - b.floquet.unstable) > accounted and self._pair(a, b) is not None
+        return abs(a.floquet.unstable - b.floquet.unstable) >= accounted + 2 and self._pair(a, b) is not None
 
     @staticmethod
     def _pair(a: Sample, b: Sample) -> tuple[complex, complex] | None:
         """The complex pair of multipliers that crosses: its members at a and b."""
-        best = None
-        for mu in a.floquet.multipliers:
-            if mu.imag <= 1e-9 * abs(mu):
-                continue
-            other = min(b.floquet.multipliers, key=lambda m: abs(m - mu))
-            # without damping, pairs stay on the circle and rounding alone carries them across
-            significant = abs(abs(mu) - abs(other)) > _SIGNIFICANT * min(a.floquet.error, b.floquet.error)
-            crosses = significant and (abs(mu) > 1.0) != (abs(other) > 1.0)
-            if crosses and (best is None or abs(abs(mu) - 1.0) < abs(abs(best[0]) - 1.0)):
-                best = (complex(mu), complex(other))
-        return best
+        outside, inside = (a, b) if a.floquet.unstable > b.floquet.unstable else (b, a)
+        candidates = [mu for mu in outside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) > 1.0]
+        partners = [mu for mu in inside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) <= 1.0]
+        if not (candidates and partners):
+            return None
+        out, partner = min(((m, p) for m in candidates for p in partners), key=lambda pair: abs(pair[0] - pair[1]))
+        with np.errstate(divide="ignore"):
+            product = float(np.log(np.abs(outside.floquet.multipliers)).sum())
+        if abs(product) < _UNDAMPED:
+            # pairs stay on the circle and rounding alone carries them across
+            return None
+        return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))
 
     def fraction(self, a: Sample, b: Sample) -> float:
         """See `BifurcationKind.fraction`."""

@@ -236,9 +236,7 @@ class March:
                 taken = length(point.weights * (solved.u - point.u))
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
-                fine = (
-                    turn < 2.5 * self.stepping.angle and solved.distance < 10.0 * self.stepping.deviation + 0.3 * step
-                )
+                fine = turn < 2.5 * self.stepping.angle and solved.distance < 0.4 * step
                 fine = fine and taken <= 1.000001 * self.stepping.max_step
                 if step <= self.stepping.min_step or (fine and (self.inspect is None or self.inspect(point, new))):
                     return new, step, solved.distance

@@ -29,11 +29,14 @@ class NewtonOptions:
         Last correction in scaled arclength, at most (with the convergence rate seen).
     iterations
         Corrections before a step is given up and shortened.
+    damped
+        Shorten corrections until the residual decreases: for starts from far away.
     """
 
     tolerance: float = 1e-10
     correction: float = 1e-7
     iterations: int = 8
+    damped: bool = False
 
     def __post_init__(self) -> None:
         if not (0.0 < self.tolerance < 1e-2 and 0.0 < self.correction < 1.0 and self.iterations >= 1):
@@ -108,14 +111,28 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
             first = size
         else:
             contraction = size / previous if previous > 0.0 else 0.0
-            if contraction > 2.0 and size > first:
+            if contraction > 2.0 and size > first and not options.damped:
                 break
-        u = u - step / weights
-        previous = size
+        share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
+        u = u - share * step / weights
+        previous = size if share == 1.0 else np.inf
     raise ConvergenceError(
         f"Newton's method did not converge near {curve.where(guess)} "
         f"(residual {error:.1e} after {iteration} iterations)"
     )
+
+
+def _decrease(curve: Curve, u: Array, step: Array, error: float) -> float:
+    """The share of a correction with which the residual decreases, 1 if the whole of it does."""
+    share = 1.0
+    while share > 1e-3:
+        try:
+            if curve.evaluate(u - share * step).error <= (1.0 - 0.1 * share) * error:
+                return share
+        except ConvergenceError:
+            pass
+        share *= 0.5
+    return 1.0
 
 
 def tangent(solved: Solved) -> Array:
