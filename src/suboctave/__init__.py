@@ -26,10 +26,11 @@ if TYPE_CHECKING:
     from suboctave.bifurcation import Bifurcation
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
-    from suboctave.harmonic import HarmonicBalance, HarmonicBasis, PeriodicOrbit
+    from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
     from suboctave.model import (
         CubicSpring,
         ElasticStop,
+        Element,
         HarmonicLoad,
         PolynomialSpring,
         System,
@@ -43,11 +44,13 @@ _HOME = {
     "CubicSpring": "suboctave.model",
     "PolynomialSpring": "suboctave.model",
     "ElasticStop": "suboctave.model",
+    "Element": "suboctave.model",
     "HarmonicLoad": "suboctave.model",
     "check_derivatives": "suboctave.model",
     "library": "suboctave.model.library",
     "HarmonicBasis": "suboctave.harmonic",
     "HarmonicBalance": "suboctave.harmonic",
+    "AdaptiveHarmonics": "suboctave.harmonic",
     "PeriodicOrbit": "suboctave.harmonic",
     "NewtonOptions": "suboctave.continuation",
     "SteppingOptions": "suboctave.continuation",
@@ -64,11 +67,13 @@ _HOME = {
 }
 
 __all__ = [
+    "AdaptiveHarmonics",
     "Bifurcation",
     "Branch",
     "ConvergenceError",
     "CubicSpring",
     "ElasticStop",
+    "Element",
     "Event",
     "HarmonicBalance",
     "HarmonicBasis",

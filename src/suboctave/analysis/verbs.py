@@ -20,7 +20,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
@@ -86,6 +86,11 @@ def frequency_response(
         settings = replace(settings, report=report)
         point = start_point(curve, first, start, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
+    if len(trace.points) > 1 and not trace.closed and trace.points[-1].orbit.omega == first:
+        trace.warnings.append(
+            f"the branch folds back and leaves the range where it began, at omega = {first:.6g}: other motions there may "
+            "lead through the range. Begin at the other end, or choose one with start="
+        )
     options = _options(settings, harmonics, {"omega": (first, last)})
     return _branch(system, "omega", trace, settings, options)
 
@@ -146,13 +151,19 @@ def continue_branch(
     settings = _settings(system, max_step, observe, events, newton, stepping)
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
-    curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, None)
+    curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, _own_linear_part(orbit))
     with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
         ahead = float(np.sign(last - first))
         trace = _both_ways(point, ahead, (low, high), settings)
     return _branch(system, parameter, trace, settings, _options(settings, wanted, {parameter: (first, last)}))
+
+
+def _own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
+    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
+    linear = orbit.balance.linear
+    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
 
 
 def _both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:

@@ -37,7 +37,7 @@ class SteppingOptions:
         Points after which the curve ends with a reason.
     """
 
-    max_step: float = 0.05
+    max_step: float = 0.06
     initial_step: float = 0.01
     min_step: float = 1e-7
     deviation: float = 0.01

@@ -81,18 +81,20 @@ class FloquetResult:
 def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
     mass, damping, stiffness = state.linear.equation_of_motion()
-    truncated = _Linearisation(state, state.local_motions)
-    linearised = _Linearisation(state.completed, state.local_motions)
-    edges = linearised.edges()
+    truncated, linearised = _Linearisation(state), _Linearisation(state.completed)
+    # where to step need not be known as well as the motion: one set of steps for both, but each with its own contact
+    # instants (between steps that end at the other's, the two would look alike)
+    steps = truncated.steps()
+    edges = linearised.with_contacts(steps)
     coarse = _monodromy(linearised, mass, damping, stiffness, edges)
     if linearised.constant:
         fine, stepping = coarse, np.zeros_like(coarse)
     else:
-        halved = np.sort(np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))))
+        halved = np.empty(2 * len(edges) - 1)
+        halved[::2], halved[1::2] = edges, 0.5 * (edges[1:] + edges[:-1])
         fine = _monodromy(linearised, mass, damping, stiffness, halved)
         stepping = (fine - coarse) / 15.0
-    # with the contact instants of its own: between steps that end at the other's, the two would look alike
-    plain = _monodromy(truncated, mass, damping, stiffness, truncated.edges())
+    plain = _monodromy(truncated, mass, damping, stiffness, truncated.with_contacts(steps))
     return _result(fine + stepping, (stepping, coarse - plain))
 
 
@@ -116,15 +118,10 @@ def _result(phi: Array, changes: tuple[Array, ...]) -> FloquetResult:
 
 
 class _Linearisation:
-    """The elements' tangents along a motion, at any instant, and the steps they ask for.
+    """The elements' tangents along a motion, at any instant, and the steps they ask for."""
 
-    `guides` are the motions that sharp laws grade their steps by: where to step need not be known as well as the
-    motion.
-    """
-
-    def __init__(self, state: BalanceState, guides: list[LocalMotion]) -> None:
+    def __init__(self, state: BalanceState) -> None:
         self.state = state
-        self.guides = guides
         self.locals = state.local_motions
         self.kinds = [local.kind for local in self.locals]
         self.constant = all(isinstance(kind, PiecewiseLinear) for kind in self.kinds)
@@ -132,23 +129,23 @@ class _Linearisation:
             i: local.contacts() for i, local in enumerate(self.locals) if isinstance(self.kinds[i], PiecewiseLinear)
         }
 
-    def edges(self) -> Array:
-        """Ends of the steps in tau, from 0 to 2 pi, ascending."""
-        parts = [np.array([0.0, 2.0 * math.pi])]
-        for contacts in self._contacts.values():
-            parts += [contact.instants for contact in contacts]
-        if not self.constant:
-            parts.append(np.linspace(0.0, 2.0 * math.pi, self._uniform() + 1))
+    def steps(self) -> Array:
+        """Ends of the steps in tau that laws without contact instants ask for, from 0 to 2 pi, ascending."""
+        if self.constant:
+            return np.array([0.0, 2.0 * math.pi])
+        parts = [np.linspace(0.0, 2.0 * math.pi, self._uniform() + 1)]
         sharp: dict[bytes, list[tuple[LocalMotion, SharpSampling]]] = {}
-        for local, kind in zip(self.guides, self.kinds, strict=True):
+        for local, kind in zip(self.locals, self.kinds, strict=True):
             if isinstance(kind, SharpSampling):
                 sharp.setdefault(local.motion.tobytes(), []).append((local, kind))
         parts += [_panel_edges(together) for together in sharp.values()]
-        edges = np.unique(np.concatenate(parts))
-        kept = np.append(True, np.diff(edges) > 1e-12)
-        edges = edges[kept]
-        edges[0], edges[-1] = 0.0, 2.0 * math.pi
-        return edges
+        return _merged(parts)
+
+    def with_contacts(self, steps: Array) -> Array:
+        """Ends of steps with those at the motion's contact instants."""
+        if not self._contacts:
+            return steps
+        return _merged([steps] + [c.instants for contacts in self._contacts.values() for c in contacts])
 
     def _uniform(self) -> int:
         """Uniform steps: enough for the highest harmonic that matters."""
@@ -181,6 +178,17 @@ class _Linearisation:
             if f_v is not None:
                 damping[i] = f_v
         return stiffness, damping
+
+
+def _merged(parts: list[Array]) -> Array:
+    """All instants in ascending order, none twice, from 0 to 2 pi."""
+    edges = np.sort(np.concatenate(parts))
+    kept = np.empty(len(edges), dtype=bool)
+    kept[0] = True
+    np.greater(np.diff(edges), 1e-12, out=kept[1:])
+    edges = edges[kept]
+    edges[0], edges[-1] = 0.0, 2.0 * math.pi
+    return edges
 
 
 def _panel_edges(together: list[tuple[LocalMotion, SharpSampling]]) -> Array:
