@@ -88,8 +88,8 @@ def frequency_response(
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
     if len(trace.points) > 1 and not trace.closed and trace.points[-1].orbit.omega == first:
         trace.warnings.append(
-            f"the branch folds back and leaves the range where it began, at omega = {first:.6g}: other motions there may "
-            "lead through the range. Begin at the other end, or choose one with start="
+            f"the branch folds back and leaves the range where it began, at omega = {first:.6g}: other motions there "
+            "may lead through the range. Begin at the other end, or choose one with start="
         )
     options = _options(settings, harmonics, {"omega": (first, last)})
     return _branch(system, "omega", trace, settings, options)
