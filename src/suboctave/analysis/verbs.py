@@ -25,6 +25,9 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 
+#: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
+_MOST_UNKNOWNS = 8000
+
 Harmonics = int | str | AdaptiveHarmonics
 
 
@@ -251,6 +254,12 @@ def _curve(
     loaded = max([1] + [c.harmonic for c in system.load_components()])
     high = int(harmonics) if adaptive is None else max(adaptive.minimum, loaded)  # type: ignore[arg-type]
     balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
+    if balance.dimension > _MOST_UNKNOWNS:
+        raise InputError(
+            f"{balance.size} DOFs with {high} harmonics are {balance.dimension} unknowns with dense matrices, more "
+            f"than {_MOST_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
+            "(linear=)"
+        )
     return ResponseCurve(balance, name, omega, span, adaptive)
 
 

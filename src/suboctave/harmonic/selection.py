@@ -17,6 +17,8 @@ from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array, HarmonicBasis
 
 #: numbers of harmonics (of omega) that adaptive selection chooses from
+#: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
+_MOST_UNKNOWNS = 4000
 _LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
 
 
@@ -79,7 +81,8 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
     # tail[k]: size of all harmonics above k
     tail = np.sqrt(np.append(np.cumsum(sizes[::-1] ** 2)[::-1][1:], 0.0)) / size
     lowest = max([options.minimum] + [c.harmonic for c in state.balance.system.load_components()])
-    ladder = [h for h in _LADDER if lowest <= h <= options.maximum] or [max(lowest, options.maximum)]
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
+    ladder = [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
 
     def sufficient(bound: float) -> int:
         for h in ladder:
