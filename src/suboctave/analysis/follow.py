@@ -91,6 +91,7 @@ class _Follower:
         self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._separated)
         self.trace = Trace()
         self.previous: Sample | None = None
+        self._before: Sample | None = None
         self._candidate: Sample | None = None
         self._speed = self._next_speed = 0.0
         self._done = 0.0
@@ -126,7 +127,7 @@ class _Follower:
 
         At most one test may change in a step; the multipliers may not move far, so that their path is known; no
         multiplier may have had the time to reach +1 or -1 and come back, and no complex pair the time to meet on the
-        real axis, part, and meet again.
+        real axis, part, and meet again (nor be found far from an axis that it was heading for).
         """
         self._candidate = new = self._sample(b)
         old, step = self.previous, b.arclength - a.arclength
@@ -157,6 +158,11 @@ class _Follower:
             gap = sum(float(np.abs(s.floquet.multipliers - target).min()) for s in (old, new))
             if gap < 1.3 * speed:
                 return False
+        if self._before is not None:
+            last = old.point.arclength - self._before.point.arclength
+            before, now, then = (sample.floquet.multipliers for sample in (self._before, old, new))
+            if _turned_back(before, now, then, step / last):
+                return False
         return _height(old.floquet.multipliers, new.floquet.multipliers) >= 1.3 * speed
 
     def _accept(self, point: CurvePoint) -> None:
@@ -164,7 +170,7 @@ class _Follower:
         if self.previous is not None:
             self._search(self.previous, sample)
         self.trace.points.append(BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations))
-        self.previous = sample
+        self._before, self.previous = self.previous, sample
         self._speed, self._recent, self._changed = self._next_speed, self._changed, []
         report = self.settings.report
         if report is not None:
@@ -383,6 +389,22 @@ def _height(old: ComplexArray, new: ComplexArray) -> float:
         return np.inf
     partner = before[np.abs(relevant[:, None] - before[None, :]).argmin(axis=1)]
     return float((relevant.imag + partner.imag).min())
+
+
+def _turned_back(before: ComplexArray, old: ComplexArray, new: ComplexArray, ratio: float) -> bool:
+    """True if a complex pair that would have reached the real axis is still far from it: it may have been there.
+
+    `ratio` is the length of the step from old to new in units of the one before it.
+    """
+    before, old = before[before.imag > 0.0], old[old.imag > 0.0]
+    if not (before.size and old.size):
+        return False
+    for mu in new[(new.imag > 0.0) & (np.abs(new) > 0.5)]:
+        now = old[np.abs(old - mu).argmin()]
+        fall = before[np.abs(before - now).argmin()].imag - now.imag
+        if mu.imag > 0.5 * now.imag and 1.5 * ratio * fall > now.imag:
+            return True
+    return False
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:
