@@ -402,7 +402,7 @@ def _turned_back(before: ComplexArray, old: ComplexArray, new: ComplexArray, rat
     for mu in new[(new.imag > 0.0) & (np.abs(new) > 0.5)]:
         now = old[np.abs(old - mu).argmin()]
         fall = before[np.abs(before - now).argmin()].imag - now.imag
-        if mu.imag > 0.5 * now.imag and 1.5 * ratio * fall > now.imag:
+        if mu.imag > 0.3 * now.imag and 1.5 * ratio * fall > now.imag:
             return True
     return False
 
