@@ -19,7 +19,7 @@ from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import choose_harmonics, truncation
+from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
 from suboctave.stability import floquet_multipliers
 
 #: two changes in one step are separated by halving it, down to this distance in scaled arclength
@@ -30,6 +30,8 @@ _EXAMINED = 0.01
 _MOVEMENT = 0.4
 #: steps shorter than this are not halved to tell a branch point from a jump between branches
 _JUMP = 1e-5
+#: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
+_CRITICAL = 1e-3
 _BRANCH_POINT = next(kind for kind in ALL_KINDS if kind.name == "BP")
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
 _NEAR_CIRCLE = 0.02
@@ -239,7 +241,9 @@ class _Follower:
         odd = sum(item.kind in ("LP", "PD", "BP") for item in items)
         pairs = sum(item.kind == "NS" for item in items)
         change = abs(b.floquet.unstable - a.floquet.unstable)
-        if change > odd + 2 * pairs or (change - odd) % 2:
+        # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
+        branching = any(item.kind == "BP" for item in items)
+        if change > odd + 2 * pairs or ((change - odd) % 2 and not branching):
             where = f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)}"
             names = ", ".join(item.kind for item in items) or "none"
             self.trace.warnings.append(
@@ -293,6 +297,12 @@ class _Follower:
         for _ in range(8):
             state = solution.state
             basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
+            if basis.harmonics <= state.basis.harmonics:
+                # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
+                critical = located.kind.critical(solution)
+                if np.abs(floquet_multipliers(state).multipliers - critical).min() <= _CRITICAL:
+                    break
+                basis = next_harmonics(state, adaptive)
             if basis.harmonics <= state.basis.harmonics:
                 break
             x = state.basis.resized(state.x, basis)

@@ -78,16 +78,16 @@ def start_point(
                     return _settled(curve, guess, newton, largest, _solve_nearest)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
+    ways: list[tuple[str, Callable[[ResponseCurve, float], Array], ResponseCurve]] = []
     for finer in _with_more_harmonics(curve):
-        for name, guess_by in (
-            ("linear response", linear_response),
-            ("homotopy in the element forces", partial(_homotopy, newton=newton)),
-            ("time integration from rest", partial(_integrated, state=None)),
-        ):
-            try:
-                return _settled(finer, guess_by(finer, value), patient, largest)
-            except ConvergenceError as failure:
-                tried.append(f"{name} ({finer.balance.basis.harmonics} harmonics): {failure}")
+        ways.append(("linear response", linear_response, finer))
+        ways.append(("homotopy in the element forces", partial(_homotopy, newton=newton), finer))
+    ways.append(("time integration from rest", partial(_integrated, state=None), finer))
+    for name, guess_by, finer in ways:
+        try:
+            return _settled(finer, guess_by(finer, value), patient, largest)
+        except ConvergenceError as failure:
+            tried.append(f"{name} ({finer.balance.basis.harmonics} harmonics): {failure}")
     raise ConvergenceError(
         f"no motion found to start from at {curve.where(linear)}. Tried " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"

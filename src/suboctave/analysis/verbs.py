@@ -27,6 +27,8 @@ from suboctave.model.system import System
 
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _MOST_UNKNOWNS = 8000
+#: DOFs up to which the stiffness is examined for motions that nothing holds
+_MOST_EXAMINED = 400
 
 Harmonics = int | str | AdaptiveHarmonics
 
@@ -251,14 +253,16 @@ def _curve(
         )
     else:
         adaptive = None
+    if linear is not None and not isinstance(linear, LinearPart):
+        raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
     loaded = max([1] + [c.harmonic for c in system.load_components()])
     high = int(harmonics) if adaptive is None else max(adaptive.minimum, loaded)  # type: ignore[arg-type]
     balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
     if balance.dimension > _MOST_UNKNOWNS:
         raise InputError(
             f"{balance.size} DOFs with {high} harmonics are {balance.dimension} unknowns with dense matrices, more "
-            f"than {_MOST_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
-            "(linear=)"
+            f"than {_MOST_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads "
+            "touch (linear=)"
         )
     return ResponseCurve(balance, name, omega, span, adaptive)
 
@@ -301,6 +305,25 @@ def _check_system(system: System) -> None:
         raise InputError(f"the first argument must be a System, not {type(system).__name__}")
     if not any(c.harmonic > 0 for c in system.load_components()):
         raise InputError("the system has no periodic load: add loads=[HarmonicLoad(dof=..., amplitude=...)]")
+    if system.n <= _MOST_EXAMINED:
+        _check_held(system)
+
+
+def _check_held(system: System) -> None:
+    """Refuse a body that nothing holds: the mean of its motion is not determined."""
+    mass, _, stiffness = system.matrices()
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    _, sizes, vectors = np.linalg.svd(stiffness * np.multiply.outer(scale, scale))
+    free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
+    if not len(free):
+        return
+    held = np.array([e.direction(system.n) * scale for e in system.elements]).reshape(-1, system.n)
+    if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
+        shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
+        raise InputError(
+            f"the structure can move freely along ({shape}): its stiffness is singular and no element holds it, so "
+            "that the mean position is not determined. Hold it by a spring, or write it in relative displacements"
+        )
 
 
 def _check_parameter(system: System, name: str) -> None:

@@ -12,6 +12,7 @@ neighbours, where in between, how to solve for it, and whether a solution is one
 
 from __future__ import annotations
 
+import cmath
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
@@ -79,6 +80,10 @@ class BifurcationKind(ABC):
     def genuine(self, found: Singular, guess: Guess) -> bool:
         """Whether a solution of the system really is of this kind."""
         return True
+
+    def critical(self, found: Singular) -> complex:
+        """The multiplier that lies on the unit circle at a solution."""
+        return {Kind.INTEGER: 1.0 + 0.0j, Kind.HALF: -1.0 + 0.0j}[self.operator]
 
 
 class LimitPoint(BifurcationKind):
@@ -177,6 +182,10 @@ class NeimarkSacker(BifurcationKind):
         """At kappa = 0 or w0/2 every LP and PD solves the system as well: those are none."""
         share = found.kappa / found.state.rate
         return 1e-3 < share < 0.5 - 1e-3
+
+    def critical(self, found: Singular) -> complex:
+        """`exp(i kappa T)`."""
+        return cmath.exp(2j * cmath.pi * found.kappa / found.state.rate)
 
 
 #: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork

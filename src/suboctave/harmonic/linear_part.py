@@ -18,7 +18,7 @@ equation of motion may have more DOFs than there are unknowns: `expand` takes di
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.system import System
 
 
+@runtime_checkable
 class LinearPart(Protocol):
     """Contract of the linear part. `size` is the number of unknown DOFs."""
 

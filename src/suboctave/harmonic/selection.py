@@ -67,6 +67,21 @@ def _neglected_sizes(state: BalanceState) -> Array:
     return sizes
 
 
+def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
+    """Numbers of harmonics of omega to choose from."""
+    nu, high = state.basis.nu, state.basis.harmonics
+    lowest = max([options.minimum] + [c.harmonic for c in state.balance.system.load_components()])
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
+    return [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
+
+
+def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
+    """A basis with half as many harmonics again, where the options allow it, else the present one."""
+    nu, high = state.basis.nu, state.basis.harmonics
+    wanted = next((h for h in _ladder(options, state) if h * nu >= 1.5 * high), None)
+    return state.basis if wanted is None else HarmonicBasis(wanted * nu, nu)
+
+
 def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
     """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
     basis = state.basis
@@ -80,9 +95,7 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
     sizes = np.concatenate((kept, _neglected_sizes(state)))
     # tail[k]: size of all harmonics above k
     tail = np.sqrt(np.append(np.cumsum(sizes[::-1] ** 2)[::-1][1:], 0.0)) / size
-    lowest = max([options.minimum] + [c.harmonic for c in state.balance.system.load_components()])
-    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-    ladder = [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
+    ladder = _ladder(options, state)
 
     def sufficient(bound: float) -> int:
         for h in ladder:

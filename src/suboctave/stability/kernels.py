@@ -62,26 +62,54 @@ def propagate_single(stiffness, damping, h):
     return out
 
 
+#: size up to which plain loops beat the overhead of BLAS
+_SMALL = 7
+
+
+@njit(cache=True)
+def _multiply(a, b, out):
+    """`out = a b`."""
+    n, m = b.shape
+    if n > _SMALL:
+        np.dot(a, b, out)
+        return
+    for i in range(n):
+        for j in range(m):
+            total = 0.0
+            for k in range(n):
+                total += a[i, k] * b[k, j]
+            out[i, j] = total
+
+
 @njit(cache=True)
 def propagate(base_k, base_c, shapes, stiffness, damping, h):
     """Monodromy of `y'' + C(t) y' + K(t) y = 0`, `K(t) = base_k + sum_e stiffness_e(t) left_e right_e^T`.
 
-    C(t) likewise, from base_c and damping_e.
-    shapes (E, 2, n): left and right vectors; stiffness, damping (E, S, 2) at the Gauss instants of the steps h (S,).
-    Exponentials act by their Taylor series on sub-steps short enough for fourteen terms to reach rounding.
+    C(t) likewise, from base_c and damping_e; shape (2 n, 2 n). shapes (E, 2, n): left and right vectors; stiffness,
+    damping (E, S, 2) at the Gauss instants of the steps h (S,). Exponentials act by their Taylor series, on sub-steps
+    short enough for it to reach rounding within twenty terms. DOFs should be weighted alike (by the square roots of
+    their masses).
     """
     n = base_k.shape[0]
-    elements = shapes.shape[0]
-    phi = np.eye(2 * n)
+    # displacements and velocities: y = upper, y' = lower, one column per initial condition
+    upper = np.zeros((n, 2 * n))
+    lower = np.zeros((n, 2 * n))
+    for i in range(n):
+        upper[i, i] = 1.0
+        lower[i, n + i] = 1.0
     k = np.empty((n, n))
     c = np.empty((n, n))
+    term_u = np.empty((n, 2 * n))
+    term_l = np.empty((n, 2 * n))
+    from_k = np.empty((n, 2 * n))
+    from_c = np.empty((n, 2 * n))
     for i in range(h.shape[0]):
         for stage in range(2):
             first = 2.0 * (_A1 if stage == 0 else _A2)
             second = 2.0 * (_A2 if stage == 0 else _A1)
             k[:] = base_k
             c[:] = base_c
-            for e in range(elements):
+            for e in range(shapes.shape[0]):
                 ks = first * stiffness[e, i, 0] + second * stiffness[e, i, 1]
                 cs = first * damping[e, i, 0] + second * damping[e, i, 1]
                 for p in range(n):
@@ -89,7 +117,6 @@ def propagate(base_k, base_c, shapes, stiffness, damping, h):
                         o = shapes[e, 0, p] * shapes[e, 1, q]
                         k[p, q] += ks * o
                         c[p, q] += cs * o
-            t = 0.5 * h[i]
             size_k = 0.0
             size_c = 0.0
             for p in range(n):
@@ -102,18 +129,28 @@ def propagate(base_k, base_c, shapes, stiffness, damping, h):
                 size_c = max(size_c, row_c)
             # the time scale of the step, not the norm of A: displacements and velocities have different units
             rate = math.sqrt(size_k) + size_c
-            count = max(1, math.ceil(rate * t / 0.7))
-            d = t / count
+            count = max(1, math.ceil(rate * 0.5 * h[i] / 0.7))
+            d = 0.5 * h[i] / count
+            # terms fall like (rate d)^order / order!: as many as reach rounding
+            orders = 1
+            left = rate * d
+            while left > 1e-17 and orders < 20:
+                orders += 1
+                left *= rate * d / orders
             for _ in range(count):
-                term = phi
-                for order in range(1, 15):
-                    upper = term[:n]
-                    lower = term[n:]
-                    new = np.empty((2 * n, 2 * n))
-                    new[:n] = (d / order) * lower
-                    new[n:] = (-d / order) * (
-                        np.dot(k, np.ascontiguousarray(upper)) + np.dot(c, np.ascontiguousarray(lower))
-                    )
-                    term = new
-                    phi = phi + term
-    return phi
+                term_u[:] = upper
+                term_l[:] = lower
+                for order in range(1, orders + 1):
+                    f = d / order
+                    _multiply(k, term_u, from_k)
+                    _multiply(c, term_l, from_c)
+                    for p in range(n):
+                        for q in range(2 * n):
+                            term_u[p, q] = f * term_l[p, q]
+                            term_l[p, q] = -f * (from_k[p, q] + from_c[p, q])
+                            upper[p, q] += term_u[p, q]
+                            lower[p, q] += term_l[p, q]
+    out = np.empty((2 * n, 2 * n))
+    out[:n] = upper
+    out[n:] = lower
+    return out

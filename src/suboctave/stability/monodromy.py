@@ -204,7 +204,7 @@ def _panel_edges(together: list[tuple[LocalMotion, SharpSampling]]) -> Array:
 def _monodromy(
     linearised: _Linearisation, mass: Array, damping: Array, stiffness: Array, edges: Array
 ) -> NDArray[np.float64]:
-    """State-transition matrix of (y, y') over the period, by steps between `edges`."""
+    """State-transition matrix of (y, y') over the period, y in DOFs weighted by the square roots of their masses."""
     state = linearised.state
     half = 0.5 * np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -220,13 +220,15 @@ def _monodromy(
         k_total = stiffness[0, 0] / m + squares @ k
         c_total = damping[0, 0] / m + squares @ c
         return kernels.propagate_single(k_total.reshape(-1, 2), c_total.reshape(-1, 2), h)
-    inverse = np.linalg.inv(mass)
+    # in DOFs weighted by the square roots of their masses the norms that set sub-steps do not depend on units
+    weight = np.sqrt(np.diag(mass))
+    inverse = np.linalg.inv(mass) * weight[:, None]
     shapes = np.zeros((len(directions), 2, n))
     for i, d in enumerate(directions):
-        shapes[i, 0], shapes[i, 1] = inverse @ d, d
+        shapes[i, 0], shapes[i, 1] = inverse @ d, d / weight
     return kernels.propagate(
-        np.ascontiguousarray(inverse @ stiffness),
-        np.ascontiguousarray(inverse @ damping),
+        np.ascontiguousarray(inverse @ stiffness / weight),
+        np.ascontiguousarray(inverse @ damping / weight),
         shapes,
         k.reshape(len(directions), len(h), 2),
         c.reshape(len(directions), len(h), 2),
