@@ -10,6 +10,7 @@ import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
 from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.stability import FloquetResult, floquet_multipliers
@@ -80,7 +81,7 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         if kind is None:
             solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
         else:
-            solution = locate_by_shooting(system, kind, start, motion.omega, periods=motion.basis.nu)
+            solution = _by_shooting(motion, kind, start, tolerance)
     except ConvergenceError as failure:
         return Verification(math.inf, math.inf, None, False, None, f"shooting found no motion from here: {failure}")
     t = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
@@ -94,6 +95,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
 
     if kind is not None:
         words = f"Shooting finds {KINDS[kind]} at omega = {solution.omega:.9g}"
+        if solution.kind is None:
+            words = f"Shooting sees multipliers cross as at {KINDS[kind]} close to omega = {solution.omega:.9g}"
         same = distance <= tolerance
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if distance > tolerance:
@@ -103,6 +106,26 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         other = "stable" if solution.stable else "unstable"
         return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite{doubt}")
     return verdict(True, "The same motion, the same verdict")
+
+
+def _by_shooting(motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:
+    """The bifurcation located by shooting, or the motion at the same omega.
+
+    The latter where the search loses the multiplier but the count of unstable ones changes as it should within a tenth
+    of the tolerance on either side.
+    """
+    system, omega, periods = motion.system, motion.omega, motion.basis.nu
+    try:
+        return locate_by_shooting(system, kind, start, omega, periods=periods)
+    except ConvergenceError:
+        crossing = {"PD": 1, "NS": 2}.get(kind)
+        if crossing is None:
+            raise
+        sides = [shoot(system, start, omega * (1.0 + s * 0.1 * tolerance), periods=periods) for s in (-1.0, 1.0)]
+        counts = [int(np.count_nonzero(np.abs(side.multipliers) > 1.0)) for side in sides]
+        if abs(counts[1] - counts[0]) != crossing:
+            raise
+        return shoot(system, start, omega, periods=periods)
 
 
 def _pairing(a: np.ndarray, b: np.ndarray) -> float:
