@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suboctave.harmonic import kernels
+from suboctave.harmonic import instants
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature, local_force
 from suboctave.model import ElasticStop
 
@@ -159,11 +159,11 @@ def test_grazing_stiffness_follows_the_square_root(harmonics, eps):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_amplitude_is_the_extremum_largest_in_modulus(seed):
-    """kernels.peak against all extrema, from the companion matrix of the derivative."""
+    """instants.peak against all extrema, from the companion matrix of the derivative."""
     rng = np.random.default_rng(seed)
     for harmonics in (1, 2, 5, 15, 40):
         c = random_motion(rng, harmonics, rng.uniform(0.0, 2.0))
-        size, tau, x = kernels.peak(c, 8 * harmonics + 8)
+        size, tau, x = instants.peak(c, 8 * harmonics + 8)
         assert size == pytest.approx(np.abs(value(c, extrema(c))).max(), rel=1e-9)
         assert value(c, tau) == pytest.approx(x, rel=1e-11)
         assert abs(x) == size
@@ -171,9 +171,9 @@ def test_amplitude_is_the_extremum_largest_in_modulus(seed):
 
 def test_amplitude_in_closed_form():
     """max |a0 + cos tau + b cos 2 tau| with the extremum inside: at cos tau = -1/(4 b), of value a0 - b - 1/(8 b)."""
-    size, tau, x = kernels.peak(np.array([-1.0, 1.0, 0.7 + 0j]), 24)
+    size, tau, x = instants.peak(np.array([-1.0, 1.0, 0.7 + 0j]), 24)
     assert x == pytest.approx(-1.0 - 0.7 - 1 / 5.6, rel=1e-14)
     assert size == -x
     assert np.cos(tau) == pytest.approx(-1 / 2.8, abs=1e-8)
-    assert kernels.peak(np.array([0.25 + 0j, 0.0]), 16)[0] == 0.25
-    assert kernels.peak(np.zeros(4, complex), 32)[0] == 0.0
+    assert instants.peak(np.array([0.25 + 0j, 0.0]), 16)[0] == 0.25
+    assert instants.peak(np.zeros(4, complex), 32)[0] == 0.0

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 import suboctave as so
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, kernels
+from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, instants
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, local_force
 from suboctave.harmonic.quadrature import samples_for
 from suboctave.model import (
@@ -56,7 +56,9 @@ def test_sharp_stop_against_adaptive_quadrature(motion, where, sharpness):
     numbers = stop.coefficient_values({})
     local = LocalMotion(stop, c, 1.0, numbers, top)
     spectra, by = local_force(local), coefficient_force(local)
-    near = kernels.crossings(c, gap, *np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 257)[:-1]]).T)
+    near = instants.crossings(
+        c, gap, *np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 257)[:-1]]).T
+    )
     ends = [0.0, *near[0], 2 * np.pi]
     if where != "passed" and motion != "rest":
         tau = np.linspace(0, 2 * np.pi, 20001)

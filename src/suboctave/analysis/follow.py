@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
+from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate
@@ -16,25 +17,13 @@ from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, Step
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.balance import BalanceState
-from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
+from suboctave.harmonic.state import BalanceState
 from suboctave.stability import floquet_multipliers
 
-#: two changes in one step are separated by halving it, down to this distance in scaled arclength
-_SEPARATE = 2e-3
-#: steps shorter than this, in scaled arclength, are not halved for the multipliers' sake
-_EXAMINED = 0.01
-#: multipliers of modulus above one half may move by this much per step (relative to their modulus where it exceeds one)
-_MOVEMENT = 0.4
-#: steps shorter than this are not halved to tell a branch point from a jump between branches
-_JUMP = 1e-5
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
-_BRANCH_POINT = next(kind for kind in ALL_KINDS if kind.name == "BP")
-#: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
-_NEAR_CIRCLE = 0.02
 
 
 @dataclass(frozen=True)
@@ -90,18 +79,14 @@ class _Follower:
         self.settings = settings
         self.bounds = bounds
         self.direction = direction
-        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._separated)
+        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear)
         self.trace = Trace()
         self.previous: Sample | None = None
-        self._before: Sample | None = None
         self._candidate: Sample | None = None
-        self._speed = self._next_speed = 0.0
-        self._done = 0.0
-        self._recent: list[str] = []
-        self._changed: list[str] = []
-        self._counted: Sample | None = None
+        self._guard = StepGuard(lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
+        self._count = CountCheck()
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
-        self._since: list[Bifurcation] = []
+        self._done = 0.0
 
     def run(self) -> Trace:
         trace = self.trace
@@ -124,56 +109,18 @@ class _Follower:
         assert isinstance(point.evaluation, ResponseEvaluation)
         return Sample(point, point.evaluation.state)
 
-    def _separated(self, a: CurvePoint, b: CurvePoint) -> bool:
-        """True if a step hides nothing that its ends could tell of, or is short already.
-
-        At most one test may change in a step; the multipliers may not move far, so that their path is known; no
-        multiplier may have had the time to reach +1 or -1 and come back, and no complex pair the time to meet on the
-        real axis, part, and meet again (nor be found far from an axis that it was heading for).
-        """
+    def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
+        """True if a step hides nothing that could be told from its ends, or is short already."""
         self._candidate = new = self._sample(b)
-        old, step = self.previous, b.arclength - a.arclength
-        if old is None:
-            return True
-        # along one branch the orientation changes at branch points only; where there is none, the step has jumped
-        # from one branch to another that passes close by
-        if _BRANCH_POINT.changed(old, new) and step > _JUMP and self._located(_BRANCH_POINT, old, new) is None:
-            return False
-        if step < _SEPARATE:
-            return True
-        changed = [kind.name for kind in ALL_KINDS if kind.changed(old, new)]
-        crossed = abs(old.floquet.unstable - new.floquet.unstable)
-        if len(changed) > 1 or crossed > 2 or (crossed == 2 and not changed):
-            return False
-        self._changed = changed
-        moved = _movement(old.floquet.multipliers, new.floquet.multipliers)
-        self._next_speed = moved / step
-        if step < _EXAMINED:
-            return True
-        # how far they went, seen directly and at the speed of the step before (a fast rotation may look like none)
-        speed = max(moved, self._speed * step)
-        if moved > _MOVEMENT or speed > 1.5 * _MOVEMENT:
-            return False
-        for target, kinds in ((1.0, ("LP", "BP")), (-1.0, ("PD",))):
-            if any(kind in changed or kind in self._recent for kind in kinds):
-                continue
-            gap = sum(float(np.abs(s.floquet.multipliers - target).min()) for s in (old, new))
-            if gap < 1.3 * speed:
-                return False
-        if self._before is not None:
-            last = old.point.arclength - self._before.point.arclength
-            before, now, then = (sample.floquet.multipliers for sample in (self._before, old, new))
-            if _turned_back(before, now, then, step / last):
-                return False
-        return _height(old.floquet.multipliers, new.floquet.multipliers) >= 1.3 * speed
+        return self.previous is None or not self._guard.hides(self.previous, new)
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
         if self.previous is not None:
             self._search(self.previous, sample)
         self.trace.points.append(BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations))
-        self._before, self.previous = self.previous, sample
-        self._speed, self._recent, self._changed = self._next_speed, self._changed, []
+        self.previous = sample
+        self._guard.passed(sample)
         report = self.settings.report
         if report is not None:
             low, high = self.bounds
@@ -199,7 +146,7 @@ class _Follower:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
                 continue
             located = self._located(kind, a, b)
-            if located is None and kind is _BRANCH_POINT:
+            if located is None and kind is BRANCH_POINT:
                 self.trace.warnings.append(
                     f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)} the curve may have "
                     "jumped to another branch: its orientation changes without a branch point; try a smaller max_step"
@@ -210,7 +157,9 @@ class _Follower:
             found.append((located.fraction, item))
             if kind.name == "BP":
                 branch_point = item
-        self._check_count(b, [item for _, item in found])
+        complaint = self._count.complaint(b, [item for _, item in found])
+        if complaint is not None:
+            self.trace.warnings.append(complaint)
         self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
         for event in self.settings.events:
             crossed = self._event(event, a, b)
@@ -222,35 +171,12 @@ class _Follower:
         known = self._last_located
         if known is not None and known[0] is kind and known[1] is a and known[2] is b:
             return known[3]
-        must_solve = kind is _BRANCH_POINT
+        must_solve = kind is BRANCH_POINT
         found = locate(kind, a, b, self.settings.newton, self._sample, _guess, 9 if must_solve else 34)
         if must_solve and found is not None and found.solution is None:
             found = None
         self._last_located = (kind, a, b, found)
         return found
-
-    def _check_count(self, b: Sample, found: list[Bifurcation]) -> None:
-        """The number of unstable multipliers must have changed by what the bifurcations explain."""
-        self._since += found
-        if not b.floquet.decided or np.any(np.abs(np.abs(b.floquet.multipliers) - 1.0) < _NEAR_CIRCLE):
-            return
-        a, items = self._counted, self._since
-        self._counted, self._since = b, []
-        if a is None:
-            return
-        odd = sum(item.kind in ("LP", "PD", "BP") for item in items)
-        pairs = sum(item.kind == "NS" for item in items)
-        change = abs(b.floquet.unstable - a.floquet.unstable)
-        # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
-        branching = any(item.kind == "BP" for item in items)
-        if change > odd + 2 * pairs or ((change - odd) % 2 and not branching):
-            where = f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)}"
-            names = ", ".join(item.kind for item in items) or "none"
-            self.trace.warnings.append(
-                f"{where} the number of unstable multipliers changes from {a.floquet.unstable} to "
-                f"{b.floquet.unstable}, which the bifurcations located there ({names}) do not explain; "
-                "a smaller max_step may resolve it"
-            )
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
         arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
@@ -380,41 +306,6 @@ def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
     assert isinstance(curve, ResponseCurve)
     x, omega, values = curve.split(u)
     return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
-
-
-def _movement(old: ComplexArray, new: ComplexArray) -> float:
-    """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    relevant = new[np.abs(new) > 0.5]
-    if not relevant.size:
-        return 0.0
-    nearest = np.abs(relevant[:, None] - old[None, :]).min(axis=1)
-    return float((nearest / np.maximum(1.0, np.abs(relevant))).max())
-
-
-def _height(old: ComplexArray, new: ComplexArray) -> float:
-    """Least way of a complex pair (modulus above one half) down to the real axis and up again between two points."""
-    relevant = new[(new.imag > 0.0) & (np.abs(new) > 0.5)]
-    before = old[old.imag > 0.0]
-    if not (relevant.size and before.size):
-        return np.inf
-    partner = before[np.abs(relevant[:, None] - before[None, :]).argmin(axis=1)]
-    return float((relevant.imag + partner.imag).min())
-
-
-def _turned_back(before: ComplexArray, old: ComplexArray, new: ComplexArray, ratio: float) -> bool:
-    """True if a complex pair that would have reached the real axis is still far from it: it may have been there.
-
-    `ratio` is the length of the step from old to new in units of the one before it.
-    """
-    before, old = before[before.imag > 0.0], old[old.imag > 0.0]
-    if not (before.size and old.size):
-        return False
-    for mu in new[(new.imag > 0.0) & (np.abs(new) > 0.5)]:
-        now = old[np.abs(old - mu).argmin()]
-        fall = before[np.abs(before - now).argmin()].imag - now.imag
-        if mu.imag > 0.3 * now.imag and 1.5 * ratio * fall > now.imag:
-            return True
-    return False
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:

@@ -11,9 +11,10 @@ import numpy as np
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, truncation
+from suboctave.harmonic.state import BalanceState
 
 #: motions of less than this share of the reference count as rest
 _REST = 1e-8

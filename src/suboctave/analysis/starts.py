@@ -21,9 +21,9 @@ from suboctave.continuation.march import CurvePoint, March, SteppingOptions, mak
 from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.balance import BalanceState, apply_blocks
 from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.state import BalanceState, apply_blocks
 from suboctave.timedomain import integrate
 
 _SETTLING = 200

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.continuation.linear import Factor
-from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
+from suboctave.harmonic.state import BalanceState
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ import numpy as np
 from suboctave.bifurcation.bordered import Bordered, bordered, null_vectors
 from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
+from suboctave.harmonic.state import BalanceState
 
 #: unfolding, in units of the forces that balance, above which a located point is no branch point
 _UNFOLDING = 1e-8

@@ -24,8 +24,8 @@ from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.state import BalanceState
 from suboctave.stability import FloquetResult, floquet_multipliers
 
 #: logarithm of the product of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped

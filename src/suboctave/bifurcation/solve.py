@@ -14,10 +14,11 @@ import numpy as np
 from suboctave.bifurcation.bordered import Bordered, NullVectors, at_values, bordered, null_vectors, residual_scale
 from suboctave.continuation.linear import Factor
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import motion_size
+from suboctave.harmonic.state import BalanceState
 
 _TOLERANCE = 1e-10
 _STEP = 1e-9

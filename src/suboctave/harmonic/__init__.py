@@ -2,11 +2,12 @@
 as data.
 """
 
-from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.harmonic.state import BalanceState
 
 __all__ = [
     "AdaptiveHarmonics",

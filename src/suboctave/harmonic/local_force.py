@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.harmonic import kernels
+from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import Nodes, nodes_for, sampled_spectra, uniform_nodes
 from suboctave.model.element import Element
@@ -96,9 +96,9 @@ class LocalMotion:
         found = []
         for piece in self.pieces or ():
             level = float(self.coefficients[piece.gap])
-            instants, above = kernels.crossings(self.motion, level, grid.zr, grid.zi)
-            chi = kernels.contact_spectrum(instants, above, piece.side, self.top + high)
-            found.append(Contact(piece.stiffness, piece.gap, piece.side, instants, above, chi))
+            crossed, above = instants.crossings(self.motion, level, grid.zr, grid.zi)
+            chi = kernels.contact_spectrum(crossed, above, piece.side, self.top + high)
+            found.append(Contact(piece.stiffness, piece.gap, piece.side, crossed, above, chi))
         return found
 
 
@@ -147,12 +147,12 @@ def curvature(local: LocalMotion) -> Curvature:
         uu, uv, vv = local.element.curvature(values[0], local.rate * values[1], local.coefficients)
         w = nodes.weights
         return Curvature(nodes.zr, nodes.zi, w * uu, None if uv is None else w * uv, None if vv is None else w * vv)
-    instants, weights = [], []
+    times, weights = [], []
     for contact in local.contacts():
         speed = _speed(local, contact)
-        instants.append(contact.instants)
+        times.append(contact.instants)
         weights.append(contact.side * local.coefficients[contact.stiffness] / speed)
-    tau = np.concatenate(instants)
+    tau = np.concatenate(times)
     return Curvature(np.cos(tau), np.sin(tau), np.concatenate(weights), None, None)
 
 

@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.harmonic import kernels
-from suboctave.harmonic.balance import BalanceState, HarmonicBalance
+from suboctave.harmonic import instants
+from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
 from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.harmonic.state import BalanceState
 from suboctave.model.system import System
 
 
@@ -111,7 +112,7 @@ class PeriodicOrbit:
     def amplitude(self, dof: int = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
         c = np.ascontiguousarray(self._along(dof))
-        return float(kernels.peak(c, 8 * self.basis.harmonics + 8)[0])
+        return float(instants.peak(c, 8 * self.basis.harmonics + 8)[0])
 
     def start(self) -> Array:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""

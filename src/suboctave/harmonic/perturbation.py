@@ -20,10 +20,11 @@ from enum import Enum
 import numpy as np
 
 from suboctave.harmonic import kernels
-from suboctave.harmonic.balance import BalanceState, apply_blocks
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature
-from suboctave.harmonic.second import Direction, coefficient_rates, second_derivative
+from suboctave.harmonic.rates import coefficient_rates
+from suboctave.harmonic.second import Direction, second_derivative
+from suboctave.harmonic.state import BalanceState, apply_blocks
 
 
 class Kind(Enum):

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import kernels
+from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.element import Element
 from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, Sampling, SharpSampling
@@ -60,7 +60,7 @@ def uniform_nodes(count: int) -> Nodes:
 
 @lru_cache(maxsize=64)
 def panel_tables(panels: int, order: int) -> tuple[Array, ...]:
-    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `kernels.sharp_nodes`
+    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `instants.sharp_nodes`
     asks for.
     """
     nodes, weights = np.polynomial.legendre.leggauss(order)
@@ -76,7 +76,7 @@ def sharp_nodes(
     law.
     """
     points, widths = _arrays(kind)
-    return kernels.sharp_nodes(motion, points, widths, *panel_tables(panels, order), ratio)
+    return instants.sharp_nodes(motion, points, widths, *panel_tables(panels, order), ratio)
 
 
 @lru_cache(maxsize=256)

@@ -19,9 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from suboctave.harmonic import kernels
-from suboctave.harmonic.balance import BalanceState, apply_blocks
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature
+from suboctave.harmonic.rates import coefficient_curvature, coefficient_rates
+from suboctave.harmonic.state import BalanceState, apply_blocks
 from suboctave.model.element import Element
 
 
@@ -47,63 +48,6 @@ class Direction:
     def parameters(self) -> dict[str, float]:
         """Changes of the parameters that are not zero."""
         return {k: r for k, r in self.rates.items() if k != "omega" and r != 0.0}
-
-
-def coefficient_rates(element: Element, values: Mapping[str, float], rates: Mapping[str, float]) -> Array:
-    """First change of an element's coefficients along parameter changes, shape (nc,)."""
-    result = np.zeros(len(element.coefficients))
-    for i, coefficient in enumerate(element.coefficients):
-        for name, rate in rates.items():
-            if name in coefficient.names:
-                result[i] += coefficient.derivative(name).value(values) * rate
-    return result
-
-
-def _coefficient_curvature(
-    element: Element, values: Mapping[str, float], a: Mapping[str, float], b: Mapping[str, float]
-) -> Array:
-    """Second change of an element's coefficients along two parameter changes, shape (nc,)."""
-    result = np.zeros(len(element.coefficients))
-    for i, coefficient in enumerate(element.coefficients):
-        for first, rate in a.items():
-            if first not in coefficient.names:
-                continue
-            slope = coefficient.derivative(first)
-            for second, other in b.items():
-                if second in slope.names:
-                    result[i] += slope.derivative(second).value(values) * rate * other
-    return result
-
-
-def force_by(state: BalanceState, name: str) -> Array | None:
-    """Element forces differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
-    high = state.basis.harmonics
-    result = None
-    if name == "omega":
-        for group, _, _, damping in state.spectra:
-            if damping.size:
-                slope = state.basis.derivative(state.x @ group.direction)
-                result = _accumulate(result, _toeplitz(state, damping) @ slope, group.direction, state)
-        return result
-    for element, local in zip(state.balance.elements, state.local_motions, strict=True):
-        rates = coefficient_rates(element, state.values, {name: 1.0})
-        if not rates.any():
-            continue
-        part = spectrum_to_real((rates @ coefficient_force(local).force)[:, None], high)[:, 0]
-        result = _accumulate(result, part, state.linear.retain(element.direction(state.balance.system.n)), state)
-    return result
-
-
-def _accumulate(result: Array | None, part: Array, direction: Array, state: BalanceState) -> Array:
-    if result is None:
-        result = np.zeros_like(state.x)
-    result += np.multiply.outer(part, direction)
-    return result
-
-
-def _toeplitz(state: BalanceState, spectrum: ComplexArray) -> Array:
-    doubled = 2 * np.arange(state.basis.harmonics + 1)
-    return kernels.galerkin(spectrum, np.zeros(0, dtype=complex), 0.0, doubled, doubled, True, True)
 
 
 def unbalanced_along(state: BalanceState, a: Direction) -> Array:
@@ -149,7 +93,7 @@ def _element_second(
     result = spectrum_to_real(kernels.spectra(total[None, :], bend.zr, bend.zi, high).T, high)[:, 0]
     damping = state.element_forces[state.balance.elements.index(element)].damping
     if damping.size and (a.omega or b.omega):
-        result += _toeplitz(state, damping) @ basis.derivative(a.omega * ub + b.omega * ua)
+        result += state.toeplitz(damping) @ basis.derivative(a.omega * ub + b.omega * ua)
     rates_a = coefficient_rates(element, state.values, a.parameters)
     rates_b = coefficient_rates(element, state.values, b.parameters)
     if rates_a.any() or rates_b.any():
@@ -157,12 +101,12 @@ def _element_second(
         for rates, other, omega in ((rates_a, ub, b.omega), (rates_b, ua, a.omega)):
             if not rates.any():
                 continue
-            result += _toeplitz(state, rates @ by.stiffness) @ other
+            result += state.toeplitz(rates @ by.stiffness) @ other
             if by.damping is not None:
                 change = local.rate * basis.nu * basis.derivative(other) + omega * basis.derivative(u)
-                result += _toeplitz(state, rates @ by.damping) @ change
+                result += state.toeplitz(rates @ by.damping) @ change
         spectrum = np.einsum("i,j,ijq->q", rates_a, rates_b, by.curvature)
-        spectrum = spectrum + _coefficient_curvature(element, state.values, a.parameters, b.parameters) @ by.force
+        spectrum = spectrum + coefficient_curvature(element, state.values, a.parameters, b.parameters) @ by.force
         result += spectrum_to_real(spectrum[:, None], high)[:, 0]
     return result
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.state import BalanceState
 
 #: numbers of harmonics (of omega) that adaptive selection chooses from
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth

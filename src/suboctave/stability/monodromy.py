@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.harmonic import kernels as harmonic_kernels
-from suboctave.harmonic.balance import BalanceState
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import LocalMotion
 from suboctave.harmonic.quadrature import sharp_nodes
+from suboctave.harmonic.state import BalanceState
 from suboctave.model.sampling import PiecewiseLinear, SharpSampling
 from suboctave.stability import kernels
 
