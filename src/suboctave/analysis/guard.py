@@ -84,7 +84,7 @@ class StepGuard:
             last = old.point.arclength - self._before.point.arclength
             if _turned_back(self._before.floquet.multipliers, a, b, step / last):
                 return True
-        return _height(a, b) < 1.3 * way
+        return _height(a, b) < 1.5 * way
 
 
 class CountCheck:
@@ -151,6 +151,6 @@ def _turned_back(before: ComplexArray, old: ComplexArray, new: ComplexArray, rat
     for mu in new[(new.imag > 0.0) & (np.abs(new) > 0.5)]:
         now = old[np.abs(old - mu).argmin()]
         fall = before[np.abs(before - now).argmin()].imag - now.imag
-        if mu.imag > 0.3 * now.imag and 1.5 * ratio * fall > now.imag:
+        if mu.imag > 0.3 * now.imag and 2.5 * ratio * fall > now.imag:
             return True
     return False
