@@ -1,0 +1,33 @@
+"""Every example runs from top to bottom, its assertion holds, and it draws its figure only when told where."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "examples"
+SCRIPTS = sorted(FOLDER.glob("ex*.py"))
+
+
+def test_there_are_examples():
+    assert len(SCRIPTS) >= 6
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_example(script, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(script), "figure.png"])
+    runpy.run_path(str(script), run_name="__main__")
+    assert [path.name for path in tmp_path.iterdir()] == ["figure.png"]
+
+
+def test_without_a_path_nothing_is_written(tmp_path, monkeypatch):
+    script = FOLDER / "ex02_tuned_absorber.py"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(script)])
+    runpy.run_path(str(script), run_name="__main__")
+    assert not list(tmp_path.iterdir())
