@@ -49,7 +49,7 @@ RESPONSE = {
     "no step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=0), "max_step must be a positive number"),
     "nan step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=NAN), "max_step must be a positive number"),
     "text step": (lambda s, b: so.frequency_response(s, (1, 2), max_step="0.1"), "max_step must be a positive number"),
-    "tiny step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=1e-9), "min_step"),
+    "tiny step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=1e-9), "max_step=1e-09"),
     "dof": (lambda s, b: so.frequency_response(s, (1, 2), observe=1), "1 DOFs, numbered from 0"),
     "negative dof": (lambda s, b: so.frequency_response(s, (1, 2), observe=-1), "observe=-1 is out of range"),
     "text dof": (lambda s, b: so.frequency_response(s, (1, 2), observe="x"), "observe='x' is out of range"),

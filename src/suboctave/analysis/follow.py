@@ -35,7 +35,6 @@ class Settings:
     events: Sequence[Event] = ()
     observe: int = 0
     report: Callable[[float, str], None] | None = None
-    context: object = None
 
 
 @dataclass
@@ -48,6 +47,7 @@ class Trace:
     warnings: list[str] = field(default_factory=list)
     closed: bool = False
     ended: str = ""
+    interrupted: bool = False
 
     def reversed_before(self, other: Trace) -> Trace:
         """This trace walked backwards, then `other`, which started from the same point."""
@@ -96,6 +96,7 @@ class _Follower:
             trace.closed, trace.ended = self.march.closed, self.march.ended
         except KeyboardInterrupt:
             where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
+            trace.interrupted = True
             trace.ended = f"interrupted at {where}; what was computed is kept"
         if trace.closed:
             _drop_seam(trace.bifurcations)
@@ -112,7 +113,9 @@ class _Follower:
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step hides nothing that could be told from its ends, or is short already."""
         self._candidate = new = self._sample(b)
-        return self.previous is None or not self._guard.hides(self.previous, new)
+        if self.previous is None or _at_rest(self.previous) or _at_rest(new):
+            return True
+        return not self._guard.hides(self.previous, new)
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
@@ -139,7 +142,8 @@ class _Follower:
     def _search(self, a: Sample, b: Sample) -> None:
         found: list[tuple[float, Bifurcation]] = []
         branch_point = None
-        for kind in ALL_KINDS:
+        # at rest the equations have a corner where a contact is closed: nothing bifurcates there
+        for kind in () if _at_rest(a) or _at_rest(b) else ALL_KINDS:
             if not kind.changed(a, b):
                 continue
             if kind.name == "LP" and branch_point is not None:
@@ -197,7 +201,6 @@ class _Follower:
                 curve.name,
                 uncertainty=located.width,
                 arclength=arclength,
-                context=self.settings.context,
             )
         solution = self._refined(located, located.solution, curve)
         state = solution.state
@@ -212,7 +215,6 @@ class _Follower:
             solution.vectors,
             solution.kappa,
             arclength=arclength,
-            context=self.settings.context,
         )
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
@@ -292,8 +294,13 @@ class _Follower:
             orbit.amplitude(self.settings.observe),
             curve.name,
             arclength=point.arclength,
-            context=self.settings.context,
         )
+
+
+def _at_rest(sample: Sample) -> bool:
+    curve = sample.point.curve
+    assert isinstance(curve, ResponseCurve)
+    return curve.at_rest(sample.point.u)
 
 
 def _as_orbit(state: BalanceState, residual: float, neglected: float, curve: ResponseCurve) -> PeriodicOrbit:

@@ -112,6 +112,8 @@ class ResponseCurve:
 
     def evaluate(self, u: Array) -> ResponseEvaluation:
         """See `Curve.evaluate`."""
+        if not np.isfinite(u).all():
+            raise ConvergenceError("the iteration left the range of numbers")
         x, omega, values = self.split(u)
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
@@ -121,9 +123,13 @@ class ResponseCurve:
         """Norm of the coefficients, weighted by the square roots of the masses."""
         return length(self._weight * u[:-1])
 
+    def at_rest(self, u: Array) -> bool:
+        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve."""
+        return self.size(u) <= _REST * self.reference
+
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
-        size = max(self.size(u), 0.01 * max(largest, self.reference), np.finfo(float).tiny)
+        size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
         return np.append(self._weight / size, 1.0 / self.span)
 
     def adapted(self, u: Array, evaluation: Evaluation) -> Curve:

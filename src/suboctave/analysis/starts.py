@@ -81,15 +81,18 @@ def start_point(
     ways: list[tuple[str, Callable[[ResponseCurve, float], Array], ResponseCurve]] = []
     for finer in _with_more_harmonics(curve):
         ways.append(("linear response", linear_response, finer))
-        ways.append(("homotopy in the element forces", partial(_homotopy, newton=newton), finer))
+        if curve.balance.elements:
+            ways.append(("homotopy in the element forces", partial(_homotopy, newton=newton), finer))
     ways.append(("time integration from rest", partial(_integrated, state=None), finer))
     for name, guess_by, finer in ways:
         try:
             return _settled(finer, guess_by(finer, value), patient, largest)
         except ConvergenceError as failure:
-            tried.append(f"{name} ({finer.balance.basis.harmonics} harmonics): {failure}")
+            reason = str(failure)
+            if reason not in tried:
+                tried += [f"{name} with {finer.balance.basis.harmonics} harmonics", reason]
     raise ConvergenceError(
-        f"no motion found to start from at {curve.where(linear)}. Tried " + "; ".join(tried) + ". "
+        f"no motion found to start from at {curve.where(linear)}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
 
@@ -177,14 +180,12 @@ def _integrated(curve: ResponseCurve, value: float, state: Array | None) -> Arra
     times = np.arange(samples + 1) * period / samples
     for _ in range(rounds):
         trajectory = integrate(balance.system, current, times, omega, values, rtol=1e-6)
-        displacement = np.asarray(trajectory.x).reshape(balance.system.n, -1)
-        velocity = np.asarray(trajectory.v).reshape(balance.system.n, -1)
-        new = np.concatenate((displacement[:, -1], velocity[:, -1]))
+        new = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
         change = np.abs(new - current).max()
         current = new
         if change <= 1e-5 * max(np.abs(current).max(), 1e-300):
             break
-    spectrum = np.fft.rfft(displacement[:, :-1], axis=1).T / samples
+    spectrum = np.fft.rfft(trajectory.x[:-1], axis=0) / samples
     return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
 
 
@@ -208,8 +209,7 @@ class _HomotopyEvaluation:
     @cached_property
     def jacobian(self) -> Array:
         """Derivatives by X and by the share of the element forces."""
-        full = self.state.jacobian
-        linear = BalanceState._with_linear(np.zeros_like(full), self.state.blocks, None, mean=True)
+        full, linear = self.state.jacobian, self.state.linear_jacobian
         return np.column_stack((linear + self.share * (full - linear), self._force))
 
     @cached_property

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.checks import check_bounds, check_parameter, check_range, check_system, is_number, make_settings
 from suboctave.analysis.follow import Settings, Trace, follow
 from suboctave.analysis.progress import reporting
 from suboctave.analysis.response import ResponseCurve
-from suboctave.analysis.starts import start_point
-from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.analysis.starts import linear_response, start_point
+from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
@@ -26,9 +26,7 @@ from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
-_MOST_UNKNOWNS = 8000
-#: DOFs up to which the stiffness is examined for motions that nothing holds
-_MOST_EXAMINED = 400
+_DENSE_UNKNOWNS = 8000
 
 Harmonics = int | str | AdaptiveHarmonics
 
@@ -80,9 +78,9 @@ def frequency_response(
     ConvergenceError
         If no motion is found at the first frequency.
     """
-    _check_system(system)
     first, last = check_range("omega", omega, positive=True)
-    settings = _settings(system, max_step, observe, events, newton, stepping)
+    check_system(system, (first, last))
+    settings = make_settings(system, max_step, observe, events, newton, stepping)
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
@@ -144,16 +142,16 @@ def continue_branch(
         )
     orbit = start
     system = orbit.system
-    _check_parameter(system, parameter)
-    first, last = _check_bounds(system, parameter, bounds)
+    check_parameter(system, parameter)
+    first, last = check_bounds(system, parameter, bounds)
     value = orbit.omega if parameter == "omega" else orbit.values[parameter]
     low, high = min(first, last), max(first, last)
     slack = 1e-12 * (high - low)
     if not low - slack <= value <= high + slack:
         raise InputError(f"the motion has {parameter}={value:.6g}, outside the bounds ({low:g}, {high:g})")
-    if omega is not None and not (_is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
+    if omega is not None and not (is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
         raise InputError(f"omega={omega!r} differs from the motion's {orbit.omega:g}: leave it out")
-    settings = _settings(system, max_step, observe, events, newton, stepping)
+    settings = make_settings(system, max_step, observe, events, newton, stepping)
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, _own_linear_part(orbit))
@@ -182,7 +180,7 @@ def _both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], set
         only = Trace(back.points[:1], ended=back.ended)
         return back.reversed_before(only)
     forward = follow(point, ahead, bounds, settings)
-    if forward.closed:
+    if forward.closed or forward.interrupted:
         return forward
     back = follow(point, -ahead, bounds, settings)
     # between two folds the curve runs the other way: what matters is where it ends
@@ -221,16 +219,14 @@ def _from_system(
             newton=newton,
             stepping=stepping,
         )
-    _check_system(system)
-    _check_parameter(system, parameter)
-    first, last = _check_bounds(system, parameter, bounds)
-    if omega is None or not (_is_number(omega) and omega > 0.0):
+    check_system(system)
+    check_parameter(system, parameter)
+    first, last = check_bounds(system, parameter, bounds)
+    if omega is None or not (is_number(omega) and omega > 0.0):
         raise InputError(f"continue_branch from a system along {parameter!r} needs a positive omega=, got {omega!r}")
-    settings = _settings(system, max_step, observe, events, newton, stepping)
+    settings = make_settings(system, max_step, observe, events, newton, stepping)
     curve = _curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
     # a size of the motion to scale with, should the branch begin at rest
-    from suboctave.analysis.starts import linear_response
-
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
     with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
@@ -258,112 +254,13 @@ def _curve(
     loaded = max([1] + [c.harmonic for c in system.load_components()])
     high = int(harmonics) if adaptive is None else max(adaptive.minimum, loaded)  # type: ignore[arg-type]
     balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
-    if balance.dimension > _MOST_UNKNOWNS:
+    if balance.dimension > _DENSE_UNKNOWNS:
         raise InputError(
             f"{balance.size} DOFs with {high} harmonics are {balance.dimension} unknowns with dense matrices, more "
-            f"than {_MOST_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads "
+            f"than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads "
             "touch (linear=)"
         )
     return ResponseCurve(balance, name, omega, span, adaptive)
-
-
-def _settings(
-    system: System,
-    max_step: float | None,
-    observe: int | None,
-    events: Sequence[Event],
-    newton: NewtonOptions | None,
-    stepping: SteppingOptions | None,
-) -> Settings:
-    if isinstance(events, Event) or not isinstance(events, Iterable):
-        events = (events,)
-    events = tuple(events)
-    for event in events:
-        if not isinstance(event, Event):
-            raise InputError(f"events must be Event objects, got {event!r}")
-    if len({e.name for e in events}) < len(events):
-        raise InputError("two events have the same name")
-    for event in events:
-        if event.name in KINDS:
-            raise InputError(f"an event cannot be called {event.name!r}: that is the name of a kind of bifurcation")
-    for name, given, kind in (("newton", newton, NewtonOptions), ("stepping", stepping, SteppingOptions)):
-        if given is not None and not isinstance(given, kind):
-            raise InputError(f"{name} must be a {kind.__name__}, not {type(given).__name__}")
-    stepping = stepping or SteppingOptions()
-    if max_step is not None:
-        if not (_is_number(max_step) and max_step > 0.0):
-            raise InputError(f"max_step must be a positive number, not {max_step!r}")
-        stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
-    dof = system.observed_dof if observe is None else observe
-    if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
-        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
-    return Settings(newton or NewtonOptions(), stepping, events, int(dof))
-
-
-def _check_system(system: System) -> None:
-    if not isinstance(system, System):
-        raise InputError(f"the first argument must be a System, not {type(system).__name__}")
-    if not any(c.harmonic > 0 for c in system.load_components()):
-        raise InputError("the system has no periodic load: add loads=[HarmonicLoad(dof=..., amplitude=...)]")
-    if system.n <= _MOST_EXAMINED:
-        _check_held(system)
-
-
-def _check_held(system: System) -> None:
-    """Refuse a body that nothing holds: the mean of its motion is not determined."""
-    mass, _, stiffness = system.matrices()
-    scale = 1.0 / np.sqrt(np.diag(mass))
-    _, sizes, vectors = np.linalg.svd(stiffness * np.multiply.outer(scale, scale))
-    free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
-    if not len(free):
-        return
-    held = np.array([e.direction(system.n) * scale for e in system.elements]).reshape(-1, system.n)
-    if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
-        shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
-        raise InputError(
-            f"the structure can move freely along ({shape}): its stiffness is singular and no element holds it, so "
-            "that the mean position is not determined. Hold it by a spring, or write it in relative displacements"
-        )
-
-
-def _check_parameter(system: System, name: str) -> None:
-    if name != "omega" and name not in system.parameters:
-        raise InputError(f"unknown parameter {name!r}{suggest(str(name), ['omega', *system.parameters])}")
-
-
-def _check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
-    """Two ends at each of which the system exists (a mass that vanishes or turns negative does not)."""
-    first, last = check_range(name, bounds, positive=name == "omega")
-    if name != "omega":
-        for end in (first, last):
-            try:
-                system.with_parameters({name: end})
-            except InputError as failure:
-                raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
-    return first, last
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
-
-
-def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:
-    """(from, to) as two different finite numbers.
-
-    Raises
-    ------
-    InputError
-        If they are not, or not positive where they must be.
-    """
-    try:
-        first, last = (float(b) for b in bounds)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}={bounds!r}: give two numbers, (from, to)") from None
-    if not (math.isfinite(first) and math.isfinite(last)) or first == last:
-        raise InputError(f"{name}=({first:g}, {last:g}): the range must have two different finite ends")
-    if positive and min(first, last) <= 0.0:
-        raise InputError(f"{name}=({first:g}, {last:g}): frequencies are positive, in rad per unit time")
-    return first, last
 
 
 def _options(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[float, float]]) -> dict[str, Any]:
@@ -378,13 +275,15 @@ def _options(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[f
 
 def _branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
     context = {"system": system, "parameter": name, **options}
-    bifurcations = [replace(b, context=context) for b in trace.bifurcations]
+    bifurcations, events = (
+        [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
+    )
     return Branch(
         system,
         name,
         trace.points,
         bifurcations,
-        trace.events,
+        events,
         trace.closed,
         trace.ended,
         settings.observe,
@@ -393,4 +292,4 @@ def _branch(system: System, name: str, trace: Trace, settings: Settings, options
     )
 
 
-__all__ = ["check_range", "continue_branch", "frequency_response"]
+__all__ = ["continue_branch", "frequency_response"]

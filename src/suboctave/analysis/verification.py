@@ -86,7 +86,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         return Verification(math.inf, math.inf, None, False, None, f"shooting found no motion from here: {failure}")
     t = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
     sizes = np.repeat([np.abs(motion.displacement(t)).max(), np.abs(motion.velocity(t)).max()], system.n)
-    distance = float(np.max(np.abs(solution.state - start) / sizes))
+    # a motion at rest differs from another only if that one moves
+    distance = float(np.max(np.abs(solution.state - start) / np.maximum(sizes, np.finfo(float).tiny)))
     distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
     error = _pairing(floquet.multipliers, solution.multipliers)
 
@@ -99,7 +100,7 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
             words = f"Shooting sees multipliers cross as at {KINDS[kind]} close to omega = {solution.omega:.9g}"
         same = distance <= tolerance
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
-    if distance > tolerance:
+    if not distance <= tolerance:
         return verdict(False, f"Shooting arrives at another motion (relative distance {distance:.1e})")
     if floquet.stable != solution.stable:
         doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"

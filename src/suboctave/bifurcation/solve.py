@@ -106,6 +106,8 @@ def newton(
             raise ConvergenceError("omega left the positive axis")
         state = balance.at(x, omega, values)
         equations, addition, columns = augmentation(state, extra)
+        if not all(e.size > 0.0 for e in equations):
+            raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
         force = max(state.force_scale(), np.finfo(float).tiny)
         error = float(np.linalg.norm(residual * rows)) / force

@@ -101,7 +101,7 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
         if factor is None or previous > _SHORT or contraction > 0.1:
             factor = bordered(evaluation, row, weights)
         if factor.singular:
-            break
+            raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         rhs = np.empty(len(u))
         rhs[:-1] = evaluation.residual
         rhs[-1] = row @ (weights * (u - guess))

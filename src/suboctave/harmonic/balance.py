@@ -67,6 +67,7 @@ class HarmonicBalance:
         self.size = self.linear.size
         self.dimension = self.size * basis.size
         self.samples = samples if samples is not None else (None,) * len(system.elements)
+        self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
         self.groups = self._grouped()
         shapes = [self.linear.retain(c.direction) for c in system.load_components()]
@@ -149,7 +150,7 @@ class HarmonicBalance:
 
     def coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling]]:
         """Coefficient values of every element, and what it tells of its law at them."""
-        key = tuple(values.values())
+        key = tuple(values[name] for name in self._coefficient_names)
         if self._coefficients is None or self._coefficients[0] != key:
             numbers = [e.coefficient_values(values) for e in self.system.elements]
             kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]

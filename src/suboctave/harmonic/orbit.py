@@ -76,7 +76,7 @@ class PeriodicOrbit:
         return to_complex(self.coefficients)
 
     def displacement(self, t: Array | float) -> Array:
-        """x at the times t; shape (n,) for a number, (n, len(t)) for an array."""
+        """x at the times t; shape (n,) for a number, (n, len(t)) for an array (a `Trajectory` has time first)."""
         return self._series(t, 0)
 
     def velocity(self, t: Array | float) -> Array:

@@ -23,7 +23,6 @@ from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_c
 from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature
 from suboctave.harmonic.rates import coefficient_curvature, coefficient_rates
 from suboctave.harmonic.state import BalanceState, apply_blocks
-from suboctave.model.element import Element
 
 
 @dataclass(frozen=True)
@@ -64,9 +63,9 @@ def unbalanced_along(state: BalanceState, a: Direction) -> Array:
 def unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
     """S''[a, b], shape (2 H + 1, size)."""
     result = np.zeros_like(state.x)
-    for element, local in zip(state.balance.elements, state.local_motions, strict=True):
+    for element, local, force in zip(state.balance.elements, state.local_motions, state.element_forces, strict=True):
         d = state.linear.retain(element.direction(state.balance.system.n))
-        result += np.multiply.outer(_element_second(state, element, local, a, b, d), d)
+        result += np.multiply.outer(_element_second(state, local, force.damping, a, b, d), d)
     for first, one in a.rates.items():
         for second, two in b.rates.items():
             if one * two != 0.0:
@@ -76,9 +75,10 @@ def unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
 
 
 def _element_second(
-    state: BalanceState, element: Element, local: LocalMotion, a: Direction, b: Direction, d: Array
+    state: BalanceState, local: LocalMotion, damping: ComplexArray, a: Direction, b: Direction, d: Array
 ) -> Array:
     """F''[a, b] of one element along its own direction, shape (2 H + 1,)."""
+    element = local.element
     basis, high = state.basis, state.basis.harmonics
     ua, ub, u = a.x @ d, b.x @ d, state.x @ d
     bend = curvature(local)
@@ -91,7 +91,6 @@ def _element_second(
         v_b = local.rate * dx_b + b.omega * slope
         total = total + bend.uv * (x_a * v_b + v_a * x_b) + bend.vv * v_a * v_b
     result = spectrum_to_real(kernels.spectra(total[None, :], bend.zr, bend.zi, high).T, high)[:, 0]
-    damping = state.element_forces[state.balance.elements.index(element)].damping
     if damping.size and (a.omega or b.omega):
         result += state.toeplitz(damping) @ basis.derivative(a.omega * ub + b.omega * ua)
     rates_a = coefficient_rates(element, state.values, a.parameters)

@@ -16,9 +16,9 @@ from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.state import BalanceState
 
-#: numbers of harmonics (of omega) that adaptive selection chooses from
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
 _MOST_UNKNOWNS = 4000
+#: numbers of harmonics (of omega) that adaptive selection chooses from
 _LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
 
 

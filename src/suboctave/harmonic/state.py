@@ -168,6 +168,11 @@ class BalanceState:
             mean=False,
         )
 
+    @property
+    def linear_jacobian(self) -> Array:
+        """The part of R_X that stays without elements: A on the block diagonal."""
+        return self._with_linear(np.zeros((self.balance.dimension,) * 2), self.blocks, None, mean=True)
+
     @staticmethod
     def _with_linear(tangent: Array, blocks: ComplexArray, compliance: ComplexArray | None, mean: bool) -> Array:
         if compliance is not None:

@@ -36,10 +36,8 @@ class FloquetResult:
 
     multipliers
         Shape (2 n,), complex, by descending modulus.
-    error
-        Estimated error of the leading multiplier's modulus and of any that lie near the unit circle.
-    margin
-        Largest modulus minus one.
+    errors
+        Estimated error of each, shape (2 n,): of the steps, of the harmonics that the motion neglects, of rounding.
     """
 
     multipliers: ComplexArray

@@ -1,0 +1,127 @@
+"""What the verbs refuse before any work, with what to do instead."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.follow import Settings
+from suboctave.bifurcation import KINDS
+from suboctave.continuation import Event, NewtonOptions, SteppingOptions
+from suboctave.errors import InputError, suggest
+from suboctave.model.system import System
+
+#: DOFs up to which the stiffness is examined for motions that nothing holds
+_MOST_EXAMINED = 400
+
+
+def make_settings(
+    system: System,
+    max_step: float | None,
+    observe: int | None,
+    events: Sequence[Event],
+    newton: NewtonOptions | None,
+    stepping: SteppingOptions | None,
+) -> Settings:
+    """The options of a verb, checked; raises InputError."""
+    events = tuple(events) if isinstance(events, Iterable) and not isinstance(events, Event) else (events,)
+    for event in events:
+        if not isinstance(event, Event):
+            raise InputError(f"events must be Event objects, got {event!r}")
+    if len({e.name for e in events}) < len(events):
+        raise InputError("two events have the same name")
+    for event in events:
+        if event.name in KINDS:
+            raise InputError(f"an event cannot be called {event.name!r}: that is the name of a kind of bifurcation")
+    for name, given, kind in (("newton", newton, NewtonOptions), ("stepping", stepping, SteppingOptions)):
+        if given is not None and not isinstance(given, kind):
+            raise InputError(f"{name} must be a {kind.__name__}, not {type(given).__name__}")
+    stepping = stepping or SteppingOptions()
+    if max_step is not None:
+        if not (is_number(max_step) and max_step > 0.0):
+            raise InputError(f"max_step must be a positive number, not {max_step!r}")
+        if max_step <= stepping.min_step:
+            raise InputError(f"max_step={max_step:g} is below the smallest step that is taken, {stepping.min_step:g}")
+        stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
+    dof = system.observed_dof if observe is None else observe
+    if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
+        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
+    return Settings(newton or NewtonOptions(), stepping, events, int(dof))
+
+
+def check_system(system: System, omega: tuple[float, ...] = ()) -> None:
+    """Refuse what cannot vibrate periodically: no load (at the frequencies `omega`), or a body that nothing holds."""
+    if not isinstance(system, System):
+        raise InputError(f"the first argument must be a System, not {type(system).__name__}")
+    periodic = [c for c in system.load_components() if c.harmonic > 0]
+    if not periodic:
+        raise InputError("the system has no periodic load: add loads=[HarmonicLoad(dof=..., amplitude=...)]")
+    amplitudes = [c.amplitude.value({**system.parameters, "omega": w}) for c in periodic for w in omega]
+    if omega and not any(amplitudes):
+        names = sorted({name for c in periodic for name in c.amplitude.names} - {"omega"})
+        values = ", ".join(f"{name}={system.parameters[name]:g}" for name in names)
+        raise InputError(f"the periodic load is zero at these parameters ({values or 'a number'}): nothing moves")
+    if system.n <= _MOST_EXAMINED:
+        _check_held(system)
+
+
+def _check_held(system: System) -> None:
+    """Refuse a body that nothing holds: the mean of its motion is not determined."""
+    mass, _, stiffness = system.matrices()
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    _, sizes, vectors = np.linalg.svd(stiffness * np.multiply.outer(scale, scale))
+    free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
+    if not len(free):
+        return
+    held = np.array([e.direction(system.n) * scale for e in system.elements]).reshape(-1, system.n)
+    if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
+        shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
+        raise InputError(
+            f"the structure can move freely along ({shape}): its stiffness is singular and no element holds it, so "
+            "that the mean position is not determined. Hold it by a spring, or write it in relative displacements"
+        )
+
+
+def check_parameter(system: System, name: str) -> None:
+    """Refuse a name that is neither "omega" nor a parameter."""
+    if name != "omega" and name not in system.parameters:
+        raise InputError(f"unknown parameter {name!r}{suggest(str(name), ['omega', *system.parameters])}")
+
+
+def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
+    """Two ends at each of which the system exists (a mass that vanishes or turns negative does not)."""
+    first, last = check_range(name, bounds, positive=name == "omega")
+    if name != "omega":
+        for end in (first, last):
+            try:
+                system.with_parameters({name: end})
+            except InputError as failure:
+                raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
+    return first, last
+
+
+def is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
+
+
+def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:
+    """(from, to) as two different finite numbers.
+
+    Raises
+    ------
+    InputError
+        If they are not, or not positive where they must be.
+    """
+    try:
+        first, last = (float(b) for b in bounds)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}={bounds!r}: give two numbers, (from, to)") from None
+    if not (math.isfinite(first) and math.isfinite(last)) or first == last:
+        raise InputError(f"{name}=({first:g}, {last:g}): the range must have two different finite ends")
+    if positive and min(first, last) <= 0.0:
+        raise InputError(f"{name}=({first:g}, {last:g}): frequencies are positive, in rad per unit time")
+    return first, last
