@@ -190,3 +190,22 @@ def test_isola_is_not_met_by_a_sweep(loop):
     sweep = so.frequency_response(so.library.nltva(0.15), (0.8, 3.0))
     inside = (sweep.omega > loop.omega.min()) & (sweep.omega < loop.omega.max())
     assert sweep.amplitude[inside].max() < 0.5 * loop.amplitude.min()
+
+
+@pytest.mark.parametrize("regularization", [None, 100.0])
+def test_a_gap_is_tracked_through_zero_both_ways(regularization):
+    """A preloaded stop, an open one, and what lies between: the regularised law's force at rest has a corner there."""
+    system = so.System(
+        1.0,
+        0.05,
+        1.0,
+        elements=[so.ElasticStop(dof=0, stiffness=3.0, gap="j", side="right", regularization=regularization)],
+        loads=[so.HarmonicLoad(dof=0, amplitude=0.4)],
+        parameters={"j": 0.5},
+    )
+    down = so.continue_branch(system, "j", (0.5, -0.5), omega=1.3)
+    up = so.continue_branch(system.with_parameters(j=-0.5), "j", (-0.5, 0.5), omega=1.3)
+    assert down.parameter("j")[-1] == -0.5
+    assert up.parameter("j")[-1] == 0.5
+    assert down.amplitude[-1] == pytest.approx(up.amplitude[0], rel=1e-6)
+    assert down.amplitude[0] == pytest.approx(up.amplitude[-1], rel=1e-6)

@@ -244,8 +244,31 @@ class March:
             except ConvergenceError as error:
                 failure = error
             if step <= self.stepping.min_step:
-                raise failure
+                return self._around_corner(point, failure)
             step = max(0.5 * step, self.stepping.min_step)
+
+    def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float]:
+        """A point beyond a corner of the equations, where no tangent leads on but the parameter does.
+
+        A corner is met where a coefficient has one: a gap tracked through zero, whose force at rest begins to change.
+        Raises the failure that led here if there is no solution close by.
+        """
+        index = point.curve.parameter
+        heading = math.copysign(1.0, point.tangent[index])
+        row = np.zeros(len(point.u))
+        row[index] = 1.0
+        for share in (1e-6, 1e-5, 1e-4, 1e-3):
+            guess = point.u.copy()
+            guess[index] += heading * share / point.weights[index]
+            try:
+                solved = correct(point.curve, guess, row, point.weights, self.newton)
+                new = make_point(solved, point.curve, heading * row, point.arclength)
+            except ConvergenceError:
+                continue
+            taken = length(point.weights * (solved.u - point.u))
+            if taken <= min(100.0 * share, self.stepping.max_step):
+                return replace(new, arclength=point.arclength + taken), self.stepping.initial_step, 0.0
+        raise failure
 
     @staticmethod
     def _angle(a: CurvePoint, b: CurvePoint) -> float:
