@@ -127,7 +127,7 @@ def _movement(old: ComplexArray, new: ComplexArray) -> float:
     if not relevant.size:
         return 0.0
     nearest = np.abs(relevant[:, None] - old[None, :]).min(axis=1)
-    return float((nearest / np.maximum(1.0, np.abs(relevant))).max())
+    return float(np.max(nearest / np.maximum(1.0, np.abs(relevant))))
 
 
 def _height(old: ComplexArray, new: ComplexArray) -> float:
@@ -137,7 +137,7 @@ def _height(old: ComplexArray, new: ComplexArray) -> float:
     if not (relevant.size and before.size):
         return np.inf
     partner = before[np.abs(relevant[:, None] - before[None, :]).argmin(axis=1)]
-    return float((relevant.imag + partner.imag).min())
+    return float(np.min(relevant.imag + partner.imag))
 
 
 def _turned_back(before: ComplexArray, old: ComplexArray, new: ComplexArray, ratio: float) -> bool:

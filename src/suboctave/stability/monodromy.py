@@ -47,7 +47,7 @@ class FloquetResult:
     def error(self) -> float:
         """Largest error estimate among the multipliers that decide (modulus above one half)."""
         deciding = np.abs(self.multipliers) > 0.5
-        return float(self.errors[deciding].max()) if deciding.any() else float(self.errors.max())
+        return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
 
     @property
     def margin(self) -> float:

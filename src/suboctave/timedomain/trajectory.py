@@ -65,7 +65,7 @@ def _read(model: Field, passage: Passage, times: Array) -> tuple[Array, Array]:
     n, tau = model.n, times * model.omega
     first, last = passage.tau[0], passage.tau[-1]
     slack = 1e-12 * max(abs(first), abs(last))
-    if times.size and (tau.min() < first - slack or tau.max() > last + slack):
+    if times.size and (np.min(tau) < first - slack or np.max(tau) > last + slack):
         raise InputError(f"times must lie between {first / model.omega:.9g} and {last / model.omega:.9g}")
     if not passage.steps:
         z = np.repeat(passage.states[0][:, None], len(tau), axis=1)
@@ -163,7 +163,7 @@ def largest_displacement(model: Field, passage: Passage, dof: int) -> float:
         grid = np.linspace(step.begin, step.end, 7)
         z = step.interpolant(grid)
         speed = z[n + dof]
-        for k in np.flatnonzero(speed[:-1] * speed[1:] <= 0.0):
+        for k in np.flatnonzero(speed[:-1] * speed[1:] <= 0.0).tolist():
             drop = speed[k] - speed[k + 1]
             share = speed[k] / drop if drop != 0.0 else 0.0
             at = float(grid[k] + share * (grid[k + 1] - grid[k]))
