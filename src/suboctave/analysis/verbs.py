@@ -238,21 +238,19 @@ def _from_system(
 def _curve(
     system: System, name: str, omega: float, span: float, harmonics: Harmonics, nu: int, linear: LinearPart | None
 ) -> ResponseCurve:
-    adaptive: AdaptiveHarmonics | None
-    if isinstance(harmonics, AdaptiveHarmonics):
-        adaptive = harmonics
-    elif harmonics == "adaptive":
-        adaptive = AdaptiveHarmonics()
-    elif isinstance(harmonics, bool) or not isinstance(harmonics, (int, np.integer)) or harmonics < 1:
+    loaded = max([1] + [c.harmonic for c in system.load_components()])
+    rule = AdaptiveHarmonics() if isinstance(harmonics, str) and harmonics == "adaptive" else harmonics
+    adaptive: AdaptiveHarmonics | None = None
+    if isinstance(rule, AdaptiveHarmonics):
+        adaptive, high = rule, max(rule.minimum, loaded)
+    elif isinstance(rule, (int, np.integer)) and not isinstance(rule, bool) and rule >= 1:
+        high = int(rule)
+    else:
         raise InputError(
             f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
         )
-    else:
-        adaptive = None
     if linear is not None and not isinstance(linear, LinearPart):
         raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
-    loaded = max([1] + [c.harmonic for c in system.load_components()])
-    high = int(harmonics) if adaptive is None else max(adaptive.minimum, loaded)  # type: ignore[arg-type]
     balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
     if balance.dimension > _DENSE_UNKNOWNS:
         raise InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, overload
@@ -86,18 +87,14 @@ class Bifurcation:
 
     def critical_multiplier(self) -> complex:
         """The multiplier on the unit circle that makes the bifurcation (closest to +1, -1 or exp(i kappa T))."""
-        import cmath
-
-        target = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(self.kind)
-        if target is None and self.kind == "NS":
-            target = cmath.exp(1j * self.kappa * self.orbit.period)  # type: ignore[assignment]
         mu = self.multipliers
         if self.kind == "NS" and self.kappa == 0.0:  # only bracketed: the complex pair nearest to the circle
             pairs = mu[mu.imag > 0.0]
             return complex(min(pairs if pairs.size else mu, key=lambda m: abs(abs(m) - 1.0)))
-        if target is None:
+        targets = {"LP": 1.0, "BP": 1.0, "PD": -1.0, "NS": cmath.exp(1j * self.kappa * self.orbit.period)}
+        if self.kind not in targets:
             return complex(mu[0])
-        return complex(min(mu, key=lambda m: abs(m - target)))
+        return complex(min(mu, key=lambda m: abs(m - targets[self.kind])))
 
     def __repr__(self) -> str:
         free = (

@@ -109,7 +109,7 @@ class BranchPoint(BifurcationKind):
 
     def changed(self, a: Sample, b: Sample) -> bool:
         """See `BifurcationKind.changed`."""
-        return a.point.orientation * b.point.orientation < 0.0
+        return (a.point.orientation > 0.0) != (b.point.orientation > 0.0)
 
     def fraction(self, a: Sample, b: Sample) -> float:
         """See `BifurcationKind.fraction`."""
@@ -128,7 +128,7 @@ class PeriodDoubling(BifurcationKind):
 
     def changed(self, a: Sample, b: Sample) -> bool:
         """See `BifurcationKind.changed`."""
-        return a.half_sign * b.half_sign < 0.0
+        return (a.half_sign > 0.0) != (b.half_sign > 0.0)
 
     def fraction(self, a: Sample, b: Sample) -> float:
         """See `BifurcationKind.fraction`."""
@@ -143,10 +143,8 @@ class NeimarkSacker(BifurcationKind):
 
     def changed(self, a: Sample, b: Sample) -> bool:
         """Count of unstable multipliers changed by more than LP, BP and PD account for."""
-        real = (a.slope > 0.0) != (b.slope > 0.0)
-        real_doubling = a.half_sign * b.half_sign < 0.0
-        branch = a.point.orientation * b.point.orientation < 0.0
-        accounted = int(real != branch or (real and branch)) + int(real_doubling)
+        folded, branched = LimitPoint().changed(a, b), BranchPoint().changed(a, b)
+        accounted = int(folded or branched) + int(PeriodDoubling().changed(a, b))
         return abs(a.floquet.unstable - b.floquet.unstable) >= accounted + 2 and self._pair(a, b) is not None
 
     @staticmethod

@@ -70,21 +70,15 @@ class BalanceState:
     @cached_property
     def local_motions(self) -> list[LocalMotion]:
         """Every element's relative displacement, in the order of the system's elements."""
-        result: list[LocalMotion | None] = [None] * len(self.balance.elements)
-        coefficients, kinds = self.balance.coefficients(self.values)
-        for group in self.balance.groups:
-            motion = to_complex(self.x @ group.direction)
-            for i in group.members:
-                result[i] = LocalMotion(
-                    self.balance.elements[i],
-                    motion,
-                    self.rate,
-                    coefficients[i],
-                    self.balance.top,
-                    self.balance.samples[i],
-                    kinds[i],
-                )
-        return result  # type: ignore[return-value]
+        balance = self.balance
+        coefficients, kinds = balance.coefficients(self.values)
+        motions: dict[int, ComplexArray] = {}
+        for group in balance.groups:
+            motions |= dict.fromkeys(group.members, to_complex(self.x @ group.direction))
+        return [
+            LocalMotion(element, motions[i], self.rate, coefficients[i], balance.top, balance.samples[i], kinds[i])
+            for i, element in enumerate(balance.elements)
+        ]
 
     @cached_property
     def element_forces(self) -> list[LocalForce]:
