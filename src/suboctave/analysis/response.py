@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -15,9 +14,11 @@ from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, truncation
 from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
 
 #: motions of less than this share of the reference count as rest
 _REST = 1e-8
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,24 +34,18 @@ class ResponseEvaluation:
         """R, shape (N,)."""
         return self.state.residual
 
-    @cached_property
+    @lazy
     def jacobian(self) -> Array:
         """`[R_X, R_parameter]`, shape (N, N + 1)."""
-        jacobian = self.state.jacobian
-        out = np.empty((jacobian.shape[0], jacobian.shape[0] + 1))
-        out[:, :-1] = jacobian
-        out[:, -1] = self.state.residual_by(self.name)
-        return out
+        return self.state.extended_jacobian(self.name)
 
-    @cached_property
+    @lazy
     def error(self) -> float:
         """Residual in units of the forces that balance (or of `floor`: at rest there are none)."""
         state = self.state
-        weight = state.balance.scales()[1]
-        size = length(state.residual.reshape(state.x.shape) * weight)
-        return size / max(state.force_scale(), self.floor, np.finfo(float).tiny)
+        return state.residual_size() / max(state.force_scale(), self.floor, _TINY)
 
-    @cached_property
+    @lazy
     def truncation(self) -> float:
         """Estimated size of the neglected harmonics relative to the motion."""
         return truncation(self.state)

@@ -22,10 +22,11 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.group_force import Group, GroupLaw
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.quadrature import samples_for
-from suboctave.harmonic.state import BalanceState, Group
+from suboctave.harmonic.state import BalanceState
 from suboctave.model.element import Element
 from suboctave.model.sampling import AdaptiveSampling, Sampling
 from suboctave.model.system import System
@@ -70,11 +71,21 @@ class HarmonicBalance:
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
         self.groups = self._grouped()
+        #: the groups' directions, packed: where each begins, its DOFs, its entries there
+        self.directions = (
+            np.cumsum([0] + [len(g.dofs) for g in self.groups]),
+            np.concatenate([np.zeros(0, dtype=np.int64)] + [g.dofs for g in self.groups]),
+            np.concatenate([np.zeros(0)] + [g.values for g in self.groups]),
+        )
+        #: whether a group's force depends on velocity
+        self.moving = np.array(
+            [any(system.elements[i].depends_on_velocity for i in g.members) for g in self.groups], dtype=bool
+        )
         shapes = [self.linear.retain(c.direction) for c in system.load_components()]
         self.loads = LoadSpectrum(system, basis, shapes)
         self._load_cache: tuple[tuple, Array] | None = None
         self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
-        self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling]]] | None = None
+        self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -148,13 +159,14 @@ class HarmonicBalance:
             self._load_cache = (key, self.loads.value({**values, "omega": omega}, self.size))
         return self._load_cache[1]
 
-    def coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling]]:
-        """Coefficient values of every element, and what it tells of its law at them."""
+    def coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
+        """Coefficient values of every element, what it tells of its law at them, and that sorted by groups."""
         key = tuple(values[name] for name in self._coefficient_names)
         if self._coefficients is None or self._coefficients[0] != key:
             numbers = [e.coefficient_values(values) for e in self.system.elements]
             kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
-            self._coefficients = (key, (numbers, kinds))
+            laws = [GroupLaw.of(group, numbers, kinds) for group in self.groups]
+            self._coefficients = (key, (numbers, kinds, laws))
         return self._coefficients[1]
 
     @cached_property

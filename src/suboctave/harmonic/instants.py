@@ -183,9 +183,14 @@ def crossings(c, level, zr, zi):
     (whose parabola comes within half its own rise of it), and two extrema between two samples where the cubic through
     them slows down. Exact up to rounding.
     """
-    n = zr.shape[0]
+    return crossings_of(c, level, motion(c, zr, zi))
+
+
+@njit(cache=True)
+def crossings_of(c, level, values):
+    """`crossings`, from value and derivative of the motion (2, N) on a uniform grid that starts at tau = 0."""
+    n = values.shape[1]
     h = 2.0 * math.pi / n
-    values = motion(c, zr, zi)
     found = np.empty(4 * n)
     count = 0
     for j in range(n):

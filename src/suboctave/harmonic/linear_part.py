@@ -22,6 +22,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from suboctave.harmonic import group_kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.system import System
 
@@ -67,7 +68,9 @@ class StructuralMatrices:
         self.system = system
         self.values = dict(system.parameters if values is None else values)
         self.size = system.n
-        self._mass, self._damping, self._stiffness = system.matrices(self.values)
+        self._mass, self._damping, self._stiffness = (
+            np.ascontiguousarray(matrix, dtype=float) for matrix in system.matrices(self.values)
+        )
 
     def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
         """The same structure at other parameter values."""
@@ -108,9 +111,5 @@ class StructuralMatrices:
 
 
 def _dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, frequency: Array, order: int) -> ComplexArray:
-    om = np.asarray(frequency, float)[:, None, None]
-    if order == 0:
-        return (stiffness - om**2 * mass) + 1j * (om * damping)
-    if order == 1:
-        return -2.0 * om * mass + 1j * np.broadcast_to(damping, om.shape[:1] + damping.shape)
-    return np.broadcast_to((-2.0 * mass).astype(complex), om.shape[:1] + mass.shape)
+    blocks: ComplexArray = group_kernels.dynamic_stiffness(mass, damping, stiffness, frequency, order)
+    return blocks

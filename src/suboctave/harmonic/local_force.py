@@ -14,14 +14,13 @@ Piecewise-linear laws are integrated in closed form over the contact intervals: 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import Nodes, nodes_for, sampled_spectra, uniform_nodes
+from suboctave.harmonic.quadrature import Nodes, nodes_for, sampled_spectra, search_grid
 from suboctave.model.element import Element
 from suboctave.model.sampling import Piece, PiecewiseLinear, Sampling
 
@@ -92,7 +91,7 @@ class LocalMotion:
     def contacts(self) -> list[Contact]:
         """Contact intervals of every piece of a piecewise-linear law."""
         high = self.motion.shape[0] - 1
-        grid = uniform_nodes(1 << math.ceil(math.log2(8 * high + 8)))
+        grid = search_grid(high)
         found = []
         for piece in self.pieces or ():
             level = float(self.coefficients[piece.gap])

@@ -21,7 +21,7 @@ import numpy as np
 
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature
+from suboctave.harmonic.local_force import Curvature, coefficient_force
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.second import Direction, second_derivative
 from suboctave.harmonic.state import BalanceState, apply_blocks
@@ -125,29 +125,35 @@ def bilinear_gradient(
     rates: dict[str, complex] = dict.fromkeys(names, 0j)
     drive = np.zeros_like(v)  # T(f_x) v + T(f_v) v'
     g_kappa = 0j
-    for element, local, force in zip(state.balance.elements, state.local_motions, state.element_forces, strict=True):
-        d = linear.retain(element.direction(state.balance.system.n))
-        ue, ve = u_force @ d, v @ d
+    for (group, _, stiffness, damping), bend, motion in zip(
+        state.spectra, state.curvatures, state.motions, strict=True
+    ):
+        ue, ve = u_force @ group.direction, v @ group.direction
         rate_ve = 1j * frequency * ve
-        local_x, local_omega = _element_gradient(local, ue, ve, rate_ve, basis.nu)
-        gx += np.multiply.outer(local_x, d)
-        response = _toeplitz_apply(force.stiffness, ve)
-        if force.damping.size:
-            response = response + _toeplitz_apply(force.damping, rate_ve)
-            local_omega += _inner(ue, _toeplitz_apply(force.damping, 1j * by_omega * ve))
-            g_kappa += _inner(ue, _toeplitz_apply(force.damping, 1j * ve))
+        local_x, local_omega = _group_gradient(bend, motion, state.rate, ue, ve, rate_ve, basis.nu)
+        gx += np.multiply.outer(local_x, group.direction)
+        if damping.size:
+            local_omega += _inner(ue, _toeplitz_apply(damping, 1j * by_omega * ve))
+            g_kappa += _inner(ue, _toeplitz_apply(damping, 1j * ve))
         if compliance is not None:
-            drive += np.multiply.outer(response, d)
-        for name in names:
-            if name == "omega":
-                rates[name] += local_omega
-                continue
+            response = _toeplitz_apply(stiffness, ve)
+            if damping.size:
+                response = response + _toeplitz_apply(damping, rate_ve)
+            drive += np.multiply.outer(response, group.direction)
+        if "omega" in rates:
+            rates["omega"] += local_omega
+    for name in names:
+        if name == "omega":
+            continue
+        for element, local in zip(state.balance.elements, state.local_motions, strict=True):
             change = coefficient_rates(element, state.values, {name: 1.0})
             if change.any():
+                d = linear.retain(element.direction(state.balance.system.n))
+                ue, ve = u_force @ d, v @ d
                 c = coefficient_force(local)
                 rates[name] += _inner(ue, _toeplitz_apply(change @ c.stiffness, ve))
                 if c.damping is not None:
-                    rates[name] += _inner(ue, _toeplitz_apply(change @ c.damping, rate_ve))
+                    rates[name] += _inner(ue, _toeplitz_apply(change @ c.damping, 1j * frequency * ve))
     g_kappa += _form(u, slope, v)
     compliance_slope = linear.compliance(frequency, 1)
     if compliance_slope is not None:
@@ -188,14 +194,19 @@ def _toeplitz_apply(spectrum: ComplexArray, waves: ComplexArray) -> ComplexArray
     return full[centre : centre + len(waves)]
 
 
-def _element_gradient(
-    local: LocalMotion, left: ComplexArray, right: ComplexArray, right_rate: ComplexArray, nu: int
+def _group_gradient(
+    bend: Curvature,
+    motion: ComplexArray,
+    rate: float,
+    left: ComplexArray,
+    right: ComplexArray,
+    right_rate: ComplexArray,
+    nu: int,
 ) -> tuple[ComplexArray, complex]:
-    """Gradient of `int conj(left) (f_u right + f_v right') / (2 pi)` by the element's real coefficients and by omega
-    through v.
+    """Gradient of `int conj(left) (f_u right + f_v right') / (2 pi)` by the real coefficients along a direction and by
+    omega through v.
     """
-    bend = curvature(local)
-    high = local.motion.shape[0] - 1
+    high = motion.shape[0] - 1
     if bend.zr.size == 0:
         return np.zeros(2 * high + 1, dtype=complex), 0.0 + 0.0j
     # the common factor exp(i f_0 tau) of all waves cancels in conj(left) * right
@@ -213,10 +224,10 @@ def _element_gradient(
     by_omega = 0.0 + 0.0j
     if by_v is not None:
         p = _projection(s[2]) + 1j * _projection(s[3])
-        k = np.arange(1, high + 1) * local.rate
+        k = np.arange(1, high + 1) * rate
         result[1::2] -= k * p[2::2]
         result[2::2] += k * p[1::2]
-        slope = kernels.motion(local.motion, bend.zr, bend.zi)[1] / nu
+        slope = kernels.motion(motion, bend.zr, bend.zi)[1] / nu
         by_omega = complex((by_v * slope).sum() / (2.0 * np.pi))
     return result, by_omega
 
@@ -252,26 +263,28 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
         pulled = apply_blocks(slope.conj().transpose(0, 2, 1), shaped)
         gx += (state.force_jacobian.T @ pulled.ravel()).reshape(gx.shape)
     u_force = shaped if state.compliance is None else apply_blocks(state.compliance.conj().transpose(0, 2, 1), shaped)
-    for element, local, force in zip(state.balance.elements, state.local_motions, state.element_forces, strict=True):
-        d = linear.retain(element.direction(state.balance.system.n))
-        ue = u_force @ d
-        if name == "omega":
-            if force.damping.size == 0:
+    if name == "omega":
+        for (group, _, _, damping), bend, motion in zip(state.spectra, state.curvatures, state.motions, strict=True):
+            if damping.size == 0:
                 continue
+            ue = u_force @ group.direction
             waves, _ = _as_waves(ue, Kind.INTEGER, 1, left=True)
             # S_omega = T(f_v) D X: its tangent by X through f_v, and T(f_v) D itself
-            slope_x, _ = _as_waves(basis.derivative(state.x @ d), Kind.INTEGER, 1, left=False)
-            part = _velocity_gradient(local, waves[:, 0], slope_x[:, 0])
-            direct = -basis.derivative(_transposed(force.damping, ue, basis.harmonics))
-            gx += np.multiply.outer(part + direct, d)
-            continue
-        change = coefficient_rates(element, state.values, {name: 1.0})
-        if change.any():
-            c = coefficient_force(local)
-            part = _transposed(change @ c.stiffness, ue, basis.harmonics)
-            if c.damping is not None:
-                part = part - state.omega * basis.derivative(_transposed(change @ c.damping, ue, basis.harmonics))
-            gx += np.multiply.outer(part, d)
+            slope_x, _ = _as_waves(basis.derivative(state.x @ group.direction), Kind.INTEGER, 1, left=False)
+            part = _velocity_gradient(bend, motion, state.rate, waves[:, 0], slope_x[:, 0])
+            direct = -basis.derivative(_transposed(damping, ue, basis.harmonics))
+            gx += np.multiply.outer(part + direct, group.direction)
+    else:
+        for element, local in zip(state.balance.elements, state.local_motions, strict=True):
+            change = coefficient_rates(element, state.values, {name: 1.0})
+            if change.any():
+                d = linear.retain(element.direction(state.balance.system.n))
+                ue = u_force @ d
+                c = coefficient_force(local)
+                part = _transposed(change @ c.stiffness, ue, basis.harmonics)
+                if c.damping is not None:
+                    part = part - state.omega * basis.derivative(_transposed(change @ c.damping, ue, basis.harmonics))
+                gx += np.multiply.outer(part, d)
     zero = np.zeros_like(state.x)
     rates = {
         other: complex(left @ second_derivative(state, Direction(zero, {name: 1.0}), Direction(zero, {other: 1.0})))
@@ -286,10 +299,13 @@ def _transposed(spectrum: ComplexArray, left: Array, harmonics: int) -> Array:
     return kernels.galerkin(spectrum, np.zeros(0, dtype=complex), 0.0, doubled, doubled, True, True).T @ left
 
 
-def _velocity_gradient(local: LocalMotion, left: ComplexArray, slope: ComplexArray) -> Array:
-    """Gradient of `int conj(left) f_v slope / (2 pi)` by the element's real coefficients, left and slope fixed."""
-    bend = curvature(local)
-    high = local.motion.shape[0] - 1
+def _velocity_gradient(
+    bend: Curvature, motion: ComplexArray, rate: float, left: ComplexArray, slope: ComplexArray
+) -> Array:
+    """Gradient of `int conj(left) f_v slope / (2 pi)` by the real coefficients along a direction, left and slope
+    fixed.
+    """
+    high = motion.shape[0] - 1
     if bend.uv is None or bend.vv is None or bend.zr.size == 0:
         return np.zeros(2 * high + 1)
     waves = kernels.polynomial(np.stack((left, slope)), bend.zr, bend.zi)
@@ -297,7 +313,7 @@ def _velocity_gradient(local: LocalMotion, left: ComplexArray, slope: ComplexArr
     s = kernels.spectra(np.stack((product * bend.uv, product * bend.vv)), bend.zr, bend.zi, high)
     result = _projection(s[0])
     p = _projection(s[1])
-    k = np.arange(1, high + 1) * local.rate
+    k = np.arange(1, high + 1) * rate
     result[1::2] -= k * p[2::2]
     result[2::2] += k * p[1::2]
     return result

@@ -3,9 +3,9 @@
 Three rules, all of which converge faster than any power of the number of nodes for the laws they are meant for:
 
 - uniform (the trapezoidal rule), exact for laws that are polynomials in displacement and velocity;
-- composite Gauss-Legendre panels that grade themselves towards the instants at which a sharp law (a regularised
-  contact) is passed, so that no sampling error is left: sampling a sharp law uniformly bends the response curve into
-  false folds;
+- Gauss-Legendre rules on pieces that are mapped away from the complex instants at which a sharp law (a regularised
+  contact) is singular, so that no sampling error is left: sampling a sharp law uniformly bends the response curve
+  into false folds;
 - uniform with a number of samples that is doubled until force and tangent stop moving, for laws that tell nothing.
 
 The nodes follow the motion at each evaluation. That does no harm because the rule is accurate to rounding before and
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import instants, kernels
+from suboctave.harmonic import sharp_nodes as graded
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.element import Element
 from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, Sampling, SharpSampling
@@ -32,7 +33,7 @@ from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, Sampl
 _ORDER = 12
 _RATIO = 1.4
 _DEPTH = 40
-_FEWEST, _MOST = 32, 1 << 15
+FEWEST, _MOST = 32, 1 << 15
 #: relative change of force and tangent coefficients below which adaptive sampling is content
 _SETTLED = 1e-11
 
@@ -75,12 +76,12 @@ def sharp_nodes(
     """z (real, imaginary part) and weights of composite Gauss-Legendre panels graded towards the passages of a sharp
     law.
     """
-    points, widths = _arrays(kind)
+    points, widths = singularities(kind)
     return instants.sharp_nodes(motion, points, widths, *panel_tables(panels, order), ratio)
 
 
 @lru_cache(maxsize=256)
-def _arrays(kind: SharpSampling) -> tuple[Array, Array]:
+def singularities(kind: SharpSampling) -> tuple[Array, Array]:
     return np.asarray(kind.points, float), np.asarray(kind.widths, float)
 
 
@@ -101,15 +102,31 @@ def nodes_for(kind: Sampling, motion: ComplexArray, top: int, samples: int | Non
     high = motion.shape[0] - 1
     if isinstance(kind, PolynomialSampling):
         # a force of degree d has harmonics up to d H; none of them may alias onto those up to `top`
-        return uniform_nodes(_even(kind.degree * high + top + 1))
+        return uniform_nodes(even(kind.degree * high + top + 1))
     if isinstance(kind, SharpSampling):
-        # harmonics up to top + H on a panel of half-length h: the error (e (top + H) h / 4 order)^(2 order) is 1e-10
-        panels = max(4, math.ceil(math.pi * math.e * (top + high) / (0.383 * 4.0 * _ORDER)))
-        return Nodes(*sharp_nodes(motion, kind, panels, _ORDER, _RATIO))
-    return uniform_nodes(samples or _FEWEST)
+        return graded_nodes(motion, *singularities(kind), top)
+    return uniform_nodes(samples or FEWEST)
 
 
-def _even(count: int) -> int:
+def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -> Nodes:
+    """Nodes for laws that are singular at u = points +- i widths: see `sharp_nodes`."""
+    high = motion.shape[0] - 1
+    grid = search_grid(high)
+    return Nodes(*graded.sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables()))
+
+
+def search_grid(high: int) -> Nodes:
+    """Equidistant instants, close enough for searches along a motion of harmonics up to `high`."""
+    return uniform_nodes(1 << math.ceil(math.log2(8 * high + 8)))
+
+
+@lru_cache(maxsize=1)
+def rule_tables() -> tuple[Array, Array]:
+    """Gauss-Legendre rules of all orders: see `sharp_nodes.tables`."""
+    return graded.tables()
+
+
+def even(count: int) -> int:
     """A number of samples, at least `count`, of a few fixed sizes so that tables are shared."""
     return 8 * math.ceil(count / 8)
 
@@ -126,7 +143,7 @@ def samples_for(element: Element, motion: ComplexArray, rate: float, coefficient
     """
     if not isinstance(element.sampling(coefficients), AdaptiveSampling):
         return None
-    count = max(_FEWEST, 1 << math.ceil(math.log2(2 * top + 2)))
+    count = max(FEWEST, 1 << math.ceil(math.log2(2 * top + 2)))
     previous: tuple[NDArray[np.complex128], ...] | None = None
     while count <= _MOST:
         nodes = uniform_nodes(count)

@@ -20,7 +20,7 @@ import numpy as np
 
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
-from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature
+from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
 from suboctave.harmonic.rates import coefficient_curvature, coefficient_rates
 from suboctave.harmonic.state import BalanceState, apply_blocks
 
@@ -63,9 +63,14 @@ def unbalanced_along(state: BalanceState, a: Direction) -> Array:
 def unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
     """S''[a, b], shape (2 H + 1, size)."""
     result = np.zeros_like(state.x)
-    for element, local, force in zip(state.balance.elements, state.local_motions, state.element_forces, strict=True):
-        d = state.linear.retain(element.direction(state.balance.system.n))
-        result += np.multiply.outer(_element_second(state, local, force.damping, a, b, d), d)
+    for (group, _, _, damping), bend, motion in zip(state.spectra, state.curvatures, state.motions, strict=True):
+        result += np.multiply.outer(_group_second(state, group.direction, damping, bend, motion, a, b), group.direction)
+    for element, local in zip(state.balance.elements, state.local_motions, strict=True):
+        rates_a = coefficient_rates(element, state.values, a.parameters)
+        rates_b = coefficient_rates(element, state.values, b.parameters)
+        if rates_a.any() or rates_b.any():
+            d = state.linear.retain(element.direction(state.balance.system.n))
+            result += np.multiply.outer(_coefficient_second(state, local, a, b, rates_a, rates_b, d), d)
     for first, one in a.rates.items():
         for second, two in b.rates.items():
             if one * two != 0.0:
@@ -74,40 +79,51 @@ def unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
     return result
 
 
-def _element_second(
-    state: BalanceState, local: LocalMotion, damping: ComplexArray, a: Direction, b: Direction, d: Array
+def _group_second(
+    state: BalanceState,
+    d: Array,
+    damping: ComplexArray,
+    bend: Curvature,
+    motion: ComplexArray,
+    a: Direction,
+    b: Direction,
 ) -> Array:
-    """F''[a, b] of one element along its own direction, shape (2 H + 1,)."""
-    element = local.element
+    """F''[a, b] of the elements along a direction at fixed coefficients, shape (2 H + 1,)."""
     basis, high = state.basis, state.basis.harmonics
-    ua, ub, u = a.x @ d, b.x @ d, state.x @ d
-    bend = curvature(local)
+    ua, ub = a.x @ d, b.x @ d
     x_a, dx_a = kernels.motion(to_complex(ua), bend.zr, bend.zi)
     x_b, dx_b = kernels.motion(to_complex(ub), bend.zr, bend.zi)
     total = bend.uu * x_a * x_b
     if bend.uv is not None and bend.vv is not None:
-        slope = kernels.motion(local.motion, bend.zr, bend.zi)[1] / basis.nu
-        v_a = local.rate * dx_a + a.omega * slope
-        v_b = local.rate * dx_b + b.omega * slope
+        slope = kernels.motion(motion, bend.zr, bend.zi)[1] / basis.nu
+        v_a = state.rate * dx_a + a.omega * slope
+        v_b = state.rate * dx_b + b.omega * slope
         total = total + bend.uv * (x_a * v_b + v_a * x_b) + bend.vv * v_a * v_b
     result = spectrum_to_real(kernels.spectra(total[None, :], bend.zr, bend.zi, high).T, high)[:, 0]
     if damping.size and (a.omega or b.omega):
         result += state.toeplitz(damping) @ basis.derivative(a.omega * ub + b.omega * ua)
-    rates_a = coefficient_rates(element, state.values, a.parameters)
-    rates_b = coefficient_rates(element, state.values, b.parameters)
-    if rates_a.any() or rates_b.any():
-        by = coefficient_force(local)
-        for rates, other, omega in ((rates_a, ub, b.omega), (rates_b, ua, a.omega)):
-            if not rates.any():
-                continue
-            result += state.toeplitz(rates @ by.stiffness) @ other
-            if by.damping is not None:
-                change = local.rate * basis.nu * basis.derivative(other) + omega * basis.derivative(u)
-                result += state.toeplitz(rates @ by.damping) @ change
-        spectrum = np.einsum("i,j,ijq->q", rates_a, rates_b, by.curvature)
-        spectrum = spectrum + coefficient_curvature(element, state.values, a.parameters, b.parameters) @ by.force
-        result += spectrum_to_real(spectrum[:, None], high)[:, 0]
     return result
+
+
+def _coefficient_second(
+    state: BalanceState, local: LocalMotion, a: Direction, b: Direction, rates_a: Array, rates_b: Array, d: Array
+) -> Array:
+    """What changes of an element's coefficients add to F''[a, b], along its direction, shape (2 H + 1,)."""
+    basis, high = state.basis, state.basis.harmonics
+    u, ua, ub = state.x @ d, a.x @ d, b.x @ d
+    by = coefficient_force(local)
+    result = np.zeros(basis.size)
+    for rates, other, omega in ((rates_a, ub, b.omega), (rates_b, ua, a.omega)):
+        if not rates.any():
+            continue
+        result += state.toeplitz(rates @ by.stiffness) @ other
+        if by.damping is not None:
+            change = local.rate * basis.nu * basis.derivative(other) + omega * basis.derivative(u)
+            result += state.toeplitz(rates @ by.damping) @ change
+    spectrum = np.einsum("i,j,ijq->q", rates_a, rates_b, by.curvature)
+    element = local.element
+    spectrum = spectrum + coefficient_curvature(element, state.values, a.parameters, b.parameters) @ by.force
+    return result + spectrum_to_real(spectrum[:, None], high)[:, 0]
 
 
 def _linear_change(state: BalanceState, a: Direction, compliance: bool) -> ComplexArray | None:

@@ -9,33 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import kernels
-from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+from suboctave.harmonic import group_kernels, kernels
+from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real
+from suboctave.harmonic.group_force import Group, add_spectra, curvature_of
 from suboctave.harmonic.linear_part import LinearPart
-from suboctave.harmonic.local_force import LocalForce, LocalMotion, coefficient_force, local_force
+from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
+from suboctave.harmonic.quadrature import uniform_nodes
 from suboctave.harmonic.rates import coefficient_rates
+from suboctave.lazy import lazy
 
 if TYPE_CHECKING:
     from suboctave.harmonic.balance import HarmonicBalance
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
-
-
-@dataclass(frozen=True)
-class Group:
-    """Elements that act along the same direction: they share displacement, projection and Galerkin matrix."""
-
-    direction: Array
-    dofs: np.ndarray
-    values: Array
-    members: tuple[int, ...]
 
 
 class BalanceState:
@@ -52,106 +43,149 @@ class BalanceState:
         self.values = values
         self.rate = omega / balance.basis.nu
 
-    @cached_property
+    @lazy
     def frequencies(self) -> Array:
         """Circular frequencies of the harmonics, shape (H + 1,)."""
         return self.basis.multiples * self.omega
 
-    @cached_property
+    @lazy
     def blocks(self) -> ComplexArray:
         """A at the harmonics, shape (H + 1, size, size)."""
         return self.linear.stiffness(self.frequencies)
 
-    @cached_property
+    @lazy
     def compliance(self) -> ComplexArray | None:
         """B at the harmonics, None for the identity."""
         return self.linear.compliance(self.frequencies)
 
-    @cached_property
+    @lazy
+    def motions(self) -> list[ComplexArray]:
+        """Complex coefficients (H + 1,) of the displacement along each group's direction."""
+        return [group_kernels.local_amplitudes(self.x, g.dofs, g.values) for g in self.balance.groups]
+
+    @lazy
     def local_motions(self) -> list[LocalMotion]:
         """Every element's relative displacement, in the order of the system's elements."""
         balance = self.balance
-        coefficients, kinds = balance.coefficients(self.values)
+        coefficients, kinds, _ = balance.coefficients(self.values)
         motions: dict[int, ComplexArray] = {}
-        for group in balance.groups:
-            motions |= dict.fromkeys(group.members, to_complex(self.x @ group.direction))
+        for group, motion in zip(balance.groups, self.motions, strict=True):
+            motions |= dict.fromkeys(group.members, motion)
         return [
             LocalMotion(element, motions[i], self.rate, coefficients[i], balance.top, balance.samples[i], kinds[i])
             for i, element in enumerate(balance.elements)
         ]
 
-    @cached_property
-    def element_forces(self) -> list[LocalForce]:
-        """Force and tangent spectra of every element."""
-        forces = [local_force(local) for local in self.local_motions]
-        for element, force in zip(self.balance.elements, forces, strict=True):
-            if not np.isfinite(force.force).all() or not np.isfinite(force.stiffness).all():
+    @lazy
+    def curvatures(self) -> list[Curvature]:
+        """Second derivatives of every group's force, as weights at instants."""
+        balance = self.balance
+        laws = balance.coefficients(self.values)[2]
+        return [
+            curvature_of(law, balance.elements, balance.samples, motion, self.rate, balance.top)
+            for law, motion in zip(laws, self.motions, strict=True)
+        ]
+
+    @lazy
+    def spectra_table(self) -> ComplexArray:
+        """Fourier coefficients 0 .. top of force, stiffness, damping along each group's direction, (3, G, top + 1)."""
+        balance = self.balance
+        table = np.zeros((3, len(balance.groups), balance.top + 1), dtype=complex)
+        laws = balance.coefficients(self.values)[2]
+        for g, (law, motion) in enumerate(zip(laws, self.motions, strict=True)):
+            add_spectra(
+                law, balance.elements, balance.samples, motion, self.rate, (table[0, g], table[1, g], table[2, g])
+            )
+        # a number that is not finite at any instant is in all coefficients
+        if not np.isfinite(table[:, :, 0]).all():
+            self._refuse()
+        return table
+
+    def _refuse(self) -> None:
+        for local in self.local_motions:
+            nodes = uniform_nodes(64) if local.pieces is not None else local.nodes()
+            u, du = kernels.motion(local.motion, nodes.zr, nodes.zi)
+            parts = local.element.tangent(u, self.rate * du, local.coefficients)
+            if not all(np.isfinite(part).all() for part in parts if part is not None):
                 raise ConvergenceError(
-                    f"{element.label} returned a force that is not finite at omega = {self.omega:.6g} "
+                    f"{local.element.label} returned a force that is not finite at omega = {self.omega:.6g} "
                     f"(largest coefficient of the motion {np.abs(self.x).max():.3g})"
                 )
-        return forces
+        raise ConvergenceError(f"the element forces are not finite at omega = {self.omega:.6g}")
 
-    @cached_property
+    @lazy
     def spectra(self) -> list[tuple[Group, ComplexArray, ComplexArray, ComplexArray]]:
         """Per direction: group, Fourier coefficients of force, stiffness, damping (empty if none)."""
-        result = []
-        for group in self.balance.groups:
-            parts = [self.element_forces[i] for i in group.members]
-            force, stiffness = parts[0].force, parts[0].stiffness
-            for part in parts[1:]:
-                force, stiffness = force + part.force, stiffness + part.stiffness
-            damping = [p.damping for p in parts if p.damping.size]
-            result.append((group, force, stiffness, np.sum(damping, axis=0) if damping else _NO_SPECTRUM))
-        return result
+        table, moving = self.spectra_table, self.balance.moving
+        return [
+            (group, table[0, g], table[1, g], table[2, g] if moving[g] else _NO_SPECTRUM)
+            for g, group in enumerate(self.balance.groups)
+        ]
 
-    @cached_property
+    @lazy
+    def _parts(self) -> tuple[Array, Array, Array, Array]:
+        """A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P with residual weights."""
+        balance = self.balance
+        parts: tuple[Array, Array, Array, Array] = group_kernels.balance_residual(
+            self.x,
+            self.blocks,
+            self.spectra_table[0],
+            balance.load(self.values, self.omega),
+            *balance.directions,
+            balance.scales()[1],
+        )
+        return parts
+
+    @property
     def force(self) -> Array:
         """Element forces F, shape (2 H + 1, size)."""
-        result = np.zeros_like(self.x)
-        for group, force, _, _ in self.spectra:
-            result += np.multiply.outer(spectrum_to_real(force, self.basis.harmonics), group.direction)
-        return result
+        return self._parts[1]
 
-    @cached_property
+    @lazy
     def unbalanced(self) -> Array:
         """S = F - P, shape (2 H + 1, size)."""
         return self.force - self.balance.load(self.values, self.omega)
 
-    @cached_property
-    def _linear_term(self) -> Array:
-        """A X, shape (2 H + 1, size)."""
-        return apply_blocks(self.blocks, self.x)
-
-    @cached_property
+    @lazy
     def residual(self) -> Array:
         """R, shape (dimension,)."""
-        b = self.unbalanced if self.compliance is None else apply_blocks(self.compliance, self.unbalanced)
-        return (self._linear_term + b).ravel()
+        if self.compliance is None:
+            return self._parts[2].ravel()
+        return (self._parts[0] + apply_blocks(self.compliance, self.unbalanced)).ravel()
 
-    @cached_property
+    @lazy
     def force_jacobian(self) -> Array:
         """dF/dX, shape (dimension, dimension)."""
         return self._tangent_matrix(mean=True)
 
-    def _tangent_matrix(self, mean: bool) -> Array:
-        """Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis."""
-        size = self.balance.size
-        harmonics = self.basis.harmonics
-        count = 2 * harmonics + (1 if mean else 2)
-        out = np.zeros((count * size, count * size))
-        doubled = 2 * np.arange(harmonics + 1) + (0 if mean else 1)
-        for group, _, stiffness, damping in self.spectra:
-            matrix = kernels.galerkin(stiffness, damping, self.rate, doubled, doubled, mean, mean)
-            kernels.add_element(out, matrix, group.dofs, group.values, group.dofs, group.values, size)
+    def _tangent_matrix(self, mean: bool, columns: int = 0) -> Array:
+        """Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis, and further columns of
+        zeros.
+        """
+        balance, table = self.balance, self.spectra_table
+        rows = balance.size * (2 * self.basis.harmonics + (1 if mean else 2))
+        out = np.zeros((rows, rows + columns))
+        group_kernels.tangent_matrix(
+            out, table[1], table[2], balance.moving, self.rate, mean, *balance.directions, balance.size
+        )
         return out
 
-    @cached_property
+    @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
-        return self._with_linear(self.force_jacobian.copy(), self.blocks, self.compliance, mean=True)
+        return self._with_linear(self._tangent_matrix(mean=True), self.blocks, self.compliance, mean=True)
 
-    @cached_property
+    def extended_jacobian(self, name: str) -> Array:
+        """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
+        if self.compliance is None:
+            out = self._tangent_matrix(mean=True, columns=1)
+            kernels.add_linear(out, self.blocks, True)
+        else:
+            out = np.column_stack((self.jacobian, np.zeros(self.balance.dimension)))
+        out[:, -1] = self.residual_by(name)
+        return out
+
+    @lazy
     def half_jacobian(self) -> Array:
         """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
         frequencies = self.basis.half_multiples * self.omega
@@ -173,7 +207,7 @@ class BalanceState:
             expanded = np.zeros_like(tangent)
             kernels.add_linear(expanded, compliance, mean)
             tangent = expanded @ tangent
-        kernels.add_linear(tangent, np.ascontiguousarray(blocks), mean)
+        kernels.add_linear(tangent, blocks, mean)
         return tangent
 
     def residual_by(self, name: str) -> Array:
@@ -235,7 +269,7 @@ class BalanceState:
         doubled = 2 * np.arange(self.basis.harmonics + 1)
         return kernels.galerkin(spectrum, _NO_SPECTRUM, 0.0, doubled, doubled, True, True)
 
-    @cached_property
+    @lazy
     def neglected(self) -> ComplexArray:
         """Amplitudes of the harmonics H + 1 .. 2 H + 1 that the force on the motion would excite, shape (H + 1, size).
 
@@ -254,7 +288,7 @@ class BalanceState:
         motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
         return -motion.astype(complex, copy=False)
 
-    @cached_property
+    @lazy
     def completed(self) -> BalanceState:
         """The motion together with the harmonics it neglects, in the basis of 2 H + 1 harmonics.
 
@@ -268,23 +302,29 @@ class BalanceState:
 
     def force_scale(self) -> float:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
+        sizes = self._parts[3]
+        if self.compliance is None:
+            return float(sizes[1] + sizes[2] + sizes[3])
         weight = self.balance.scales()[1]
-        parts = (self._linear_term, self.force, self.balance.load(self.values, self.omega))
-        if self.compliance is not None:
-            parts = (
-                self._linear_term,
-                apply_blocks(self.compliance, self.force),
-                apply_blocks(self.compliance, parts[2]),
-            )
-        return sum(math.sqrt(np.vdot(q, q)) for q in (p * weight for p in parts))
+        load = self.balance.load(self.values, self.omega)
+        return float(sizes[1]) + sum(
+            length(apply_blocks(self.compliance, part) * weight) for part in (self.force, load)
+        )
+
+    def residual_size(self) -> float:
+        """Size of R with residual weights."""
+        if self.compliance is None:
+            return float(self._parts[3][0])
+        return length(self.residual.reshape(self.x.shape) * self.balance.scales()[1])
+
+
+def length(vector: Array) -> float:
+    """Euclidean norm of all entries."""
+    flat = vector.ravel()
+    return math.sqrt(flat.dot(flat))
 
 
 def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
     """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
-    c = to_complex(x)
-    y = np.matmul(blocks, c[:, :, None])[:, :, 0] if blocks.shape[1] > 1 else blocks[:, :, 0] * c
-    result = np.empty_like(x)
-    result[0] = y[0].real
-    result[1::2] = y[1:].real
-    result[2::2] = -y[1:].imag
+    result: Array = group_kernels.apply_blocks(np.ascontiguousarray(blocks, dtype=complex), np.ascontiguousarray(x))
     return result

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
 from suboctave.model.element import Array, Element
-from suboctave.model.sampling import PiecewiseLinear, SharpSampling
+from suboctave.model.sampling import PiecewiseLinear, PolynomialSampling, SharpSampling
 
 __all__ = ["DerivativeReport", "check_derivatives"]
 
@@ -216,11 +216,14 @@ class _Check:
 
     def _pieces(self, tangent: Any) -> None:
         sampling = self.element.sampling(self.c)
+        size = float(np.max(np.abs(tangent[0]))) or 1.0
+        if isinstance(sampling, PolynomialSampling) and sampling.coefficients is not None:
+            told = np.polynomial.polynomial.polyval(self.u, sampling.coefficients)
+            self.errors["polynomial told"] = float(np.max(np.abs(told - tangent[0]))) / size
         if not isinstance(sampling, PiecewiseLinear):
             return
         total = np.zeros_like(self.u)
         for piece in sampling.pieces:
             distance = self.u - self.c[piece.gap]
             total += self.c[piece.stiffness] * distance * (piece.side * distance > 0.0)
-        size = float(np.max(np.abs(tangent[0]))) or 1.0
         self.errors["sum of pieces"] = float(np.max(np.abs(total - tangent[0]))) / size

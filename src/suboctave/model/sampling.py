@@ -5,14 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from suboctave.errors import InputError
+
 __all__ = ["AdaptiveSampling", "Piece", "PiecewiseLinear", "PolynomialSampling", "Sampling", "SharpSampling"]
 
 
 @dataclass(frozen=True)
 class PolynomialSampling:
-    """A polynomial in `(u, v)` of this total degree: a uniform grid of enough samples integrates it exactly."""
+    """A polynomial in `(u, v)` of this total degree: a uniform grid of enough samples integrates it exactly.
+
+    A polynomial in u alone may tell its coefficients too, those of u^0, u^1, ..., u^degree (unit of the p-th: force /
+    length^p): it is then evaluated without asking the element.
+    """
 
     degree: int
+    coefficients: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.coefficients is not None and len(self.coefficients) != self.degree + 1:
+            raise InputError(
+                f"a polynomial of degree {self.degree} has {self.degree + 1} coefficients, not {len(self.coefficients)}"
+            )
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,11 @@ class PolynomialSpring(Element):
         super().__init__(dof, factors, direction=direction)
 
     def sampling(self, c: Array) -> PolynomialSampling:
-        """Exact on a uniform grid."""
-        return PolynomialSampling(max(self.powers))
+        """A polynomial in u alone."""
+        factors = [0.0] * (max(self.powers) + 1)
+        for power, factor in zip(self.powers, c, strict=True):
+            factors[power] = float(factor)
+        return PolynomialSampling(max(self.powers), tuple(factors))
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.tangent`."""

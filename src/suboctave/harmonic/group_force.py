@@ -1,0 +1,226 @@
+"""The force of all elements that act along one direction, on a motion: one displacement, one set of spectra.
+
+Piecewise-linear and polynomial laws are summed in closed form in one compiled call; sharp laws share one set of graded
+nodes, other laws one uniform grid, so that the motion is evaluated once however many elements there are.
+`local_force` has the same for a single element, and the derivatives that only located bifurcations need.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.harmonic import group_kernels, kernels
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.local_force import Curvature
+from suboctave.harmonic.quadrature import FEWEST, Nodes, even, graded_nodes, search_grid, singularities, uniform_nodes
+from suboctave.model.element import Element
+from suboctave.model.sampling import (
+    PiecewiseLinear,
+    PolynomialSampling,
+    Sampling,
+    SharpSampling,
+)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Elements that act along the same direction: they share displacement, projection and Galerkin matrix."""
+
+    direction: Array
+    dofs: np.ndarray
+    values: Array
+    members: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GroupLaw:
+    """What a group's elements tell of their laws at given coefficients, sorted by how it is integrated.
+
+    pieces
+        Stiffness, gap, side of all piecewise-linear pieces, (P, 3).
+    polynomial
+        Coefficients of u^0, u^1, ... of all polynomials in u, added up.
+    sharp, uniform
+        Elements (index, coefficients) that are sampled on graded and on uniform nodes.
+    points, widths
+        Where the sharp ones are singular.
+    degree, blind
+        Highest degree of polynomials that need samples, and whether an element tells nothing.
+    """
+
+    pieces: Array
+    polynomial: Array
+    sharp: tuple[tuple[int, Array], ...]
+    uniform: tuple[tuple[int, Array], ...]
+    points: Array
+    widths: Array
+    degree: int
+
+    @classmethod
+    def of(cls, group: Group, numbers: list[Array], kinds: list[Sampling]) -> GroupLaw:
+        """Sort the laws of a group's members."""
+        pieces: list[tuple[float, float, float]] = []
+        polynomials: list[tuple[float, ...]] = []
+        sharp, uniform = [], []
+        points: list[Array] = []
+        widths: list[Array] = []
+        degree = 0
+        for i in group.members:
+            kind, c = kinds[i], numbers[i]
+            if isinstance(kind, PiecewiseLinear):
+                pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
+            elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
+                polynomials.append(kind.coefficients)
+            elif isinstance(kind, SharpSampling):
+                sharp.append((i, c))
+                where = singularities(kind)
+                points.append(where[0])
+                widths.append(where[1])
+            else:
+                uniform.append((i, c))
+                if isinstance(kind, PolynomialSampling):
+                    degree = max(degree, kind.degree)
+        total = np.zeros(max((len(p) for p in polynomials), default=0))
+        for p in polynomials:
+            total[: len(p)] += p
+        none = np.zeros(0)
+        return cls(
+            np.array(pieces, dtype=float).reshape(-1, 3),
+            total,
+            tuple(sharp),
+            tuple(uniform),
+            np.concatenate(points) if points else none,
+            np.concatenate(widths) if widths else none,
+            degree,
+        )
+
+
+def add_spectra(
+    law: GroupLaw,
+    elements: tuple[Element, ...],
+    samples: tuple[int | None, ...],
+    motion: ComplexArray,
+    rate: float,
+    out: tuple[ComplexArray, ComplexArray, ComplexArray],
+) -> None:
+    """Add the Fourier coefficients of a group's force, stiffness and damping, (top + 1,) each, to `out`.
+
+    Parameters
+    ----------
+    elements, samples
+        The system's, with their frozen sample counts.
+    motion, rate
+        Complex coefficients of the relative displacement (H + 1,), base frequency.
+    """
+    top, high = out[0].shape[0] - 1, motion.shape[0] - 1
+    if law.pieces.shape[0] or law.polynomial.shape[0]:
+        grid = search_grid(high)
+        nodes = uniform_nodes(even(max(0, law.polynomial.shape[0] - 1) * high + top + 1))
+        group_kernels.closed_spectra(
+            motion, law.pieces, law.polynomial, grid.zr, grid.zi, nodes.zr, nodes.zi, out[0], out[1]
+        )
+    if law.sharp:
+        _add_sampled(law.sharp, elements, motion, rate, graded_nodes(motion, law.points, law.widths, top), out)
+    if law.uniform:
+        nodes = uniform_nodes(uniform_count(law, samples, high, top))
+        _add_sampled(law.uniform, elements, motion, rate, nodes, out)
+
+
+def _add_sampled(
+    members: tuple[tuple[int, Array], ...],
+    elements: tuple[Element, ...],
+    motion: ComplexArray,
+    rate: float,
+    nodes: Nodes,
+    out: tuple[ComplexArray, ComplexArray, ComplexArray],
+) -> None:
+    values = kernels.motion(motion, nodes.zr, nodes.zi)
+    u, v = values[0], values[1]
+    v *= rate
+    rows: list[Array | None] = [None, None, None]
+    for i, c in members:
+        parts = elements[i].tangent(u, v, c)
+        for r, part in enumerate(parts):
+            if part is not None:
+                sofar = rows[r]
+                rows[r] = part if sofar is None else sofar + part
+            if parts[2] is not None and not elements[i].depends_on_velocity:
+                raise InputError(
+                    f"{elements[i].label} returns f_v, a derivative by velocity: its class must say "
+                    "depends_on_velocity = True"
+                )
+    kept = [(sums, row) for sums, row in zip(out, rows, strict=True) if row is not None]
+    weighted = np.empty((len(kept), len(u)))
+    for at, (_, row) in enumerate(kept):
+        np.multiply(row, nodes.weights, out=weighted[at])
+    top = out[0].shape[0] - 1
+    for (sums, _), spectrum in zip(kept, kernels.spectra(weighted, nodes.zr, nodes.zi, top), strict=True):
+        sums += spectrum
+
+
+def curvature_of(
+    law: GroupLaw,
+    elements: tuple[Element, ...],
+    samples: tuple[int | None, ...],
+    motion: ComplexArray,
+    rate: float,
+    top: int,
+) -> Curvature:
+    """Second derivatives of a group's force, as weights at instants: see `local_force.Curvature`."""
+    high = motion.shape[0] - 1
+    parts: list[Curvature] = []
+    if law.pieces.shape[0]:
+        grid = search_grid(high)
+        tau, weight = group_kernels.contact_comb(motion, law.pieces, grid.zr, grid.zi)
+        parts.append(Curvature(np.cos(tau), np.sin(tau), weight, None, None))
+    if law.polynomial.shape[0] > 2:
+        nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
+        u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
+        second = np.polynomial.polynomial.polyder(law.polynomial, 2)
+        parts.append(
+            Curvature(nodes.zr, nodes.zi, nodes.weights * np.polynomial.polynomial.polyval(u, second), None, None)
+        )
+    for members, given in ((law.sharp, True), (law.uniform, False)):
+        if not members:
+            continue
+        nodes = (
+            graded_nodes(motion, law.points, law.widths, top)
+            if given
+            else uniform_nodes(uniform_count(law, samples, high, top))
+        )
+        values = kernels.motion(motion, nodes.zr, nodes.zi)
+        rows: list[Array | None] = [None, None, None]
+        for i, c in members:
+            for r, part in enumerate(elements[i].curvature(values[0], rate * values[1], c)):
+                if part is not None:
+                    weighted, sofar = nodes.weights * part, rows[r]
+                    rows[r] = weighted if sofar is None else sofar + weighted
+        assert rows[0] is not None
+        parts.append(Curvature(nodes.zr, nodes.zi, rows[0], rows[1], rows[2]))
+    if len(parts) == 1:
+        return parts[0]
+    moving = any(part.uv is not None for part in parts)
+
+    def joined(arrays: list[Array | None]) -> Array:
+        filled = [np.zeros_like(part.zr) if a is None else a for a, part in zip(arrays, parts, strict=True)]
+        return np.concatenate(filled) if filled else np.zeros(0)
+
+    return Curvature(
+        joined([p.zr for p in parts]),
+        joined([p.zi for p in parts]),
+        joined([p.uu for p in parts]),
+        joined([p.uv for p in parts]) if moving else None,
+        joined([p.vv for p in parts]) if moving else None,
+    )
+
+
+def uniform_count(law: GroupLaw, samples: tuple[int | None, ...], high: int, top: int) -> int:
+    """Samples of the laws that share a uniform grid."""
+    count = max(samples[i] or FEWEST for i, _ in law.uniform)
+    return max(count, even(law.degree * high + top + 1)) if law.degree else count
+
+
+__all__ = ["Group", "GroupLaw", "add_spectra", "curvature_of"]

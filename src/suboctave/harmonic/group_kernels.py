@@ -1,0 +1,251 @@
+"""Compiled evaluation of harmonic balance: forces along one direction, the residual, the Jacobian. Arrays in and out.
+
+One call does what belongs together, so that a small system costs what its arithmetic costs. The pieces are in
+`kernels` and `instants`; the formulae in `local_force`, `state` and `kernels.galerkin`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from suboctave.harmonic.instants import crossings_of
+from suboctave.harmonic.kernels import contact_spectrum, motion, product_spectrum, spectra
+
+
+@njit(cache=True)
+def closed_spectra(c, pieces, polynomial, grid_r, grid_i, uniform_r, uniform_i, force, stiffness):
+    """Add the Fourier coefficients of laws known in closed form to force and stiffness (top + 1,), in place.
+
+    Parameters
+    ----------
+    c
+        Complex coefficients of the relative displacement (H + 1,).
+    pieces
+        Stiffness, gap and side of every piece of piecewise-linear laws, (P, 3).
+    polynomial
+        Coefficients of u^0, u^1, ..., possibly none.
+    grid_r, grid_i, uniform_r, uniform_i
+        Equidistant points on the circle: for the search for crossings, and enough for the polynomial's tangent.
+    """
+    top = force.shape[0] - 1
+    high = c.shape[0] - 1
+    if pieces.shape[0]:
+        values = motion(c, grid_r, grid_i)
+        slope = np.zeros(top + high + 1, dtype=np.complex128)
+        touching = False
+        for p in range(pieces.shape[0]):
+            k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
+            found, above = crossings_of(c, gap, values)
+            if found.shape[0] == 0 and above != (side > 0):
+                continue
+            touching = True
+            chi = contact_spectrum(found, above, side, top + high)
+            for q in range(top + high + 1):
+                slope[q] += k * chi[q]
+            for q in range(top + 1):
+                force[q] -= k * gap * chi[q]
+        if touching:
+            product = product_spectrum(c, 0.0, slope, top)
+            for q in range(top + 1):
+                force[q] += product[q]
+                stiffness[q] += slope[q]
+    if polynomial.shape[0]:
+        n = uniform_r.shape[0]
+        u = motion(c, uniform_r, uniform_i)[0]
+        law = np.empty((2, n))
+        degree = polynomial.shape[0] - 1
+        for j in range(n):
+            f, slope_at = 0.0, 0.0
+            for p in range(degree, -1, -1):
+                slope_at = slope_at * u[j] + f
+                f = f * u[j] + polynomial[p]
+            law[0, j] = f * (2.0 * math.pi / n)
+            law[1, j] = slope_at * (2.0 * math.pi / n)
+        found_spectra = spectra(law, uniform_r, uniform_i, top)
+        for q in range(top + 1):
+            force[q] += found_spectra[0, q]
+            stiffness[q] += found_spectra[1, q]
+
+
+@njit(cache=True)
+def contact_comb(c, pieces, grid_r, grid_i):
+    """Instants at which the gaps of piecewise-linear pieces are crossed, and the weights of `f_uu` there, `side
+    stiffness / |u'|`, with |u'| kept from zero where the motion grazes.
+    """
+    values = motion(c, grid_r, grid_i)
+    largest = 1e-300
+    for h in range(c.shape[0]):
+        largest = max(largest, abs(c[h]))
+    at = np.empty(0)
+    weight = np.empty(0)
+    for p in range(pieces.shape[0]):
+        found, _above = crossings_of(c, pieces[p, 1], values)
+        speed = motion(c, np.cos(found), np.sin(found))[1]
+        at = np.concatenate((at, found))
+        weight = np.concatenate((weight, pieces[p, 2] * pieces[p, 0] / np.maximum(np.abs(speed), 1e-12 * largest)))
+    return at, weight
+
+
+@njit(cache=True)
+def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
+    """`R = A X + F - P` with its parts: A X, F, R (2 H + 1, n), and the sizes |R|, |A X|, |F|, |P|.
+
+    blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions, whose non-zero
+    entries are `shape[starts[g] : starts[g + 1]]` at `dofs`. Sizes are weighted by `weight` per DOF.
+    """
+    rows, n = x.shape
+    linear = np.empty((rows, n))
+    forces = np.zeros((rows, n))
+    residual = np.empty((rows, n))
+    for h in range(blocks.shape[0]):
+        for i in range(n):
+            re = 0.0
+            im = 0.0
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                # amplitude a - i b of a cos + b sin
+                a = x[0, j] if h == 0 else x[2 * h - 1, j]
+                b = 0.0 if h == 0 else -x[2 * h, j]
+                re += p * a - q * b
+                im += p * b + q * a
+            if h == 0:
+                linear[0, i] = re
+            else:
+                linear[2 * h - 1, i] = re
+                linear[2 * h, i] = -im
+    for g in range(force.shape[0]):
+        for s in range(starts[g], starts[g + 1]):
+            i, d = dofs[s], shape[s]
+            forces[0, i] += d * force[g, 0].real
+            for h in range(1, blocks.shape[0]):
+                forces[2 * h - 1, i] += 2.0 * d * force[g, h].real
+                forces[2 * h, i] -= 2.0 * d * force[g, h].imag
+    sizes = np.zeros(4)
+    for r in range(rows):
+        for i in range(n):
+            residual[r, i] = linear[r, i] + forces[r, i] - load[r, i]
+            w = weight[i] * weight[i]
+            sizes[0] += w * residual[r, i] * residual[r, i]
+            sizes[1] += w * linear[r, i] * linear[r, i]
+            sizes[2] += w * forces[r, i] * forces[r, i]
+            sizes[3] += w * load[r, i] * load[r, i]
+    for k in range(4):
+        sizes[k] = math.sqrt(sizes[k])
+    return linear, forces, residual, sizes
+
+
+@njit(cache=True)
+def apply_blocks(blocks, x):
+    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
+    rows, n = x.shape
+    out = np.empty((rows, n))
+    for h in range(blocks.shape[0]):
+        for i in range(n):
+            re = 0.0
+            im = 0.0
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                a = x[0, j] if h == 0 else x[2 * h - 1, j]
+                b = 0.0 if h == 0 else -x[2 * h, j]
+                re += p * a - q * b
+                im += p * b + q * a
+            if h == 0:
+                out[0, i] = re
+            else:
+                out[2 * h - 1, i] = re
+                out[2 * h, i] = -im
+    return out
+
+
+@njit(cache=True)
+def tangent_matrix(out, stiffness, damping, moving, rate, mean, starts, dofs, shape, n):
+    """Add the Galerkin matrices `T(f_x) + T(f_v) d/dt` of all directions to `out`, in the integer (mean) or half-odd
+    basis.
+
+    stiffness, damping (G, top + 1); moving (G,): whether a direction has damping; directions as in
+    `balance_residual`. The formula is that of `kernels.galerkin`.
+    """
+    count = stiffness.shape[1] // 2
+    first = 0 if mean else 1
+    for g in range(stiffness.shape[0]):
+        begin, end = starts[g], starts[g + 1]
+        k = stiffness[g]
+        c = damping[g]
+        for i in range(count):
+            row_mean = mean and i == 0
+            row = 0 if row_mean else (2 * i - 1 if mean else 2 * i)
+            for j in range(count):
+                col_mean = mean and j == 0
+                col = 0 if col_mean else (2 * j - 1 if mean else 2 * j)
+                total = i + j + first
+                gr = k[i - j].real if i >= j else k[j - i].real
+                gi = k[i - j].imag if i >= j else -k[j - i].imag
+                pr, pi = k[total].real, k[total].imag
+                a = gr + pr
+                b = gi - pi
+                e = -gi - pi
+                d = gr - pr
+                if moving[g]:
+                    w = (j + 0.5 * first) * rate
+                    gr = c[i - j].real if i >= j else c[j - i].real
+                    gi = c[i - j].imag if i >= j else -c[j - i].imag
+                    pr, pi = c[total].real, c[total].imag
+                    a -= w * (gi - pi)
+                    b += w * (gr + pr)
+                    e -= w * (gr - pr)
+                    d += w * (-gi - pi)
+                if row_mean:
+                    a *= 0.5
+                    b *= 0.5
+                for s in range(begin, end):
+                    for t in range(begin, end):
+                        v = shape[s] * shape[t]
+                        r, q = row * n + dofs[s], col * n + dofs[t]
+                        out[r, q] += v * a
+                        if not col_mean:
+                            out[r, q + n] += v * b
+                        if not row_mean:
+                            out[r + n, q] += v * e
+                            if not col_mean:
+                                out[r + n, q + n] += v * d
+
+
+@njit(cache=True)
+def dynamic_stiffness(mass, damping, stiffness, frequency, order):
+    """`K - Omega^2 M + i Omega C` at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
+    n = mass.shape[0]
+    out = np.empty((frequency.shape[0], n, n), dtype=np.complex128)
+    for f in range(frequency.shape[0]):
+        om = frequency[f]
+        for i in range(n):
+            for j in range(n):
+                if order == 0:
+                    out[f, i, j] = complex(stiffness[i, j] - om * om * mass[i, j], om * damping[i, j])
+                elif order == 1:
+                    out[f, i, j] = complex(-2.0 * om * mass[i, j], damping[i, j])
+                else:
+                    out[f, i, j] = complex(-2.0 * mass[i, j], 0.0)
+    return out
+
+
+@njit(cache=True)
+def local_amplitudes(x, dofs, shape):
+    """Complex coefficients (H + 1,) of the displacement along a direction with entries `shape` at `dofs`."""
+    high = x.shape[0] // 2
+    out = np.empty(high + 1, dtype=np.complex128)
+    for h in range(high + 1):
+        re = 0.0
+        im = 0.0
+        for s in range(dofs.shape[0]):
+            if h == 0:
+                re += shape[s] * x[0, dofs[s]]
+            else:
+                re += shape[s] * x[2 * h - 1, dofs[s]]
+                im -= shape[s] * x[2 * h, dofs[s]]
+        out[h] = complex(re, im)
+    return out

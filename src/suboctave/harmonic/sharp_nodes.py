@@ -1,0 +1,290 @@
+"""Compiled quadrature nodes along a motion that passes sharp laws: few, wherever and however fast it passes them.
+
+A law with singularities at `u = point +- i width` is singular, as a function of time, at the complex instants
+`s +- i d` at which the motion takes these values: close to the real axis wherever a narrow transition is crossed or
+nearly touched. They are found on a grid and split the period. From each the instants run as
+
+    tau = s +- d sinh(t)
+
+which carries the singularity to `t = i pi / 2`, so that Gauss-Legendre rules in t converge as fast as for a smooth
+law, with a number of nodes that grows like log(1 / width) (Tee & Trefethen, SIAM J. Sci. Comput. 28 (2006) 1798-1811,
+use such maps for sharp layers). Elsewhere plain Gauss-Legendre panels. Arrays in, arrays out, as in `kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from suboctave.harmonic.instants import _jet
+
+#: nodes of the Gauss-Legendre rules in the tables, from 0 to this
+ORDERS = 64
+#: phase (highest harmonic times length) of plain panels, of the pieces next to a singularity, and of those that follow
+_PLAIN, _NEAR, _FAR = 28.0, 4.0, 28.0
+#: a singularity this far from the axis, in half-lengths of a plain panel, does not disturb it
+_HARMLESS = 0.75
+_FAST = {"reassoc", "contract", "nsz"}
+#: coefficients of the series of sine and cosine
+_S2, _S3, _S4, _S5, _S6, _S7, _S8 = -1 / 2, -1 / 6, 1 / 24, 1 / 120, -1 / 720, -1 / 5040, 1 / 40320
+_S9, _S10, _S11, _S12 = 1 / 362880, -1 / 3628800, -1 / 39916800, 1 / 479001600
+_S13, _S14, _S15 = 1 / 6227020800, -1 / 87178291200, -1 / 1307674368000
+
+
+def tables() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights of all Gauss-Legendre rules on (-1, 1), row n for n nodes; shape (ORDERS + 1, ORDERS)."""
+    nodes, weights = np.zeros((ORDERS + 1, ORDERS)), np.zeros((ORDERS + 1, ORDERS))
+    for n in range(1, ORDERS + 1):
+        nodes[n, :n], weights[n, :n] = np.polynomial.legendre.leggauss(n)
+    return nodes, weights
+
+
+@njit(cache=True, fastmath=_FAST)
+def _jets(c, zr, zi):
+    """Value, first and second derivative of the motion at the points z, shape (3, N)."""
+    n = zr.shape[0]
+    top = c.shape[0] - 1
+    out = np.empty((3, n))
+    p = np.empty((3, n))
+    x, xi, dr, di, sr, si = out[0], p[0], out[1], p[1], out[2], p[2]
+    for j in range(n):
+        x[j] = c[top].real
+        xi[j] = c[top].imag
+        dr[j] = top * c[top].real
+        di[j] = top * c[top].imag
+        sr[j] = top * top * c[top].real
+        si[j] = top * top * c[top].imag
+    for k in range(top - 1, -1, -1):
+        a = c[k].real
+        b = c[k].imag
+        for j in range(n):
+            t = x[j] * zr[j] - xi[j] * zi[j] + a
+            xi[j] = x[j] * zi[j] + xi[j] * zr[j] + b
+            x[j] = t
+            t = dr[j] * zr[j] - di[j] * zi[j] + k * a
+            di[j] = dr[j] * zi[j] + di[j] * zr[j] + k * b
+            dr[j] = t
+            t = sr[j] * zr[j] - si[j] * zi[j] + k * k * a
+            si[j] = sr[j] * zi[j] + si[j] * zr[j] + k * k * b
+            sr[j] = t
+    for j in range(n):
+        dr[j] = -di[j]
+        sr[j] = -sr[j]
+    return out
+
+
+@njit(cache=True)
+def _roots(x, d, s, point, width):
+    """Both complex offsets at which the parabola (x, d, s) equals point + i width."""
+    target = complex(x - point, -width)
+    root = np.sqrt(d * d - 2.0 * s * target)
+    q = -(d + root) if (root.real * d >= 0.0) else -(d - root)
+    if abs(q) == 0.0:
+        return complex(np.inf, 0.0), complex(np.inf, 0.0)
+    far = q / s if s != 0.0 else complex(np.inf, 0.0)
+    return 2.0 * target / q, far
+
+
+@njit(cache=True)
+def singular_instants(c, points, widths, reach, zr, zi):
+    """Complex instants `s + i d`, d > 0 and below `reach`, at which the motion meets point +- i width; ascending in s.
+
+    z: uniform grid on the circle, fine enough for the motion's highest harmonic. Returns (2, count): s in [0, 2 pi), d.
+    """
+    n = zr.shape[0]
+    cell = 2.0 * math.pi / n
+    found = np.empty((2, 8 * n))
+    count = 0
+    jets = _jets(c, zr, zi)
+    for j in range(n):
+        x, d, s = jets[0, j], jets[1, j], jets[2, j]
+        most = abs(d) * 1.5 * reach + abs(s) * reach * reach
+        for m in range(points.shape[0]):
+            if abs(x - points[m]) > most + abs(d) * cell + widths[m]:
+                continue
+            first, second = _roots(x, d, s, points[m], widths[m])
+            for r in range(2):
+                root = first if r == 0 else second
+                if not (abs(root.real) <= 0.8 * cell and abs(root.imag) <= 1.5 * reach):
+                    continue
+                at = j * cell
+                # the parabola around the singularity's own real part: twice is as good as exact
+                offset, distance = root.real, abs(root.imag)
+                for _ in range(3):
+                    at += offset
+                    vx, vd, vs = _jet(c, math.cos(at), math.sin(at))
+                    one, two = _roots(vx, vd, vs, points[m], widths[m])
+                    # of the two roots the one that continues the present
+                    near_one = abs(complex(abs(one.real), abs(one.imag) - distance))
+                    near_two = abs(complex(abs(two.real), abs(two.imag) - distance))
+                    new = one if near_one <= near_two else two
+                    if not (abs(new.real) <= cell):
+                        break
+                    offset, distance = new.real, abs(new.imag)
+                    if abs(offset) < 0.05 * distance:
+                        break
+                at += offset
+                if not distance <= reach:
+                    continue
+                at %= 2.0 * math.pi
+                distance = max(distance, 1e-13)
+                known = False
+                for k in range(count):
+                    gap = abs(found[0, k] - at)
+                    gap = min(gap, 2.0 * math.pi - gap)
+                    if gap < 0.3 * min(distance, found[1, k]) + 1e-13:
+                        found[1, k] = min(found[1, k], distance)
+                        known = True
+                        break
+                if not known and count < found.shape[1]:
+                    found[0, count] = at
+                    found[1, count] = distance
+                    count += 1
+    order = np.argsort(found[0, :count])
+    out = np.empty((2, count))
+    for k in range(count):
+        out[0, k] = found[0, order[k]]
+        out[1, k] = found[1, order[k]]
+    return out
+
+
+@njit(cache=True, fastmath=_FAST)
+def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, nodes, weights, offset):
+    """Append the nodes of one piece, offsets (first, last) from `centre` in the direction `sign`; returns the count."""
+    if plain:
+        orders = math.ceil(8.0 + 0.42 * phase)
+        low, high = first, last
+    else:
+        low, high = math.asinh(first / distance), math.asinh(last / distance)
+        t = high - low
+        orders = math.ceil(8.0 + 2.8 * t**0.8 if first == 0.0 else 7.0 + 0.45 * phase + 3.0 * t)
+    orders = min(max(orders, 7), ORDERS)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    origin = 0.5 * (first + last)
+    # views: indices that cannot be negative let the loops run in vector registers
+    node, weight = nodes[orders, :orders], weights[orders, :orders]
+    at_r, at_i, share = zr[count : count + orders], zi[count : count + orders], w[count : count + orders]
+    if plain:
+        for j in range(orders):
+            offset[j] = half * node[j]
+            share[j] = half * weight[j]
+    else:
+        for j in range(orders):
+            grown = 0.5 * distance * math.exp(middle + half * node[j])
+            shrunk = 0.25 * distance * distance / grown
+            offset[j] = grown - shrunk - origin
+            share[j] = half * weight[j] * (grown + shrunk)
+    cr, ci = math.cos(centre + sign * origin), math.sin(centre + sign * origin)
+    for j in range(orders):
+        # sine and cosine of a small angle, by their series
+        t = sign * offset[j]
+        y = t * t
+        si = _S15
+        si = _S13 + y * si
+        si = _S11 + y * si
+        si = _S9 + y * si
+        si = _S7 + y * si
+        si = _S5 + y * si
+        si = _S3 + y * si
+        si = t + t * y * si
+        co = _S14
+        co = _S12 + y * co
+        co = _S10 + y * co
+        co = _S8 + y * co
+        co = _S6 + y * co
+        co = _S4 + y * co
+        co = 1.0 + y * (_S2 + y * co)
+        at_r[j] = cr * co - ci * si
+        at_i[j] = cr * si + ci * co
+    return count + orders
+
+
+@njit(cache=True)
+def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
+    """Nodes `exp(i tau)` (real, imaginary part) on a period and weights that add up to 2 pi.
+
+    Parameters
+    ----------
+    c
+        Complex coefficients of the motion (H + 1,).
+    points, widths
+        Where the laws are singular: u = point +- i width.
+    degree
+        Highest harmonic of the integrands where the law is smooth.
+    zr, zi
+        Uniform grid on the circle for the search.
+    nodes, weights
+        `tables()`.
+    """
+    panel = _PLAIN / degree
+    at = singular_instants(c, points, widths, 0.5 * _HARMLESS * panel, zr, zi)
+    number = at.shape[1]
+    capacity = 64 * (8 + number * 6 + math.ceil(2.0 * math.pi / panel))
+    out_r, out_i, w = np.empty(capacity), np.empty(capacity), np.empty(capacity)
+    offset = np.empty(ORDERS)
+    count = 0
+    if number == 0:
+        panels = max(2, math.ceil(2.0 * math.pi / panel))
+        half = math.pi / panels
+        for p in range(panels):
+            count = _fill(
+                out_r,
+                out_i,
+                w,
+                count,
+                (2 * p + 1) * half,
+                1.0,
+                1.0,
+                -half,
+                half,
+                True,
+                2.0 * half * degree,
+                nodes,
+                weights,
+                offset,
+            )
+        return out_r[:count], out_i[:count], w[:count]
+    for k in range(number):
+        start = at[0, k]
+        end = at[0, k + 1] if k + 1 < number else at[0, 0] + 2.0 * math.pi
+        length = 0.5 * (end - start)
+        if length <= 0.0:
+            continue
+        for side in range(2):
+            centre = start if side == 0 else end
+            distance = at[1, k] if side == 0 else at[1, (k + 1) % number]
+            sign = 1.0 if side == 0 else -1.0
+            done = 0.0
+            while done < length:
+                if done == 0.0:
+                    piece, plain = _NEAR / degree, False
+                else:
+                    # far from the singularity, in units of its own length, a piece needs no map
+                    piece = _FAR / degree
+                    plain = done > 0.5 * piece
+                if done + 1.3 * piece >= length:
+                    piece = length - done
+                elif done + 2.0 * piece > length:
+                    piece = 0.5 * (length - done)
+                count = _fill(
+                    out_r,
+                    out_i,
+                    w,
+                    count,
+                    centre,
+                    sign,
+                    distance,
+                    done,
+                    done + piece,
+                    plain,
+                    piece * degree,
+                    nodes,
+                    weights,
+                    offset,
+                )
+                if done + piece >= length * (1.0 - 1e-15):
+                    break
+                done += piece
+    return out_r[:count], out_i[:count], w[:count]

@@ -1,0 +1,140 @@
+"""All elements along one direction at once, against each element by itself and against other quadratures."""
+
+import numpy as np
+import pytest
+
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis, instants
+from suboctave.harmonic.local_force import curvature, local_force
+from suboctave.harmonic.quadrature import graded_nodes, panel_tables
+from suboctave.model import CubicSpring, ElasticStop, PolynomialSpring, System
+from suboctave.model.derivative_check import check_derivatives
+from suboctave.model.element import Element
+from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling
+
+
+class Damper(Element):
+    """f = c v |v|-like but smooth: c v sqrt(v^2 + 1), sampled blindly."""
+
+    coefficient_names = ("c",)
+    depends_on_velocity = True
+
+    def sampling(self, c):
+        return AdaptiveSampling()
+
+    def tangent(self, u, v, c):
+        root = np.sqrt(v * v + 1.0)
+        return c[0] * v * root, np.zeros_like(u), c[0] * (root + v * v / root)
+
+    def curvature(self, u, v, c):
+        zero = np.zeros_like(u)
+        root = np.sqrt(v * v + 1.0)
+        return zero, zero, c[0] * (3.0 * v / root - v**3 / root**3)
+
+    def coefficient_tangent(self, u, v, c):
+        f, f_u, f_v = self.tangent(u, v, np.ones(1))
+        return f[None], f_u[None], f_v[None]
+
+    def coefficient_curvature(self, u, v, c):
+        return np.zeros((1, 1, len(u)))
+
+
+class Undeclared(Damper):
+    depends_on_velocity = False
+
+
+class LyingPolynomial(CubicSpring):
+    def sampling(self, c):
+        return PolynomialSampling(3, (0.0, 0.0, 0.0, 2.0 * float(c[0])))
+
+
+ELEMENTS = [
+    CubicSpring(0, 0.3),
+    PolynomialSpring(0, {2: 0.2, 5: -0.1}),
+    ElasticStop(0, 3.0, 0.4),
+    ElasticStop(0, 2.0, -0.6),
+    ElasticStop(0, 1.5, 0.5, regularization=200.0),
+    ElasticStop(0, 2.5, -0.3, regularization=40.0),
+    Damper(0, [0.2]),
+    CubicSpring((0, 1), 0.7),
+    ElasticStop((0, 1), 2.0, 0.1),
+]
+
+
+def state_of(elements, harmonics=6):
+    system = System(np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], elements)
+    rng = np.random.default_rng(3)
+    x = rng.standard_normal((2 * harmonics + 1, 2)) * 0.7 ** np.arange(2 * harmonics + 1)[:, None]
+    return HarmonicBalance(system, HarmonicBasis(harmonics)).settle(x, 1.3).at(x, 1.3)
+
+
+def test_the_sum_over_elements_is_what_a_group_gives():
+    state = state_of(ELEMENTS)
+    assert len(state.spectra) == 2
+    for group, force, stiffness, damping in state.spectra:
+        parts = [local_force(state.local_motions[i]) for i in group.members]
+        np.testing.assert_allclose(force, sum(p.force for p in parts), atol=1e-9)
+        np.testing.assert_allclose(stiffness, sum(p.stiffness for p in parts), atol=1e-8)
+        assert (damping.size > 0) == any(p.damping.size for p in parts)
+        if damping.size:
+            np.testing.assert_allclose(damping, sum(p.damping for p in parts if p.damping.size), atol=1e-9)
+
+
+def test_curvature_of_a_group_integrates_like_those_of_its_elements():
+    state = state_of(ELEMENTS)
+    for (group, *_), bend in zip(state.spectra, state.curvatures, strict=True):
+        for k in (0, 1, 3):
+            total = (bend.uu * (bend.zr + 1j * bend.zi) ** k).sum()
+            parts = [curvature(state.local_motions[i]) for i in group.members]
+            expected = sum((p.uu * (p.zr + 1j * p.zi) ** k).sum() for p in parts)
+            assert total == pytest.approx(expected, abs=1e-6)
+
+
+def test_an_undeclared_velocity_is_refused_not_dropped():
+    with pytest.raises(InputError, match="depends_on_velocity = True"):
+        _ = state_of([Undeclared(0, [0.2])]).spectra
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+def test_a_force_that_is_not_finite_is_named():
+    state = state_of([CubicSpring(0, 1.0), PolynomialSpring(1, {300: 1e300})])
+    with pytest.raises(ConvergenceError, match=r"PolynomialSpring\(dof=1\).*not finite"):
+        _ = state.residual
+
+
+def test_a_polynomial_that_tells_other_coefficients_than_it_has_is_found():
+    assert not check_derivatives(LyingPolynomial(0, 1.0)).ok
+    with pytest.raises(InputError, match="has 4 coefficients"):
+        PolynomialSampling(3, (1.0, 2.0))
+
+
+def bell(u, points, widths):
+    return sum(np.arctan((u - p) / w) for p, w in zip(points, widths, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_graded_nodes_integrate_sharp_laws_as_dyadic_panels_do(seed):
+    """Two rules with nothing in common but Gauss-Legendre: mapped pieces, and panels that halve."""
+    rng = np.random.default_rng(seed)
+    high = int(rng.choice([3, 7, 15]))
+    k = np.arange(high + 1)
+    c = (rng.standard_normal(high + 1) + 1j * rng.standard_normal(high + 1)) * np.exp(-rng.uniform(0.4, 1.0) * k)
+    c[0] = c[0].real
+    count = int(rng.integers(1, 4))
+    points, widths = rng.uniform(-0.8, 0.8, count) * np.abs(c).sum(), 10.0 ** rng.uniform(-6, -0.5, count)
+    if seed % 4 == 0:  # nearly a grazing
+        points[0] = instants.peak(c, 128)[2] * (1.0 + rng.choice([-1, 1]) * 10.0 ** rng.uniform(-9, -2))
+    top = 2 * high + 1
+    nodes = graded_nodes(c, points, widths, top)
+    assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
+    other = instants.sharp_nodes(c, points, widths, *panel_tables(40 + 4 * high, 20), 1.6)
+
+    def spectrum(zr, zi, weights):
+        z = zr + 1j * zi
+        u = np.real(sum(c[q] * z**q for q in range(high + 1)))
+        return np.array([(weights * bell(u, points, widths) * z**-q).sum() for q in range(top + 1)])
+
+    mine, theirs = spectrum(nodes.zr, nodes.zi, nodes.weights), spectrum(*other)
+    assert np.abs(mine - theirs).max() < 1e-9 * max(1.0, np.abs(theirs).max())
+    # a handful of nodes per passage and per harmonic, not per width
+    assert len(nodes.weights) < 60 * count * high + 400
