@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -103,11 +104,14 @@ class ResponseCurve:
 
     def join(self, x: Array, value: float) -> Array:
         """The vector u of coefficients and a value of the free parameter."""
-        return np.append(np.ravel(x), value)
+        u = np.empty(x.size + 1)
+        u[:-1] = x.ravel()
+        u[-1] = value
+        return u
 
     def evaluate(self, u: Array) -> ResponseEvaluation:
         """See `Curve.evaluate`."""
-        if not np.isfinite(u).all():
+        if not math.isfinite(u.dot(u)):
             raise ConvergenceError("the iteration left the range of numbers")
         x, omega, values = self.split(u)
         if not omega > 0.0:
@@ -125,7 +129,7 @@ class ResponseCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
-        return np.append(self._weight / size, 1.0 / self.span)
+        return self.join(self._weight / size, 1.0 / self.span)
 
     def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
         """The curve with the number of harmonics (and blind samples) that this point needs."""

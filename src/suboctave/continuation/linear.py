@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from suboctave.continuation import kernels
+
 Array = NDArray[np.float64]
 
 
@@ -62,9 +64,7 @@ class Factor:
         """Sign of the determinant of a real matrix; 0 if singular."""
         if self.singular:
             return 0.0
-        swaps = np.count_nonzero(self.pivots != np.arange(len(self.pivots)))
-        negative = np.count_nonzero(self.lu.diagonal() < 0.0)
-        return -1.0 if (swaps + negative) % 2 else 1.0
+        return float(kernels.determinant_sign(self.lu, self.pivots))
 
     @property
     def log_determinant(self) -> float:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
@@ -80,7 +81,7 @@ def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: flo
     # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of
     # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
     sign = solved.factor.sign
-    if along is not None and (solved.weights * t) @ (solved.weights * along) < 0.0:
+    if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:
         t, sign = -t, -sign
     return CurvePoint(curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations)
 
@@ -162,7 +163,7 @@ class March:
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
-        bend: Array | None = None
+        bend = np.zeros_like(point.u)
         count = 1
         while True:
             if count >= options.max_points:
@@ -222,18 +223,15 @@ class March:
     def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
         """The same point with scaling and tangent length of the present amplitude."""
         weights = point.curve.weights(point.u, largest)
-        return replace(point, weights=weights, tangent=point.tangent / length(weights * point.tangent))
+        return replace(point, weights=weights, tangent=kernels.normalised(weights * point.tangent, weights))
 
-    def _advance(self, point: CurvePoint, step: float, bend: Array | None) -> tuple[CurvePoint, float, float]:
+    def _advance(self, point: CurvePoint, step: float, bend: Array) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, step length used, distance between prediction and solution."""
         while True:
             try:
-                guess = point.u + step * point.tangent
-                if bend is not None:
-                    guess += 0.5 * step**2 * bend
-                row = point.weights * point.tangent
-                solved = correct(point.curve, guess, row, point.weights, self.newton)
-                taken = length(point.weights * (solved.u - point.u))
+                guess = kernels.predicted(point.u, point.tangent, bend, step)
+                solved = correct(point.curve, guess, point.weights * point.tangent, point.weights, self.newton)
+                taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
                 fine = turn < 2.5 * self.stepping.angle and solved.distance < 0.4 * step
@@ -272,9 +270,7 @@ class March:
 
     @staticmethod
     def _angle(a: CurvePoint, b: CurvePoint) -> float:
-        ta, tb = b.weights * a.tangent, b.weights * b.tangent
-        cosine = float(ta @ tb / (length(ta) * length(tb)))
-        return math.acos(min(1.0, max(-1.0, cosine)))
+        return math.acos(min(1.0, max(-1.0, kernels.cosine(a.tangent, b.tangent, b.weights))))
 
     def _next_step(self, point: CurvePoint, new: CurvePoint, step: float, deviation: float) -> float:
         options = self.stepping
@@ -321,11 +317,14 @@ class March:
 
     def _returns(self, first: CurvePoint, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
         """The start point again, if the step from `point` to `new` passes it in the same direction."""
-        origin = new.curve.transfer(first.u, first.curve)
-        heading = new.curve.transfer(first.tangent, first.curve)
         w = new.weights
-        step = length(w * (new.u - point.u))
-        for image, leaving in zip(new.curve.images(origin), new.curve.images(heading), strict=True):
+        step = kernels.distance(new.u, point.u, w)
+        index = new.curve.parameter
+        images = new.curve.images(new.curve.transfer(first.u, first.curve))
+        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
+            return None
+        heading = new.curve.transfer(first.tangent, first.curve)
+        for image, leaving in zip(images, new.curve.images(heading), strict=True):
             from_point, to_new = w * (image - point.u), w * (new.u - image)
             if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
                 continue

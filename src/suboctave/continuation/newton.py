@@ -7,11 +7,13 @@ point.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation import kernels
+from suboctave.continuation.linear import Factor
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
 
@@ -60,11 +62,7 @@ class Solved:
 
 def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
     """Factorise `[F_u; row]` with columns scaled to arclength."""
-    jacobian = evaluation.jacobian
-    matrix = np.empty((len(row), len(row)), order="F")
-    np.divide(jacobian, weights, out=matrix[:-1])
-    matrix[-1] = row
-    return Factor.of(matrix, overwrite=True)
+    return Factor.of(kernels.bordered_transposed(evaluation.jacobian, row, weights).T, overwrite=True)
 
 
 def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions) -> Solved:
@@ -88,12 +86,12 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
     for iteration in range(options.iterations + 1):
         evaluation = curve.evaluate(u)
         error = evaluation.error
-        if not np.isfinite(error):
+        if not math.isfinite(error):
             raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
         # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
         if error <= options.tolerance and (settled or iteration == 0):
-            distance = length(weights * (u - guess))
+            distance = kernels.distance(u, guess, weights)
             return Solved(u, evaluation, weights, bordered(evaluation, row, weights), iteration, distance, contraction)
         if iteration == options.iterations:
             break
@@ -102,19 +100,15 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
             factor = bordered(evaluation, row, weights)
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
-        rhs = np.empty(len(u))
-        rhs[:-1] = evaluation.residual
-        rhs[-1] = row @ (weights * (u - guess))
-        step = factor.solve(rhs)
-        size = length(step)
+        step = factor.solve(kernels.right_hand_side(evaluation.residual, row, weights, u, guess))
+        share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
+        u, size = kernels.moved(u, step, weights, share)
         if iteration == 0:
             first = size
         else:
             contraction = size / previous if previous > 0.0 else 0.0
             if contraction > 2.0 and size > first and not options.damped:
                 break
-        share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
-        u = u - share * step / weights
         previous = size if share == 1.0 else np.inf
     raise ConvergenceError(
         f"Newton's method did not converge near {curve.where(guess)} "
@@ -141,5 +135,5 @@ def tangent(solved: Solved) -> Array:
     rhs[-1] = 1.0
     if solved.factor.singular:
         raise ConvergenceError("the equations are singular (an undamped resonance, or a body free to move)")
-    direction = solved.factor.solve(rhs)
-    return direction / length(direction) / solved.weights
+    result: Array = kernels.normalised(solved.factor.solve(rhs), solved.weights)
+    return result

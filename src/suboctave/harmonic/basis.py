@@ -64,6 +64,11 @@ class HarmonicBasis:
         """Frequencies of the half-odd basis in units of omega, `(k + 1/2) / nu`, `k = 0 .. H`; shape (H + 1,)."""
         return (np.arange(self.harmonics + 1) + 0.5) / self.nu
 
+    @cached_property
+    def beyond(self) -> Array:
+        """The next frequencies in units of omega, `k / nu` for `k = H + 1 .. 2 H + 1`; shape (H + 1,)."""
+        return np.arange(self.harmonics + 1, 2 * self.harmonics + 2) / self.nu
+
     def derivative(self, coefficients: Array) -> Array:
         """Apply `D`, the derivative with respect to `omega t`, to coefficients of shape (2 H + 1, ...)."""
         factor = self.multiples[1:].reshape((-1,) + (1,) * (coefficients.ndim - 1))

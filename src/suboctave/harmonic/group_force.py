@@ -15,7 +15,16 @@ from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import Curvature
-from suboctave.harmonic.quadrature import FEWEST, Nodes, even, graded_nodes, search_grid, singularities, uniform_nodes
+from suboctave.harmonic.quadrature import (
+    FEWEST,
+    Nodes,
+    even,
+    graded_motion,
+    graded_nodes,
+    search_grid,
+    singularities,
+    uniform_nodes,
+)
 from suboctave.model.element import Element
 from suboctave.model.sampling import (
     PiecewiseLinear,
@@ -23,6 +32,8 @@ from suboctave.model.sampling import (
     Sampling,
     SharpSampling,
 )
+
+_NONE = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -123,22 +134,24 @@ def add_spectra(
             motion, law.pieces, law.polynomial, grid.zr, grid.zi, nodes.zr, nodes.zi, out[0], out[1]
         )
     if law.sharp:
-        _add_sampled(law.sharp, elements, motion, rate, graded_nodes(motion, law.points, law.widths, top), out)
+        zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
+        _add_sampled(law.sharp, elements, u, v, rate, Nodes(zr, zi, w), out)
     if law.uniform:
         nodes = uniform_nodes(uniform_count(law, samples, high, top))
-        _add_sampled(law.uniform, elements, motion, rate, nodes, out)
+        u, v = kernels.motion(motion, nodes.zr, nodes.zi)
+        _add_sampled(law.uniform, elements, u, v, rate, nodes, out)
 
 
 def _add_sampled(
     members: tuple[tuple[int, Array], ...],
     elements: tuple[Element, ...],
-    motion: ComplexArray,
+    u: Array,
+    v: Array,
     rate: float,
     nodes: Nodes,
     out: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> None:
-    values = kernels.motion(motion, nodes.zr, nodes.zi)
-    u, v = values[0], values[1]
+    """`u`, `v`: displacement and its derivative by tau at the nodes."""
     v *= rate
     rows: list[Array | None] = [None, None, None]
     for i, c in members:
@@ -147,18 +160,16 @@ def _add_sampled(
             if part is not None:
                 sofar = rows[r]
                 rows[r] = part if sofar is None else sofar + part
-            if parts[2] is not None and not elements[i].depends_on_velocity:
-                raise InputError(
-                    f"{elements[i].label} returns f_v, a derivative by velocity: its class must say "
-                    "depends_on_velocity = True"
-                )
-    kept = [(sums, row) for sums, row in zip(out, rows, strict=True) if row is not None]
-    weighted = np.empty((len(kept), len(u)))
-    for at, (_, row) in enumerate(kept):
-        np.multiply(row, nodes.weights, out=weighted[at])
-    top = out[0].shape[0] - 1
-    for (sums, _), spectrum in zip(kept, kernels.spectra(weighted, nodes.zr, nodes.zi, top), strict=True):
-        sums += spectrum
+        if parts[2] is not None and not elements[i].depends_on_velocity:
+            raise InputError(
+                f"{elements[i].label} returns f_v, a derivative by velocity: its class must say "
+                "depends_on_velocity = True"
+            )
+    f, f_u, f_v = (_NONE if row is None else np.ascontiguousarray(row, dtype=float) for row in rows)
+    if f.shape != u.shape or f_u.shape != u.shape or f_v.shape not in (u.shape, (0,)):
+        labels = ", ".join(elements[i].label for i, _ in members)
+        raise InputError(f"{labels}: tangent must return arrays of the shape of u")
+    group_kernels.add_projected(f, f_u, f_v, nodes.weights, nodes.zr, nodes.zi, *out)
 
 
 def curvature_of(

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from suboctave.harmonic.instants import crossings_of
-from suboctave.harmonic.kernels import contact_spectrum, motion, product_spectrum, spectra
+from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
 
 @njit(cache=True)
@@ -70,6 +70,37 @@ def closed_spectra(c, pieces, polynomial, grid_r, grid_i, uniform_r, uniform_i, 
             stiffness[q] += found_spectra[1, q]
 
 
+@njit(cache=True, fastmath=_FAST)
+def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
+    """Add `1/(2 pi) sum_j weights_j g_j z_j^-q`, q = 0 .. top, of the sampled f, f_u and f_v (empty if there is none)
+    to the spectra of force, stiffness and damping, in place.
+    """
+    n = zr.shape[0]
+    moving = f_v.shape[0] > 0
+    scale = 1.0 / (2.0 * math.pi)
+    pr = weights * scale
+    pi = np.zeros(n)
+    for q in range(force.shape[0]):
+        fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
+        for j in range(n):
+            fr += f[j] * pr[j]
+            fi += f[j] * pi[j]
+            sr += f_u[j] * pr[j]
+            si += f_u[j] * pi[j]
+        force[q] += complex(fr, -fi)
+        stiffness[q] += complex(sr, -si)
+        if moving:
+            fr, fi = 0.0, 0.0
+            for j in range(n):
+                fr += f_v[j] * pr[j]
+                fi += f_v[j] * pi[j]
+            damping[q] += complex(fr, -fi)
+        for j in range(n):
+            t = pr[j] * zr[j] - pi[j] * zi[j]
+            pi[j] = pr[j] * zi[j] + pi[j] * zr[j]
+            pr[j] = t
+
+
 @njit(cache=True)
 def contact_comb(c, pieces, grid_r, grid_i):
     """Instants at which the gaps of piecewise-linear pieces are crossed, and the weights of `f_uu` there, `side
@@ -90,16 +121,25 @@ def contact_comb(c, pieces, grid_r, grid_i):
 
 
 @njit(cache=True)
+def finite(table):
+    """Whether the zeroth coefficients of all spectra (R, G, top + 1) are finite."""
+    for r in range(table.shape[0]):
+        for g in range(table.shape[1]):
+            if not (math.isfinite(table[r, g, 0].real) and math.isfinite(table[r, g, 0].imag)):
+                return False
+    return True
+
+
+@njit(cache=True)
 def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
-    """`R = A X + F - P` with its parts: A X, F, R (2 H + 1, n), and the sizes |R|, |A X|, |F|, |P|.
+    """A X, F and `R = A X + F - P`, (3, 2 H + 1, n), and the sizes |R|, |A X|, |F|, |P|.
 
     blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions, whose non-zero
     entries are `shape[starts[g] : starts[g + 1]]` at `dofs`. Sizes are weighted by `weight` per DOF.
     """
     rows, n = x.shape
-    linear = np.empty((rows, n))
-    forces = np.zeros((rows, n))
-    residual = np.empty((rows, n))
+    parts = np.zeros((3, rows, n))
+    linear, forces, residual = parts[0], parts[1], parts[2]
     for h in range(blocks.shape[0]):
         for i in range(n):
             re = 0.0
@@ -135,7 +175,7 @@ def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
             sizes[3] += w * load[r, i] * load[r, i]
     for k in range(4):
         sizes[k] = math.sqrt(sizes[k])
-    return linear, forces, residual, sizes
+    return parts, sizes
 
 
 @njit(cache=True)
@@ -248,4 +288,59 @@ def local_amplitudes(x, dofs, shape):
                 re += shape[s] * x[2 * h - 1, dofs[s]]
                 im -= shape[s] * x[2 * h, dofs[s]]
         out[h] = complex(re, im)
+    return out
+
+
+@njit(cache=True)
+def tails(x, neglected, weight):
+    """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size.
+
+    x (2 H + 1, n) are kept, `neglected` (H + 1, n) complex those from H + 1 on; sizes are weighted per DOF.
+    """
+    rows, n = x.shape
+    high = rows // 2
+    squares = np.zeros(2 * high + 2)
+    for i in range(n):
+        w = weight[i] * weight[i]
+        squares[0] += w * x[0, i] * x[0, i]
+        for h in range(1, high + 1):
+            squares[h] += w * (x[2 * h - 1, i] ** 2 + x[2 * h, i] ** 2)
+        for h in range(high + 1):
+            squares[high + 1 + h] += w * (neglected[h, i].real ** 2 + neglected[h, i].imag ** 2)
+    size = 0.0
+    for h in range(high + 1):
+        size += squares[h]
+    size = math.sqrt(size)
+    out = np.zeros(2 * high + 2)
+    total = 0.0
+    for h in range(2 * high, -1, -1):
+        total += squares[h + 1]
+        out[h] = math.sqrt(total) / size if size > 0.0 else 0.0
+    return out, size
+
+
+@njit(cache=True)
+def apply_scaled(blocks, scale, x):
+    """`apply_blocks` with every harmonic's block multiplied by a number."""
+    out = apply_blocks(blocks, x)
+    for h in range(1, blocks.shape[0]):
+        for i in range(x.shape[1]):
+            out[2 * h - 1, i] *= scale[h]
+            out[2 * h, i] *= scale[h]
+    for i in range(x.shape[1]):
+        out[0, i] *= scale[0]
+    return out
+
+
+@njit(cache=True)
+def response_to(blocks, force):
+    """`-blocks^-1 force` per harmonic, (F, n), for a small number of DOFs too; blocks (F, n, n)."""
+    count, n = force.shape
+    out = np.empty((count, n), dtype=np.complex128)
+    if n == 1:
+        for f in range(count):
+            out[f, 0] = -force[f, 0] / blocks[f, 0, 0]
+        return out
+    for f in range(count):
+        out[f] = -np.linalg.solve(blocks[f], force[f])
     return out

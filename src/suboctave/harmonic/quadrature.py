@@ -110,9 +110,15 @@ def nodes_for(kind: Sampling, motion: ComplexArray, top: int, samples: int | Non
 
 def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -> Nodes:
     """Nodes for laws that are singular at u = points +- i widths: see `sharp_nodes`."""
+    return Nodes(*graded_motion(motion, points, widths, top)[:3])
+
+
+def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int) -> Array:
+    """These nodes with the motion there: cosines, sines, weights, values, derivatives by tau, (5, N)."""
     high = motion.shape[0] - 1
     grid = search_grid(high)
-    return Nodes(*graded.sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables()))
+    found: Array = graded.sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables())
+    return found
 
 
 def search_grid(high: int) -> Nodes:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic import group_kernels
+from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.state import BalanceState
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
@@ -57,14 +58,8 @@ def motion_size(state: BalanceState) -> float:
 
 def truncation(state: BalanceState) -> float:
     """Estimated size of the neglected harmonics relative to the motion."""
-    size = motion_size(state)
-    return float(np.linalg.norm(_neglected_sizes(state))) / size if size > 0.0 else 0.0
-
-
-def _neglected_sizes(state: BalanceState) -> Array:
-    """Sizes of the neglected harmonics k = H + 1 .. 2 H + 1, shape (H + 1,)."""
-    sizes: Array = np.linalg.norm(np.abs(state.neglected) * state.balance.scales()[0], axis=1)
-    return sizes
+    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
+    return float(tail[state.basis.harmonics]) if size > 0.0 else 0.0
 
 
 def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
@@ -86,15 +81,9 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
     """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
     basis = state.basis
     nu, high = basis.nu, basis.harmonics
-    size = motion_size(state)
+    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
     if size == 0.0:
         return basis
-    weight = state.balance.scales()[0]
-    kept = np.linalg.norm(state.x * weight, axis=1)
-    kept = np.concatenate((kept[:1], np.hypot(kept[1::2], kept[2::2])))
-    sizes = np.concatenate((kept, _neglected_sizes(state)))
-    # tail[k]: size of all harmonics above k
-    tail = np.sqrt(np.append(np.cumsum(sizes[::-1] ** 2)[::-1][1:], 0.0)) / size
     ladder = _ladder(options, state)
 
     def sufficient(bound: float) -> int:

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 
 from suboctave.harmonic.instants import _jet
+from suboctave.harmonic.kernels import motion
 
 #: nodes of the Gauss-Legendre rules in the tables, from 0 to this
 ORDERS = 64
@@ -202,8 +203,20 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
 
 
 @njit(cache=True)
+def _with_motion(c, zr, zi, w):
+    """The result of `sharp_nodes`: one array, since handing arrays over costs more than filling them."""
+    out = np.empty((5, zr.shape[0]))
+    out[0] = zr
+    out[1] = zi
+    out[2] = w
+    out[3:] = motion(c, zr, zi)
+    return out
+
+
+@njit(cache=True)
 def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
-    """Nodes `exp(i tau)` (real, imaginary part) on a period and weights that add up to 2 pi.
+    """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion and its derivative by
+    tau there; (5, N).
 
     Parameters
     ----------
@@ -245,7 +258,7 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
                 weights,
                 offset,
             )
-        return out_r[:count], out_i[:count], w[:count]
+        return _with_motion(c, out_r[:count], out_i[:count], w[:count])
     for k in range(number):
         start = at[0, k]
         end = at[0, k + 1] if k + 1 < number else at[0, 0] + 2.0 * math.pi
@@ -287,4 +300,4 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
                 if done + piece >= length * (1.0 - 1e-15):
                     break
                 done += piece
-    return out_r[:count], out_i[:count], w[:count]
+    return _with_motion(c, out_r[:count], out_i[:count], w[:count])

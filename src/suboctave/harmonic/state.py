@@ -97,7 +97,7 @@ class BalanceState:
                 law, balance.elements, balance.samples, motion, self.rate, (table[0, g], table[1, g], table[2, g])
             )
         # a number that is not finite at any instant is in all coefficients
-        if not np.isfinite(table[:, :, 0]).all():
+        if not group_kernels.finite(table):
             self._refuse()
         return table
 
@@ -123,10 +123,10 @@ class BalanceState:
         ]
 
     @lazy
-    def _parts(self) -> tuple[Array, Array, Array, Array]:
+    def _parts(self) -> tuple[Array, Array]:
         """A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P with residual weights."""
         balance = self.balance
-        parts: tuple[Array, Array, Array, Array] = group_kernels.balance_residual(
+        parts: tuple[Array, Array] = group_kernels.balance_residual(
             self.x,
             self.blocks,
             self.spectra_table[0],
@@ -139,7 +139,7 @@ class BalanceState:
     @property
     def force(self) -> Array:
         """Element forces F, shape (2 H + 1, size)."""
-        return self._parts[1]
+        return self._parts[0][1]
 
     @lazy
     def unbalanced(self) -> Array:
@@ -150,8 +150,8 @@ class BalanceState:
     def residual(self) -> Array:
         """R, shape (dimension,)."""
         if self.compliance is None:
-            return self._parts[2].ravel()
-        return (self._parts[0] + apply_blocks(self.compliance, self.unbalanced)).ravel()
+            return self._parts[0][2].ravel()
+        return (self._parts[0][0] + apply_blocks(self.compliance, self.unbalanced)).ravel()
 
     @lazy
     def force_jacobian(self) -> Array:
@@ -214,11 +214,11 @@ class BalanceState:
         """R differentiated by "omega" or a parameter, shape (dimension,)."""
         linear, freq = self.linear, self.frequencies
         if name == "omega":
-            m = self.basis.multiples[:, None, None]
-            result = apply_blocks(linear.stiffness(freq, 1) * m, self.x)
+            m = self.basis.multiples
+            result: Array = group_kernels.apply_scaled(linear.stiffness(freq, 1), m, self.x)
             slope = linear.compliance(freq, 1)
             if slope is not None:
-                result += apply_blocks(slope * m, self.unbalanced)
+                result += group_kernels.apply_scaled(slope, m, self.unbalanced)
         else:
             result = np.zeros_like(self.x)
             block = linear.stiffness_by(freq, (name,))
@@ -280,13 +280,13 @@ class BalanceState:
         force = np.zeros((high + 1, size), dtype=complex)
         for group, spectrum, _, _ in self.spectra:
             force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
-        frequency = np.arange(high + 1, 2 * high + 2) / basis.nu * self.omega
+        frequency = basis.beyond * self.omega
         compliance = self.linear.compliance(frequency)
         if compliance is not None:
             force = np.einsum("kij,kj->ki", compliance, force)
         blocks = self.linear.stiffness(frequency)
-        motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
-        return -motion.astype(complex, copy=False)
+        motion: ComplexArray = group_kernels.response_to(blocks, force)
+        return motion
 
     @lazy
     def completed(self) -> BalanceState:
@@ -302,7 +302,7 @@ class BalanceState:
 
     def force_scale(self) -> float:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
-        sizes = self._parts[3]
+        sizes = self._parts[1]
         if self.compliance is None:
             return float(sizes[1] + sizes[2] + sizes[3])
         weight = self.balance.scales()[1]
@@ -314,7 +314,7 @@ class BalanceState:
     def residual_size(self) -> float:
         """Size of R with residual weights."""
         if self.compliance is None:
-            return float(self._parts[3][0])
+            return float(self._parts[1][0])
         return length(self.residual.reshape(self.x.shape) * self.balance.scales()[1])
 
 

@@ -1,0 +1,100 @@
+"""Compiled pieces of Newton's method along a curve. Arrays in, arrays out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def bordered_transposed(jacobian, row, weights):
+    """Transpose of `[F_u / weights; row]`, so that its transpose lies in memory as LAPACK wants it; (N + 1, N + 1)."""
+    rows, cols = jacobian.shape
+    out = np.empty((cols, rows + 1))
+    for j in range(cols):
+        scale = 1.0 / weights[j]
+        for i in range(rows):
+            out[j, i] = jacobian[i, j] * scale
+        out[j, rows] = row[j]
+    return out
+
+
+@njit(cache=True)
+def right_hand_side(residual, row, weights, u, guess):
+    """`[F; row . (weights (u - guess))]`, shape (N + 1,)."""
+    n = u.shape[0]
+    out = np.empty(n)
+    total = 0.0
+    for i in range(n):
+        total += row[i] * weights[i] * (u[i] - guess[i])
+    out[: n - 1] = residual
+    out[n - 1] = total
+    return out
+
+
+@njit(cache=True)
+def moved(u, step, weights, share):
+    """`u - share step / weights`, and the length of the step."""
+    out = np.empty(u.shape[0])
+    total = 0.0
+    for i in range(u.shape[0]):
+        out[i] = u[i] - share * step[i] / weights[i]
+        total += step[i] * step[i]
+    return out, math.sqrt(total)
+
+
+@njit(cache=True)
+def distance(u, v, weights):
+    """`|weights (u - v)|`."""
+    total = 0.0
+    for i in range(u.shape[0]):
+        d = weights[i] * (u[i] - v[i])
+        total += d * d
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def normalised(direction, weights):
+    """A direction in scaled variables as a vector in u of unit length in scaled arclength."""
+    total = 0.0
+    for i in range(direction.shape[0]):
+        total += direction[i] * direction[i]
+    total = math.sqrt(total)
+    out = np.empty(direction.shape[0])
+    for i in range(direction.shape[0]):
+        out[i] = direction[i] / (total * weights[i])
+    return out
+
+
+@njit(cache=True)
+def cosine(a, b, weights):
+    """Cosine of the angle between two vectors in scaled variables."""
+    ab = 0.0
+    aa = 0.0
+    bb = 0.0
+    for i in range(a.shape[0]):
+        w = weights[i] * weights[i]
+        ab += w * a[i] * b[i]
+        aa += w * a[i] * a[i]
+        bb += w * b[i] * b[i]
+    return ab / math.sqrt(aa * bb)
+
+
+@njit(cache=True)
+def predicted(u, tangent, bend, step):
+    """`u + step tangent + step^2 / 2 bend`."""
+    return u + step * tangent + 0.5 * step * step * bend
+
+
+@njit(cache=True)
+def determinant_sign(lu, pivots):
+    """Sign of the determinant of a factorised matrix (`lapack.dgetrf`, pivots counted from 0)."""
+    sign = 1.0
+    for i in range(pivots.shape[0]):
+        if pivots[i] != i:
+            sign = -sign
+        if lu[i, i] < 0.0:
+            sign = -sign
+    return sign
