@@ -233,7 +233,7 @@ class _Follower:
                 basis = next_harmonics(state, adaptive)
             if basis.harmonics <= state.basis.harmonics:
                 break
-            x = state.basis.resized(state.x, basis)
+            x = state.completed.basis.resized(state.completed.x, basis)
             # more harmonics need more samples of a law that tells nothing of itself
             balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
             guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)

@@ -118,6 +118,7 @@ def sharp_nodes(c, points, widths, cr, ci, hr, hi, weights, ratio):
 def _refine(c, lo, hi, flo, level):
     """A root of the motion minus `level` in the bracket (lo, hi), by Newton's method kept inside the bracket."""
     tau = 0.5 * (lo + hi)
+    last = hi - lo
     for _ in range(100):
         x, d, _s = _jet(c, math.cos(tau), math.sin(tau))
         f = x - level
@@ -127,12 +128,20 @@ def _refine(c, lo, hi, flo, level):
             lo = tau
         else:
             hi = tau
-        step = -f / d if d != 0.0 else np.inf
-        new = tau + step
+        new = tau - f / d if d != 0.0 else np.inf
         if not (lo < new < hi):
+            # a step out of the bracket that rounding alone explains: the root is here
+            if abs(new - tau) < 1e-14 * max(1.0, abs(tau)) or hi - lo < 4e-16 * max(1.0, abs(tau)):
+                return tau
             new = 0.5 * (lo + hi)
-        if abs(new - tau) < 1e-15 * max(1.0, abs(tau)) or hi - lo < 4e-16 * max(1.0, abs(tau)):
+        step = abs(new - tau)
+        # converging quadratically: the step after one of 1e-8 is below rounding
+        if step < 1e-15 * max(1.0, abs(tau)) or (step < 1e-8 and step < 1e-4 * last):
+            x, d, _s = _jet(c, math.cos(new), math.sin(new))
+            if d != 0.0 and abs(x - level) < abs(d) * 1e-12:
+                new -= (x - level) / d
             return new
+        last = step
         tau = new
     return tau
 

@@ -8,13 +8,14 @@ dimensionless and weighs what matters.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels
-from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.state import BalanceState
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
@@ -77,6 +78,22 @@ def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicB
     return state.basis if wanted is None else HarmonicBasis(wanted * nu, nu)
 
 
+def _expected(tail: Array, high: int, bound: float) -> float:
+    """Harmonic beyond which less than `bound` is left, if the harmonics beyond H go on falling like a power.
+
+    Contacts make them fall like k^-3 or k^-4; smooth laws do so faster than any power.
+    """
+    middle = (3 * high + 1) // 2
+    near, far = tail[high] ** 2 - tail[middle] ** 2, tail[middle] ** 2
+    if not near > far > 0.0:
+        return 2.0 * high
+    # amplitudes k^-p: sums of squares over (H, 3 H / 2] and (3 H / 2, 2 H + 1]
+    power = min(40.0, max(2.0, math.log(near / far) / (2.0 * math.log(1.4))))
+    slope = 2.0 * power - 1.0
+    rest = near / (1.0 - 1.5**-slope)
+    return float(high * (rest / bound**2) ** (1.0 / slope))
+
+
 def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
     """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
     basis = state.basis
@@ -90,7 +107,8 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
         for h in ladder:
             if h * nu < 2 * high and tail[h * nu] <= bound:
                 return h
-        return next((h for h in ladder if h * nu >= 2 * high), ladder[-1])
+        least = max(2.0 * high, min(_expected(tail, high, bound), 2.5 * high))
+        return next((h for h in ladder if h * nu >= least), ladder[-1])
 
     if tail[high] > tolerance:
         wanted = sufficient(0.5 * tolerance)
