@@ -29,8 +29,7 @@ def right_hand_side(residual, row, weights, u, guess):
     total = 0.0
     for i in range(n):
         total += row[i] * weights[i] * (u[i] - guess[i])
-    out[: n - 1] = residual
-    out[n - 1] = total
+        out[i] = residual[i] if i < n - 1 else total
     return out
 
 
@@ -85,7 +84,10 @@ def cosine(a, b, weights):
 @njit(cache=True)
 def predicted(u, tangent, bend, step):
     """`u + step tangent + step^2 / 2 bend`."""
-    return u + step * tangent + 0.5 * step * step * bend
+    out = np.empty(u.shape[0])
+    for i in range(u.shape[0]):
+        out[i] = u[i] + step * (tangent[i] + 0.5 * step * bend[i])
+    return out
 
 
 @njit(cache=True)

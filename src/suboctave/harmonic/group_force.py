@@ -1,6 +1,6 @@
 """The force of all elements that act along one direction, on a motion: one displacement, one set of spectra.
 
-Piecewise-linear and polynomial laws are summed in closed form in one compiled call; sharp laws share one set of graded
+Piecewise-linear laws and polynomials are summed in one compiled call each; sharp laws share one set of graded
 nodes, other laws one uniform grid, so that the motion is evaluated once however many elements there are.
 `local_force` has the same for a single element, and the derivatives that only located bifurcations need.
 """
@@ -127,12 +127,12 @@ def add_spectra(
         Complex coefficients of the relative displacement (H + 1,), base frequency.
     """
     top, high = out[0].shape[0] - 1, motion.shape[0] - 1
-    if law.pieces.shape[0] or law.polynomial.shape[0]:
+    if law.pieces.shape[0]:
         grid = search_grid(high)
-        nodes = uniform_nodes(even(max(0, law.polynomial.shape[0] - 1) * high + top + 1))
-        group_kernels.closed_spectra(
-            motion, law.pieces, law.polynomial, grid.zr, grid.zi, nodes.zr, nodes.zi, out[0], out[1]
-        )
+        group_kernels.add_pieces(motion, law.pieces, grid.zr, grid.zi, out[0], out[1])
+    if law.polynomial.shape[0]:
+        nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
+        group_kernels.add_polynomial(motion, law.polynomial, nodes.zr, nodes.zi, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
         _add_sampled(law.sharp, elements, u, v, rate, Nodes(zr, zi, w), out)
@@ -185,8 +185,9 @@ def curvature_of(
     parts: list[Curvature] = []
     if law.pieces.shape[0]:
         grid = search_grid(high)
-        tau, weight = group_kernels.contact_comb(motion, law.pieces, grid.zr, grid.zi)
-        parts.append(Curvature(np.cos(tau), np.sin(tau), weight, None, None))
+        comb, count = group_kernels.contact_comb(motion, law.pieces, grid.zr, grid.zi)
+        zr, zi, weight = np.ascontiguousarray(comb[:, :count])
+        parts.append(Curvature(zr, zi, weight, None, None))
     if law.polynomial.shape[0] > 2:
         nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
         u = kernels.motion(motion, nodes.zr, nodes.zi)[0]

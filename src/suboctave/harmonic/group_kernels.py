@@ -11,63 +11,67 @@ import math
 import numpy as np
 from numba import njit
 
-from suboctave.harmonic.instants import crossings_of
+from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
 
 @njit(cache=True)
-def closed_spectra(c, pieces, polynomial, grid_r, grid_i, uniform_r, uniform_i, force, stiffness):
-    """Add the Fourier coefficients of laws known in closed form to force and stiffness (top + 1,), in place.
+def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
+    """Add the Fourier coefficients of piecewise-linear laws to force and stiffness (top + 1,), in place.
 
     Parameters
     ----------
     c
         Complex coefficients of the relative displacement (H + 1,).
     pieces
-        Stiffness, gap and side of every piece of piecewise-linear laws, (P, 3).
-    polynomial
-        Coefficients of u^0, u^1, ..., possibly none.
-    grid_r, grid_i, uniform_r, uniform_i
-        Equidistant points on the circle: for the search for crossings, and enough for the polynomial's tangent.
+        Stiffness, gap and side of every piece, (P, 3).
+    grid_r, grid_i
+        Equidistant points on the circle for the search for crossings.
     """
     top = force.shape[0] - 1
     high = c.shape[0] - 1
-    if pieces.shape[0]:
-        values = motion(c, grid_r, grid_i)
-        slope = np.zeros(top + high + 1, dtype=np.complex128)
-        touching = False
-        for p in range(pieces.shape[0]):
-            k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-            found, above = crossings_of(c, gap, values)
-            if found.shape[0] == 0 and above != (side > 0):
-                continue
-            touching = True
-            chi = contact_spectrum(found, above, side, top + high)
-            for q in range(top + high + 1):
-                slope[q] += k * chi[q]
-            for q in range(top + 1):
-                force[q] -= k * gap * chi[q]
-        if touching:
-            product = product_spectrum(c, 0.0, slope, top)
-            for q in range(top + 1):
-                force[q] += product[q]
-                stiffness[q] += slope[q]
-    if polynomial.shape[0]:
-        n = uniform_r.shape[0]
-        u = motion(c, uniform_r, uniform_i)[0]
-        law = np.empty((2, n))
-        degree = polynomial.shape[0] - 1
-        for j in range(n):
-            f, slope_at = 0.0, 0.0
-            for p in range(degree, -1, -1):
-                slope_at = slope_at * u[j] + f
-                f = f * u[j] + polynomial[p]
-            law[0, j] = f * (2.0 * math.pi / n)
-            law[1, j] = slope_at * (2.0 * math.pi / n)
-        found_spectra = spectra(law, uniform_r, uniform_i, top)
+    values = motion(c, grid_r, grid_i)
+    slope = np.zeros(top + high + 1, dtype=np.complex128)
+    touching = False
+    for p in range(pieces.shape[0]):
+        k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
+        found, above = crossings_of(c, gap, values)
+        if found.shape[0] == 0 and above != (side > 0):
+            continue
+        touching = True
+        chi = contact_spectrum(found, above, side, top + high)
+        for q in range(top + high + 1):
+            slope[q] += k * chi[q]
         for q in range(top + 1):
-            force[q] += found_spectra[0, q]
-            stiffness[q] += found_spectra[1, q]
+            force[q] -= k * gap * chi[q]
+    if touching:
+        product = product_spectrum(c, 0.0, slope, top)
+        for q in range(top + 1):
+            force[q] += product[q]
+            stiffness[q] += slope[q]
+
+
+@njit(cache=True)
+def add_polynomial(c, polynomial, zr, zi, force, stiffness):
+    """Add the Fourier coefficients of `sum_p polynomial_p u^p` to force and stiffness (top + 1,), in place.
+
+    z: equidistant points on the circle, enough for the tangent.
+    """
+    n = zr.shape[0]
+    values = motion(c, zr, zi)
+    law = np.empty((2, n))
+    scale = 2.0 * math.pi / n
+    for j in range(n):
+        f, slope = 0.0, 0.0
+        for p in range(polynomial.shape[0] - 1, -1, -1):
+            slope = slope * values[0, j] + f
+            f = f * values[0, j] + polynomial[p]
+        law[0, j] = f * scale
+        law[1, j] = slope * scale
+    found = spectra(law, zr, zi, force.shape[0] - 1)
+    for q in range(force.shape[0]):
+        force[q] += found[0, q]
+        stiffness[q] += found[1, q]
 
 
 @njit(cache=True, fastmath=_FAST)
@@ -103,21 +107,25 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
 
 @njit(cache=True)
 def contact_comb(c, pieces, grid_r, grid_i):
-    """Instants at which the gaps of piecewise-linear pieces are crossed, and the weights of `f_uu` there, `side
-    stiffness / |u'|`, with |u'| kept from zero where the motion grazes.
+    """Instants at which the gaps of piecewise-linear pieces are crossed: cosines, sines, and the weights of `f_uu`
+    there, `side stiffness / |u'|`, with |u'| kept from zero where the motion grazes; how many of the columns count.
     """
     values = motion(c, grid_r, grid_i)
     largest = 1e-300
     for h in range(c.shape[0]):
         largest = max(largest, abs(c[h]))
-    at = np.empty(0)
-    weight = np.empty(0)
+    out = np.empty((3, 4 * grid_r.shape[0] * max(1, pieces.shape[0])))
+    count = 0
     for p in range(pieces.shape[0]):
         found, _above = crossings_of(c, pieces[p, 1], values)
-        speed = motion(c, np.cos(found), np.sin(found))[1]
-        at = np.concatenate((at, found))
-        weight = np.concatenate((weight, pieces[p, 2] * pieces[p, 0] / np.maximum(np.abs(speed), 1e-12 * largest)))
-    return at, weight
+        for i in range(found.shape[0]):
+            zr, zi = math.cos(found[i]), math.sin(found[i])
+            speed = abs(_jet(c, zr, zi)[1])
+            out[0, count] = zr
+            out[1, count] = zi
+            out[2, count] = pieces[p, 2] * pieces[p, 0] / max(speed, 1e-12 * largest)
+            count += 1
+    return out, count
 
 
 @njit(cache=True)
@@ -329,18 +337,4 @@ def apply_scaled(blocks, scale, x):
             out[2 * h, i] *= scale[h]
     for i in range(x.shape[1]):
         out[0, i] *= scale[0]
-    return out
-
-
-@njit(cache=True)
-def response_to(blocks, force):
-    """`-blocks^-1 force` per harmonic, (F, n), for a small number of DOFs too; blocks (F, n, n)."""
-    count, n = force.shape
-    out = np.empty((count, n), dtype=np.complex128)
-    if n == 1:
-        for f in range(count):
-            out[f, 0] = -force[f, 0] / blocks[f, 0, 0]
-        return out
-    for f in range(count):
-        out[f] = -np.linalg.solve(blocks[f], force[f])
     return out

@@ -143,11 +143,16 @@ def singular_instants(c, points, widths, reach, zr, zi):
                     found[0, count] = at
                     found[1, count] = distance
                     count += 1
-    order = np.argsort(found[0, :count])
     out = np.empty((2, count))
     for k in range(count):
-        out[0, k] = found[0, order[k]]
-        out[1, k] = found[1, order[k]]
+        # by insertion: there are few
+        i = k
+        while i > 0 and out[0, i - 1] > found[0, k]:
+            out[0, i] = out[0, i - 1]
+            out[1, i] = out[1, i - 1]
+            i -= 1
+        out[0, i] = found[0, k]
+        out[1, i] = found[1, k]
     return out
 
 
@@ -206,10 +211,13 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
 def _with_motion(c, zr, zi, w):
     """The result of `sharp_nodes`: one array, since handing arrays over costs more than filling them."""
     out = np.empty((5, zr.shape[0]))
-    out[0] = zr
-    out[1] = zi
-    out[2] = w
-    out[3:] = motion(c, zr, zi)
+    values = motion(c, zr, zi)
+    for j in range(zr.shape[0]):
+        out[0, j] = zr[j]
+        out[1, j] = zi[j]
+        out[2, j] = w[j]
+        out[3, j] = values[0, j]
+        out[4, j] = values[1, j]
     return out
 
 
@@ -234,70 +242,46 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
     panel = _PLAIN / degree
     at = singular_instants(c, points, widths, 0.5 * _HARMLESS * panel, zr, zi)
     number = at.shape[1]
-    capacity = 64 * (8 + number * 6 + math.ceil(2.0 * math.pi / panel))
+    intervals = max(1, 2 * number)
+    capacity = ORDERS * (8 + 3 * intervals + math.ceil(2.0 * math.pi / panel))
     out_r, out_i, w = np.empty(capacity), np.empty(capacity), np.empty(capacity)
     offset = np.empty(ORDERS)
     count = 0
-    if number == 0:
-        panels = max(2, math.ceil(2.0 * math.pi / panel))
-        half = math.pi / panels
-        for p in range(panels):
+    for k in range(intervals):
+        # the way from a singularity to the middle before the next, forwards or backwards in time
+        centre, distance, length, sign = 0.0, 1.0, 2.0 * math.pi, 1.0
+        if number > 0:
+            first, second = k // 2, (k // 2 + 1) % number
+            start = at[0, first]
+            end = at[0, second] + (2.0 * math.pi if first == number - 1 else 0.0)
+            length = 0.5 * (end - start)
+            forwards = k % 2 == 0
+            centre, distance = (start, at[1, first]) if forwards else (end, at[1, second])
+            sign = 1.0 if forwards else -1.0
+        done = 0.0
+        while done < length * (1.0 - 1e-15):
+            # far from the singularity, in units of its own length, a piece needs no map
+            piece = _NEAR / degree if done == 0.0 and number > 0 else _FAR / degree
+            plain = number == 0 or done > 0.5 * piece
+            if done + 1.3 * piece >= length:
+                piece = length - done
+            elif done + 2.0 * piece > length:
+                piece = 0.5 * (length - done)
             count = _fill(
                 out_r,
                 out_i,
                 w,
                 count,
-                (2 * p + 1) * half,
-                1.0,
-                1.0,
-                -half,
-                half,
-                True,
-                2.0 * half * degree,
+                centre,
+                sign,
+                distance,
+                done,
+                done + piece,
+                plain,
+                piece * degree,
                 nodes,
                 weights,
                 offset,
             )
-        return _with_motion(c, out_r[:count], out_i[:count], w[:count])
-    for k in range(number):
-        start = at[0, k]
-        end = at[0, k + 1] if k + 1 < number else at[0, 0] + 2.0 * math.pi
-        length = 0.5 * (end - start)
-        if length <= 0.0:
-            continue
-        for side in range(2):
-            centre = start if side == 0 else end
-            distance = at[1, k] if side == 0 else at[1, (k + 1) % number]
-            sign = 1.0 if side == 0 else -1.0
-            done = 0.0
-            while done < length:
-                if done == 0.0:
-                    piece, plain = _NEAR / degree, False
-                else:
-                    # far from the singularity, in units of its own length, a piece needs no map
-                    piece = _FAR / degree
-                    plain = done > 0.5 * piece
-                if done + 1.3 * piece >= length:
-                    piece = length - done
-                elif done + 2.0 * piece > length:
-                    piece = 0.5 * (length - done)
-                count = _fill(
-                    out_r,
-                    out_i,
-                    w,
-                    count,
-                    centre,
-                    sign,
-                    distance,
-                    done,
-                    done + piece,
-                    plain,
-                    piece * degree,
-                    nodes,
-                    weights,
-                    offset,
-                )
-                if done + piece >= length * (1.0 - 1e-15):
-                    break
-                done += piece
+            done += piece
     return _with_motion(c, out_r[:count], out_i[:count], w[:count])

@@ -285,8 +285,8 @@ class BalanceState:
         if compliance is not None:
             force = np.einsum("kij,kj->ki", compliance, force)
         blocks = self.linear.stiffness(frequency)
-        motion: ComplexArray = group_kernels.response_to(blocks, force)
-        return motion
+        motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+        return -motion.astype(complex, copy=False)
 
     @lazy
     def completed(self) -> BalanceState:
