@@ -139,7 +139,9 @@ class ResponseCurve:
             basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance)
         balance = self._in_basis(basis)
         x, omega, values = self.split(u)
-        balance = balance.settle(self.balance.basis.resized(x, basis), omega, values)
+        if balance is not self.balance:
+            x = self.balance.basis.resized(x, basis)
+        balance = balance.settle(x, omega, values)
         return self if balance is self.balance else self.with_balance(balance)
 
     def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:

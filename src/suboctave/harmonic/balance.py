@@ -138,7 +138,7 @@ class HarmonicBalance:
 
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
         """These equations with sample counts chosen for a motion and frozen from here on."""
-        if all(s is None for s in self.samples) and not self._blind:
+        if self._settled:
             return self
         state = self.at(x, omega, values)
         samples = tuple(
@@ -148,9 +148,15 @@ class HarmonicBalance:
         return self.with_samples(samples)
 
     @cached_property
-    def _blind(self) -> bool:
-        """True if an element tells nothing of its law."""
-        return any(isinstance(kind, AdaptiveSampling) for kind in self.coefficients(self.values)[1])
+    def _settled(self) -> bool:
+        """True if no element needs a number of samples."""
+        kinds = self.coefficients(self.values)[1]
+        return all(s is None for s in self.samples) and not any(isinstance(kind, AdaptiveSampling) for kind in kinds)
+
+    @cached_property
+    def highest_load(self) -> int:
+        """Highest harmonic of omega that is loaded, 0 without loads."""
+        return max((c.harmonic for c in self.system.load_components()), default=0)
 
     def load(self, values: Mapping[str, float], omega: float) -> Array:
         """Load coefficients P, shape (2 H + 1, size)."""

@@ -66,7 +66,7 @@ def truncation(state: BalanceState) -> float:
 def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
     """Numbers of harmonics of omega to choose from."""
     nu, high = state.basis.nu, state.basis.harmonics
-    lowest = max([options.minimum] + [c.harmonic for c in state.balance.system.load_components()])
+    lowest = max(options.minimum, state.balance.highest_load)
     most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
     return [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
 
