@@ -58,8 +58,12 @@ class GroupLaw:
         Elements (index, coefficients) that are sampled on graded and on uniform nodes.
     points, widths
         Where the sharp ones are singular.
-    degree, blind
-        Highest degree of polynomials that need samples, and whether an element tells nothing.
+    smooth_steps
+        Gap, width, stiffness of all arctan steps that are told, (S, 3); `line` their constant and slope.
+    told
+        The elements (index, coefficients) that these belong to.
+    degree
+        Highest degree of polynomials that need samples.
     """
 
     pieces: Array
@@ -68,6 +72,9 @@ class GroupLaw:
     uniform: tuple[tuple[int, Array], ...]
     points: Array
     widths: Array
+    smooth_steps: Array
+    line: Array
+    told: tuple[tuple[int, Array], ...]
     degree: int
 
     @classmethod
@@ -75,7 +82,9 @@ class GroupLaw:
         """Sort the laws of a group's members."""
         pieces: list[tuple[float, float, float]] = []
         polynomials: list[tuple[float, ...]] = []
-        sharp, uniform = [], []
+        sharp, uniform, told = [], [], []
+        steps: list[tuple[float, float, float]] = []
+        line = np.zeros(2)
         points: list[Array] = []
         widths: list[Array] = []
         degree = 0
@@ -85,6 +94,10 @@ class GroupLaw:
                 pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
             elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
                 polynomials.append(kind.coefficients)
+            elif isinstance(kind, SharpSampling) and kind.steps is not None:
+                told.append((i, c))
+                steps += zip(kind.points, kind.widths, kind.steps, strict=True)
+                line += (kind.constant, kind.slope)
             elif isinstance(kind, SharpSampling):
                 sharp.append((i, c))
                 where = singularities(kind)
@@ -105,6 +118,9 @@ class GroupLaw:
             tuple(uniform),
             np.concatenate(points) if points else none,
             np.concatenate(widths) if widths else none,
+            np.array(steps, dtype=float).reshape(-1, 3),
+            line,
+            tuple(told),
             degree,
         )
 
@@ -133,6 +149,10 @@ def add_spectra(
     if law.polynomial.shape[0]:
         nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
         group_kernels.add_polynomial(motion, law.polynomial, nodes.zr, nodes.zi, out[0], out[1])
+    if law.told:
+        points, widths = law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy()
+        sampled = graded_motion(motion, points, widths, top)
+        group_kernels.add_smooth_steps(sampled, law.smooth_steps, law.line, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
         _add_sampled(law.sharp, elements, u, v, rate, Nodes(zr, zi, w), out)
@@ -195,13 +215,17 @@ def curvature_of(
         parts.append(
             Curvature(nodes.zr, nodes.zi, nodes.weights * np.polynomial.polynomial.polyval(u, second), None, None)
         )
-    for members, given in ((law.sharp, True), (law.uniform, False)):
+    for members, points, widths in (
+        (law.told, law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy()),
+        (law.sharp, law.points, law.widths),
+        (law.uniform, None, None),
+    ):
         if not members:
             continue
         nodes = (
-            graded_nodes(motion, law.points, law.widths, top)
-            if given
-            else uniform_nodes(uniform_count(law, samples, high, top))
+            uniform_nodes(uniform_count(law, samples, high, top))
+            if points is None or widths is None
+            else graded_nodes(motion, points, widths, top)
         )
         values = kernels.motion(motion, nodes.zr, nodes.zi)
         rows: list[Array | None] = [None, None, None]

@@ -105,6 +105,47 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
             pr[j] = t
 
 
+@njit(cache=True, fastmath=_FAST)
+def add_smooth_steps(sampled, steps, line, force, stiffness):
+    """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.
+
+    sampled: what `sharp_nodes` gives, (5, N); steps: point, width, step, (S, 3); line: constant and slope.
+    """
+    n = sampled.shape[1]
+    zr, zi, weights, u = sampled[0], sampled[1], sampled[2], sampled[3]
+    f = np.empty(n)
+    f_u = np.empty(n)
+    for j in range(n):
+        f[j] = line[0] + line[1] * u[j]
+        f_u[j] = line[1]
+    for s in range(steps.shape[0]):
+        point, width, factor = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
+        for j in range(n):
+            y = u[j] - point
+            ratio = y / width
+            angle = math.atan(ratio)
+            f[j] += factor * (y * angle - 0.5 * width * math.log1p(ratio * ratio))
+            f_u[j] += factor * angle
+    scale = 1.0 / (2.0 * math.pi)
+    pr = np.empty(n)
+    pi = np.empty(n)
+    for j in range(n):
+        pr[j] = weights[j] * scale
+        pi[j] = 0.0
+    for q in range(force.shape[0]):
+        fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
+        for j in range(n):
+            fr += f[j] * pr[j]
+            fi += f[j] * pi[j]
+            sr += f_u[j] * pr[j]
+            si += f_u[j] * pi[j]
+            t = pr[j] * zr[j] - pi[j] * zi[j]
+            pi[j] = pr[j] * zi[j] + pi[j] * zr[j]
+            pr[j] = t
+        force[q] += complex(fr, -fi)
+        stiffness[q] += complex(sr, -si)
+
+
 @njit(cache=True)
 def contact_comb(c, pieces, grid_r, grid_i):
     """Instants at which the gaps of piecewise-linear pieces are crossed: cosines, sines, and the weights of `f_uu`

@@ -220,6 +220,12 @@ class _Check:
         if isinstance(sampling, PolynomialSampling) and sampling.coefficients is not None:
             told = np.polynomial.polynomial.polyval(self.u, sampling.coefficients)
             self.errors["polynomial told"] = float(np.max(np.abs(told - tangent[0]))) / size
+        if isinstance(sampling, SharpSampling) and sampling.steps is not None:
+            told = sampling.constant + sampling.slope * self.u
+            for point, width, step in zip(sampling.points, sampling.widths, sampling.steps, strict=True):
+                y = self.u - point
+                told += step / np.pi * (y * np.arctan(y / width) - 0.5 * width * np.log1p((y / width) ** 2))
+            self.errors["arctan steps told"] = float(np.max(np.abs(told - tangent[0]))) / size
         if not isinstance(sampling, PiecewiseLinear):
             return
         total = np.zeros_like(self.u)

@@ -30,10 +30,27 @@ class PolynomialSampling:
 
 @dataclass(frozen=True)
 class SharpSampling:
-    """Analytic on the real axis, with complex singularities at `u = points[i] +- 1j * widths[i]` (unit: length)."""
+    """Analytic on the real axis, with complex singularities at `u = points[i] +- 1j * widths[i]` (unit: length).
+
+    A law that is a sum of arctan steps of its stiffness may tell them: it is then evaluated without asking the element,
+
+        f = constant + slope u + sum_i steps_i / pi [y_i atan(y_i / w_i) - w_i / 2 ln(1 + (y_i / w_i)^2)]
+
+    with y_i = u - points_i, w_i = widths_i.
+
+    constant
+        Unit: force; `slope` and `steps` are stiffnesses.
+    """
 
     points: tuple[float, ...]
     widths: tuple[float, ...]
+    constant: float = 0.0
+    slope: float = 0.0
+    steps: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.points) != len(self.widths) or len(self.steps or self.points) != len(self.points):
+            raise InputError("a sharp law has as many widths (and steps, if it tells them) as points")
 
 
 @dataclass(frozen=True)

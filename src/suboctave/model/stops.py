@@ -102,7 +102,10 @@ class ElasticStop(Element):
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gap with width 1/s."""
         if self.regularised:
-            return SharpSampling((float(c[1]),), (1.0 / float(c[2]),))
+            k, b, sharpness = (float(value) for value in c)
+            # right: k [phi + at_rest], left: k [u - phi + at_rest], phi = y / 2 + an arctan step at the gap
+            constant = k * (self._at_rest(b, sharpness) - 0.5 * self._sign * b)
+            return SharpSampling((b,), (1.0 / sharpness,), constant, 0.5 * k, (self._sign * k,))
         return PiecewiseLinear((Piece(stiffness=0, gap=1, side=self._sign),))
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
