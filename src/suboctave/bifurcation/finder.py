@@ -61,12 +61,12 @@ def locate(
     at_low, at_high = a, b
     for depth in range(bisections):
         share = kind.fraction(at_low, at_high)
-        fraction = low + share * (high - low)
         nearer = at_low if share < 0.5 else at_high
         if depth % 3 == 0:
-            found = _try(kind, a, b, low, high, between(a.point, b.point, fraction), nearer, make_guess)
+            # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
+            found = _try(kind, at_low, at_high, share, nearer, make_guess)
             if found is not None:
-                return Located(kind, found[1], nearer, found[0], 0.0)
+                return Located(kind, low + found[1] * (high - low), nearer, found[0], 0.0)
         middle = None
         for part in (0.5, 0.4, 0.65):
             try:
@@ -89,16 +89,15 @@ def locate(
 
 def _try(
     kind: BifurcationKind,
-    a: Sample,
-    b: Sample,
-    low: float,
-    high: float,
-    u: Array,
+    low: Sample,
+    high: Sample,
+    share: float,
     nearer: Sample,
     make_guess: Callable[[Array, CurvePoint, float], Guess],
 ) -> tuple[Singular, float] | None:
+    """A solution between two samples and where, from a start at a share of the way; None if there is none."""
     try:
-        guess = make_guess(u, b.point, kind.kappa(nearer))
+        guess = make_guess(between(low.point, high.point, share), high.point, kind.kappa(nearer))
         found = kind.solve(guess)
     except ConvergenceError:
         return None
@@ -107,9 +106,8 @@ def _try(
     solution = np.append(
         found.state.x.ravel(), found.state.omega if guess.name == "omega" else found.state.values[guess.name]
     )
-    fraction = position(a.point, b.point, solution)
-    margin = 0.05 * (high - low) + 1e-9
-    if fraction is None or not low - margin <= fraction <= high + margin:
+    fraction = position(low.point, high.point, solution)
+    if fraction is None or not -0.05 <= fraction <= 1.05:
         return None
     return found, fraction
 
