@@ -12,6 +12,8 @@ from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate
+from suboctave.bifurcation.grazing import locate_grazings
+from suboctave.bifurcation.layer import grazing_beside, layer_of
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
@@ -56,7 +58,7 @@ class Trace:
         on = [replace(p, arclength=length + p.arclength) for p in other.points[1:]]
 
         def joined(first: list[Bifurcation], second: list[Bifurcation]) -> list[Bifurcation]:
-            flipped = [replace(b, arclength=length - b.arclength) for b in reversed(first)]
+            flipped = [b.seen_backwards(length - b.arclength) for b in reversed(first)]
             return flipped + [replace(b, arclength=length + b.arclength) for b in second]
 
         return Trace(
@@ -162,6 +164,9 @@ class _Follower:
             if kind.name == "BP":
                 branch_point = item
         complaint = self._count.complaint(b, [item for _, item in found])
+        if not (_at_rest(a) or _at_rest(b)):
+            for touched in locate_grazings(a, b, self.settings.newton, self._sample, _guess):
+                found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self.trace.warnings.append(complaint)
         self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
@@ -188,9 +193,11 @@ class _Follower:
         assert isinstance(curve, ResponseCurve)
         if located.solution is None:
             orbit = self._orbit(located.sample)
+            point = located.sample.point
+            beside = grazing_beside(_guess(point.u, point, 0.0))
             self.trace.warnings.append(
-                f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
-                f"to +- {located.width:.1e}: the motion grazes a contact there, or too few harmonics are kept"
+                f"{located.kind.name} near {curve.where(point.u)} could only be bracketed, to +- {located.width:.1e}: "
+                + (f"{beside[0].label} grazes there" if beside else "too few harmonics are kept, or a law is rough there")
             )
             return Bifurcation(
                 located.kind.name,
@@ -201,9 +208,11 @@ class _Follower:
                 curve.name,
                 uncertainty=located.width,
                 arclength=arclength,
+                contact=beside[0] if beside else None,
             )
         solution = self._refined(located, located.solution, curve)
         state = solution.state
+        guess = Guess(state.balance, state.x, state.omega, state.values, curve.name, curve.span)
         orbit = _as_orbit(state, solution.residual, truncation(state), curve)
         return Bifurcation(
             located.kind.name,
@@ -215,6 +224,7 @@ class _Follower:
             solution.vectors,
             solution.kappa,
             arclength=arclength,
+            contact=located.kind.contact(solution, curve.name) or layer_of(located.kind, solution, guess),
         )
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
@@ -228,7 +238,7 @@ class _Follower:
             if basis.harmonics <= state.basis.harmonics:
                 # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
                 critical = located.kind.critical(solution)
-                if np.abs(floquet_multipliers(state).multipliers - critical).min() <= _CRITICAL:
+                if critical is None or np.abs(floquet_multipliers(state).multipliers - critical).min() <= _CRITICAL:
                     break
                 basis = next_harmonics(state, adaptive)
             if basis.harmonics <= state.basis.harmonics:

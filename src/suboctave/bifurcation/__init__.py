@@ -1,6 +1,16 @@
 """Where a response changes: limit points, branch points, period doublings, Neimark-Sacker points."""
 
-from suboctave.bifurcation.bifurcation import KINDS, Bifurcation, BifurcationList
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, KINDS, Bifurcation, BifurcationList
+from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.kinds import ALL_KINDS, BifurcationKind, Sample
 
-__all__ = ["ALL_KINDS", "KINDS", "Bifurcation", "BifurcationKind", "BifurcationList", "Sample"]
+__all__ = [
+    "ALL_KINDS",
+    "CONTACT_KINDS",
+    "KINDS",
+    "Bifurcation",
+    "BifurcationKind",
+    "BifurcationList",
+    "GrazingContact",
+    "Sample",
+]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, overload
 
+from suboctave.bifurcation.contact import GrazingContact
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -18,17 +19,24 @@ KINDS = {
     "BP": "branch point",
     "PD": "period doubling",
     "NS": "Neimark-Sacker",
+    "grazing": "grazing contact",
 }
+#: kinds at which a curve meets a contact, without having to change in number or stability
+CONTACT_KINDS = ("grazing",)
+
+
+#: way along a curve, in scaled arclength, that its smallest steps resolve
+_RESOLVED = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Bifurcation:
-    """A motion at which the response changes its nature.
+    """A motion at which the response changes its nature, or a contact begins or ceases to touch.
 
     Attributes
     ----------
     kind
-        "LP", "BP", "PD", "NS", or the name of a user's event.
+        "LP", "BP", "PD", "NS", "grazing", or the name of a user's event.
     orbit
         The motion, with its own number of harmonics.
     floquet
@@ -43,6 +51,9 @@ class Bifurcation:
         Frequency of the perturbation at an NS, rad per unit time; else 0.
     uncertainty
         Half-width in the free parameter if the point could only be bracketed, else 0.
+    contact
+        The contact that grazes: at a grazing its own; at another bifurcation the one whose beginning or end brings it
+        about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.
     criticality
         "supercritical", "subcritical" or None where it has not been computed.
     arclength
@@ -60,7 +71,29 @@ class Bifurcation:
     uncertainty: float = 0.0
     criticality: str | None = None
     arclength: float = 0.0
+    contact: GrazingContact | None = None
     context: Any = field(default=None, repr=False)
+
+    @property
+    def smooth(self) -> bool:
+        """True if no contact just begins or ends to touch here."""
+        return self.contact is None
+
+    @property
+    def discontinuous(self) -> bool:
+        """True for a bifurcation that no step can tell from the grazing that brings it about.
+
+        Its critical multiplier jumps across the unit circle as far as the curve can be resolved.
+        """
+        return (
+            self.contact is not None
+            and self.kind not in CONTACT_KINDS
+            and (self.uncertainty > 0.0 or self.contact.distance <= _RESOLVED)
+        )
+
+    def seen_backwards(self, arclength: float) -> Bifurcation:
+        """The same on the curve followed the other way."""
+        return replace(self, arclength=arclength, contact=None if self.contact is None else self.contact.backwards())
 
     @property
     def omega(self) -> float:
@@ -96,6 +129,19 @@ class Bifurcation:
             return complex(mu[0])
         return complex(min(mu, key=lambda m: abs(m - targets[self.kind])))
 
+    def remark(self) -> str:
+        """What a table says beside the numbers: the contact that grazes, and what could only be bracketed."""
+        words = []
+        if self.uncertainty:
+            words.append(f"bracketed to +- {self.uncertainty:.1e} in {self.parameter_name}")
+        if self.contact is not None and self.kind in CONTACT_KINDS:
+            words.append(str(self.contact))
+        elif self.contact is not None:
+            behind = self.parameter(self.parameter_name) - self.contact.parameter
+            nature = "discontinuous, at" if self.discontinuous else f"{behind:+.1e} from"
+            words.append(f"{nature} the grazing of {self.contact.label}")
+        return "; ".join(words)
+
     def __repr__(self) -> str:
         free = (
             ""
@@ -107,10 +153,15 @@ class Bifurcation:
 
 
 class BifurcationList:
-    """Located bifurcations in the order met; `["PD"]` gives those of a kind, `[0]` one by position."""
+    """Located bifurcations in the order met; `["PD"]` gives those of a kind, `[0]` one by position.
+
+    Grazing contacts are no bifurcations: iteration, positions and the length leave them out, `["grazing"]` gives them,
+    and the table shows them where they lie on the curve. `met` is everything in the order met.
+    """
 
     def __init__(self, items: list[Bifurcation], names: tuple[str, ...] = ()) -> None:
-        self._items = list(items)
+        self.met = tuple(items)
+        self._items = [item for item in items if item.kind not in CONTACT_KINDS]
         self._known = tuple(KINDS) + names
 
     def __iter__(self) -> Iterator[Bifurcation]:
@@ -128,22 +179,27 @@ class BifurcationList:
         if isinstance(key, str):
             if key not in self._known:
                 raise InputError(f"unknown kind of bifurcation {key!r}{suggest(key, list(self._known))}")
-            return [item for item in self._items if item.kind == key]
+            return [item for item in self.met if item.kind == key]
         return self._items[key]
 
     def __repr__(self) -> str:
-        if not self._items:
+        if not self.met:
             return "no bifurcations"
-        free = next((b.parameter_name for b in self._items if b.parameter_name != "omega"), None)
+        free = next((b.parameter_name for b in self.met if b.parameter_name != "omega"), None)
+        width = max(6, 1 + max(len(b.kind) for b in self.met))
         head = (
-            f"{'kind':<6}{'omega':>14}"
+            f"{'kind':<{width}}{'omega':>13}"
             + (f"{free:>14}" if free else "")
             + f"{'amplitude':>14}{'multiplier':>24}{'residual':>11}"
         )
         rows = [head]
-        for b in self._items:
+        for b in self.met:
             mu = b.critical_multiplier()
             text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
             extra = f"{b.parameter(free):>14.8g}" if free else ""
-            rows.append(f"{b.kind:<6}{b.omega:>14.9g}{extra}{b.amplitude:>14.7g}{text:>24}{b.residual:>11.1e}")
+            remark = b.remark()
+            rows.append(
+                f"{b.kind:<{width}}{b.omega:>13.9g}{extra}{b.amplitude:>14.7g}{text:>24}{b.residual:>11.1e}"
+                + (f"  {remark}" if remark else "")
+            )
         return "\n".join(rows)

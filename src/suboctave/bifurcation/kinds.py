@@ -20,6 +20,8 @@ from functools import cached_property
 import numpy as np
 
 from suboctave.bifurcation.branch import locate_branch_point
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.march import CurvePoint
@@ -48,6 +50,11 @@ class Sample:
     def half_sign(self) -> float:
         """Sign of det J_half."""
         return Factor.of(self.state.half_jacobian).sign
+
+    @cached_property
+    def gaps(self) -> tuple[GapExtrema, ...]:
+        """The elements' gaps with the extrema of the motion there."""
+        return gap_extrema(self.state)
 
     @property
     def slope(self) -> float:
@@ -81,9 +88,13 @@ class BifurcationKind(ABC):
         """Whether a solution of the system really is of this kind."""
         return True
 
-    def critical(self, found: Singular) -> complex:
-        """The multiplier that lies on the unit circle at a solution."""
+    def critical(self, found: Singular) -> complex | None:
+        """The multiplier that lies on the unit circle at a solution, None if none need."""
         return {Kind.INTEGER: 1.0 + 0.0j, Kind.HALF: -1.0 + 0.0j}[self.operator]
+
+    def contact(self, found: Singular, name: str) -> GrazingContact | None:
+        """The contact that grazes at a solution, where the kind is that; `name` is the free parameter's."""
+        return None
 
 
 class LimitPoint(BifurcationKind):

@@ -50,12 +50,12 @@ class Guess:
 
 @dataclass(frozen=True)
 class Singular:
-    """A located singular motion: state, borders' null vectors, kappa, and the dimensionless residual of the whole
-    system.
+    """A located motion: state, null vectors of its singular operator (None if it has none), kappa, and the
+    dimensionless residual of the whole system.
     """
 
     state: BalanceState
-    vectors: NullVectors
+    vectors: NullVectors | None
     kappa: float
     residual: float
     iterations: int

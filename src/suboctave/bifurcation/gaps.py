@@ -1,0 +1,87 @@
+"""The gaps of a system's elements along a motion: where the relative displacement turns, and how far from each gap.
+
+A gap is a place u = b at which an element's law has a corner (a piece of a piecewise-linear law), or is sharp (a point
+of `SharpSampling`). Elements that act along the same direction share one search for extrema.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.grazing_instants import extrema
+from suboctave.harmonic.local_force import LocalMotion
+from suboctave.harmonic.quadrature import uniform_nodes
+from suboctave.harmonic.rates import coefficient_rates
+from suboctave.harmonic.state import BalanceState
+from suboctave.model.sampling import PiecewiseLinear, SharpSampling
+
+
+@dataclass(frozen=True, eq=False)
+class GapExtrema:
+    """One gap and the extrema of the relative displacement there, ascending in tau.
+
+    Index of the element, index of the gap among the element's, displacement of the gap (`level`); instants, values and
+    second derivatives by tau of the extrema, shape (m,) each, m even, maxima and minima in turn.
+    """
+
+    element: int
+    index: int
+    level: float
+    tau: Array
+    value: Array
+    curve: Array
+
+
+def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
+    """Every gap of every element on a motion."""
+    found = []
+    for group in state.balance.groups:
+        turns = None
+        for i in group.members:
+            local = state.local_motions[i]
+            for index, level in enumerate(levels(local)):
+                if turns is None:
+                    high = local.motion.shape[0] - 1
+                    grid = uniform_nodes(1 << math.ceil(math.log2(8 * high + 8)))
+                    turns = extrema(local.motion, grid.zr, grid.zi)
+                found.append(GapExtrema(i, index, level, *turns))
+    return tuple(found)
+
+
+def levels(local: LocalMotion) -> tuple[float, ...]:
+    """Displacements at which an element's law has a corner, or is sharp."""
+    kind = local.kind
+    if isinstance(kind, PiecewiseLinear):
+        return tuple(float(local.coefficients[piece.gap]) for piece in kind.pieces)
+    return kind.points if isinstance(kind, SharpSampling) else ()
+
+
+def level_rate(state: BalanceState, element: int, index: int, name: str) -> float:
+    """Derivative of a gap by "omega" or a parameter."""
+    if name == "omega":
+        return 0.0
+    local = state.local_motions[element]
+    rates = coefficient_rates(local.element, state.values, {name: 1.0})
+    if not rates.any():
+        return 0.0
+    kind = local.kind
+    if isinstance(kind, PiecewiseLinear):
+        return float(rates[kind.pieces[index].gap])
+    # what a sharp law tells of itself is the point alone: by differences, which are exact where a gap is a coefficient
+    ends = [local.element.sampling(local.coefficients + s * rates) for s in (-1e-3, 1e-3)]
+    points = [end.points[index] for end in ends if isinstance(end, SharpSampling)]
+    return 500.0 * (points[1] - points[0]) if len(points) == 2 else 0.0
+
+
+def contact_side(local: LocalMotion, index: int) -> int:
+    """+1 where the element is in contact above its gap, -1 below it: the side on which it is stiffer."""
+    kind = local.kind
+    if isinstance(kind, PiecewiseLinear):
+        piece = kind.pieces[index]
+        return piece.side if local.coefficients[piece.stiffness] >= 0.0 else -piece.side
+    point = np.array([levels(local)[index]])
+    return -1 if float(local.element.curvature(point, np.zeros(1), local.coefficients)[0][0]) < 0.0 else 1

@@ -1,0 +1,143 @@
+"""Whether a bifurcation lies in the layer behind a grazing, where a contact is too young to be smooth.
+
+Behind a grazing at s = 0 (s: way along the curve) the force of the young contact changes R_X, and with it every test
+function g, like the square root of s:
+
+    g(s) = g_0 + c sqrt(s) + O(s).
+
+Where that term carries g through zero, the bifurcation is one of the non-smooth system: it owes its place to the
+contact that begins, Newton's method converges only from within the layer, and the critical multiplier crosses the
+circle in a sliver of the parameter. The layer ends where the contact turns the motion by itself: the half-duration t of
+contact is no longer small beside the stop's own time, t sqrt(k / m) = 1 with k its stiffness and m the mass behind it.
+
+With elastic stops the multipliers are continuous all the same: the force is continuous at a gap, so that no saltation
+matrix stands between contact and flight (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+Springer 2004, chapters 7 and 8). They jump in the limit of a rigid stop only. A layer thinner than the engine's
+smallest step is a jump to whoever follows the curve, and called so (`Bifurcation.discontinuous`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from suboctave.bifurcation.bordered import at_values, bordered
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import gap_extrema
+from suboctave.bifurcation.grazing import Grazing, Touch
+from suboctave.bifurcation.kinds import BifurcationKind
+from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.selection import motion_size
+from suboctave.harmonic.state import BalanceState
+from suboctave.model.sampling import PiecewiseLinear
+
+#: exponent of the test function's path from the grazing below which it counts as a square root (1/2; smooth: 1)
+_SQUARE_ROOT = 0.75
+#: way from the grazing, in scaled arclength, beyond which no bifurcation is laid at its door
+_FAR = 0.05
+#: the same for a bifurcation that could only be bracketed
+_BRACKETED = 1e-3
+
+
+def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingContact | None:
+    """The grazing in whose layer a located bifurcation lies, None for a smooth one. `guess` is what it was solved from."""
+    if found.vectors is None:
+        return None
+    best: GrazingContact | None = None
+    for touch, grazing, distance in _grazings_near(found.state, guess, _FAR, young=True):
+        if best is not None and distance >= best.distance:
+            continue
+        if _exponent(kind, found, grazing, guess) < _SQUARE_ROOT:
+            best = replace(touch.contact(grazing, guess.name), change="", distance=distance)
+    return best
+
+
+def grazing_beside(guess: Guess) -> tuple[GrazingContact, Grazing] | None:
+    """The grazing at a motion where a bifurcation could only be bracketed, if there is one that near."""
+    near = list(_grazings_near(guess.state(), guess, _BRACKETED, young=False))
+    if not near:
+        return None
+    touch, grazing, distance = min(near, key=lambda item: item[2])
+    return replace(touch.contact(grazing, guess.name), change="", distance=distance), grazing
+
+
+def _grazings_near(
+    state: BalanceState, guess: Guess, limit: float, young: bool
+) -> Iterator[tuple[Touch, Grazing, float]]:
+    """Grazings of exact contacts up to some way along the curve; `young`: only those whose contact exists and is young."""
+    mass = state.linear.equation_of_motion()[0]
+    for gap in gap_extrema(state):
+        local = state.local_motions[gap.element]
+        kind = local.kind
+        if not isinstance(kind, PiecewiseLinear):
+            continue
+        direction = state.linear.retain(local.element.direction(state.balance.system.n))
+        expanded = state.linear.expand(direction)
+        mobility = float(expanded @ np.linalg.solve(mass, expanded))
+        stiffness = abs(float(local.coefficients[kind.pieces[gap.index].stiffness]))
+        size = float(np.abs(gap.value).max())
+        for tau, value, curve in zip(gap.tau, gap.value, gap.curve, strict=True):
+            beyond = value - gap.level
+            if curve == 0.0 or abs(beyond) > limit * size:
+                continue
+            # half the time that the excursion across the gap takes, in units of the stop's own
+            duration = math.sqrt(2.0 * abs(beyond / curve) * stiffness * mobility) / state.rate
+            if young and (beyond * curve > 0.0 or duration > 1.0):
+                continue
+            touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
+            try:
+                grazing = touch.solve(replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values))
+            except ConvergenceError:
+                continue
+            distance = float(np.linalg.norm(_chord(grazing.state, state, guess)))
+            if distance <= limit:
+                yield touch, grazing, distance
+
+
+def _weights(state: BalanceState, guess: Guess) -> Array:
+    """Scaled arclength: coefficients in units of the motion, the free parameter in units of its range."""
+    weight = np.tile(state.balance.scales()[0], state.basis.size)
+    return np.append(weight / max(motion_size(state), np.finfo(float).tiny), 1.0 / guess.span)
+
+
+def _vector(state: BalanceState, guess: Guess) -> Array:
+    return np.append(state.x.ravel(), state.omega if guess.name == "omega" else state.values[guess.name])
+
+
+def _chord(a: BalanceState, b: BalanceState, guess: Guess) -> Array:
+    """From one motion to another, scaled."""
+    return _weights(b, guess) * (_vector(b, guess) - _vector(a, guess))
+
+
+def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: Guess) -> float:
+    """Exponent p of `|g - g_0| ~ s^p` between the grazing and the bifurcation, from a point at a quarter of the way."""
+    assert found.vectors is not None
+    chord = _chord(grazing.state, found.state, guess)
+    length = float(np.linalg.norm(chord))
+    if length < 1e-9:
+        return 0.5
+    weights = _weights(found.state, guess)
+    row = weights * chord / length**2
+    start = 0.75 * _vector(grazing.state, guess) + 0.25 * _vector(found.state, guess)
+
+    def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
+        ahead = float(row @ (_vector(state, guess) - start))
+        return [Extra(ahead, row[:-1], float(row[-1]), (), 1.0)], None, []
+
+    state = found.state
+    omega, values = at_values(state.values, guess.name, float(start[-1]), state.omega)
+    begin = replace(guess, balance=state.balance, x=start[:-1].reshape(state.x.shape), omega=omega, values=values)
+    try:
+        quarter, *_ = newton(begin, np.zeros(0), np.zeros(0), augmentation)
+    except ConvergenceError:
+        return 0.5
+    g = [bordered(s, kind.operator, found.vectors, found.kappa).g for s in (grazing.state, quarter, found.state)]
+    near, far = abs(g[1] - g[0]), abs(g[2] - g[0])
+    if near == 0.0 or far == 0.0:
+        return 1.0
+    return math.log(far / near) / math.log(4.0)

@@ -1,0 +1,132 @@
+"""Compiled searches along a motion: its local extrema, and which of them pass a level between two neighbours.
+
+Arrays in, arrays out, as in `kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from suboctave.harmonic.instants import _jet
+from suboctave.harmonic.kernels import motion
+
+
+@njit(cache=True)
+def extrema(c, zr, zi):
+    """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative; ascending in tau.
+
+    Brackets of the derivative's zeros on the uniform grid z, then safeguarded Newton. Maxima and minima alternate, so
+    that their number is even.
+    """
+    n = zr.shape[0]
+    h = 2.0 * math.pi / n
+    slope = motion(c, zr, zi)[1]
+    count = 0
+    for j in range(n):
+        if (slope[j] > 0.0) != (slope[(j + 1) % n] > 0.0):
+            count += 1
+    tau = np.empty(count)
+    value = np.empty(count)
+    curve = np.empty(count)
+    i = 0
+    for j in range(n):
+        d0 = slope[j]
+        d1 = slope[(j + 1) % n]
+        if (d0 > 0.0) == (d1 > 0.0):
+            continue
+        lo = j * h
+        hi = lo + h
+        t = lo + h * d0 / (d0 - d1)
+        for _ in range(60):
+            x, d, s = _jet(c, math.cos(t), math.sin(t))
+            if (d > 0.0) == (d0 > 0.0):
+                lo = t
+            else:
+                hi = t
+            new = t - d / s if s != 0.0 else 0.5 * (lo + hi)
+            if not (lo <= new <= hi):
+                new = 0.5 * (lo + hi)
+            # an error e of the instant is one of s e^2 / 2 in the value
+            done = abs(new - t) < 1e-9
+            t = new
+            if done:
+                break
+        tau[i] = t
+        value[i] = x
+        # the sign that alternates, where rounding hides it
+        curve[i] = -abs(s) if d0 > 0.0 else abs(s)
+        i += 1
+    return tau, value, curve
+
+
+@njit(cache=True)
+def _level_count(x, level):
+    """How often the motion crosses a level, from its extrema."""
+    crossed = 0
+    for i in range(x.shape[0]):
+        if (x[i] > level) != (x[(i + 1) % x.shape[0]] > level):
+            crossed += 1
+    return crossed
+
+
+@njit(cache=True)
+def _smoothed(keep, x, wanted):
+    """Drop neighbouring pairs of extrema, the least different first, until `wanted` are kept: ripples that have just
+    come, or are about to go.
+    """
+    index = np.flatnonzero(keep)
+    while index.shape[0] > wanted:
+        m = index.shape[0]
+        best = 0
+        least = np.inf
+        for i in range(m):
+            difference = abs(x[index[i]] - x[index[(i + 1) % m]])
+            if difference < least:
+                least = difference
+                best = i
+        keep[index[best]] = False
+        keep[index[(best + 1) % m]] = False
+        index = np.flatnonzero(keep)
+    return index
+
+
+@njit(cache=True)
+def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
+    """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).
+
+    Extrema are paired in their cyclic order, so that two that pass at once in opposite senses are both seen. Returns
+    pairs of indices, shape (2, m), and how often each motion crosses its level. If the crossings differ by other than
+    what the pairs explain, extrema have come or gone as well.
+    """
+    crossed_a = _level_count(xa, level_a)
+    crossed_b = _level_count(xb, level_b)
+    wanted = min(xa.shape[0], xb.shape[0])
+    if wanted == 0:
+        return np.empty((2, 0), dtype=np.int64), crossed_a, crossed_b
+    ia = _smoothed(np.ones(xa.shape[0], dtype=np.bool_), xa, wanted)
+    ib = _smoothed(np.ones(xb.shape[0], dtype=np.bool_), xb, wanted)
+    # maxima to maxima
+    first = 0 if (sa[ia[0]] < 0.0) == (sb[ib[0]] < 0.0) else 1
+    best = first
+    least = np.inf
+    for shift in range(first, wanted, 2):
+        total = 0.0
+        for i in range(wanted):
+            way = abs(ta[ia[i]] - tb[ib[(i + shift) % wanted]])
+            total += min(way, 2.0 * math.pi - way)
+        if total < least:
+            least = total
+            best = shift
+    found = np.empty((2, wanted), dtype=np.int64)
+    count = 0
+    for i in range(wanted):
+        p = ia[i]
+        q = ib[(i + best) % wanted]
+        if (xa[p] > level_a) != (xb[q] > level_b):
+            found[0, count] = p
+            found[1, count] = q
+            count += 1
+    return found[:, :count], crossed_a, crossed_b
