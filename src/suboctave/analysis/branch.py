@@ -42,7 +42,8 @@ class Branch:
     observe
         DOF whose amplitude is reported.
     bifurcations, events
-        Located bifurcations, and the user's events, in the order met.
+        Located bifurcations (`bifurcations["grazing"]`: the contacts that begin or cease to touch), and the user's
+        events, in the order met.
     closed, ended
         Whether the curve closed on itself, and a sentence saying why it ended.
     options
@@ -75,6 +76,11 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    @property
+    def grazings(self) -> list[Bifurcation]:
+        """Where contacts begin or cease to touch, in the order met."""
+        return self.bifurcations["grazing"]
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:

@@ -10,7 +10,7 @@ import numpy as np
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
+from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, GrazingContact, Sample
 from suboctave.bifurcation.finder import Located, locate
 from suboctave.bifurcation.grazing import locate_grazings
 from suboctave.bifurcation.layer import grazing_beside, layer_of
@@ -19,6 +19,7 @@ from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, Step
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
 from suboctave.harmonic.state import BalanceState
@@ -212,7 +213,8 @@ class _Follower:
             )
         solution = self._refined(located, located.solution, curve)
         state = solution.state
-        guess = Guess(state.balance, state.x, state.omega, state.values, curve.name, curve.span)
+        guess = Guess(state.balance, state.x, state.omega, state.values, curve.name, curve.span, solution.kappa)
+        layer = layer_of(located.kind, solution, guess)
         orbit = _as_orbit(state, solution.residual, truncation(state), curve)
         return Bifurcation(
             located.kind.name,
@@ -223,9 +225,29 @@ class _Follower:
             curve.name,
             solution.vectors,
             solution.kappa,
+            0.0 if layer is None else self._unresolved(located.kind, guess, layer, curve),
             arclength=arclength,
-            contact=located.kind.contact(solution, curve.name) or layer_of(located.kind, solution, guess),
+            contact=layer or located.kind.contact(solution, curve.name),
         )
+
+    def _unresolved(
+        self, kind: BifurcationKind, guess: Guess, layer: GrazingContact, curve: ResponseCurve
+    ) -> float:
+        """What the neglected harmonics may do to the place of a bifurcation behind a grazing: half as many more tell.
+
+        If it is not found again with them, it is known up to the thickness of the layer.
+        """
+        basis = guess.balance.basis
+        finer = HarmonicBasis((3 * basis.harmonics + 1) // 2, basis.nu)
+        x = basis.resized(guess.x, finer)
+        balance = curve.with_basis(finer).balance.settle(x, guess.omega, guess.values)
+        try:
+            state = kind.solve(replace(guess, balance=balance, x=x)).state
+        except ConvergenceError:
+            return abs(guess.parameter - layer.parameter)
+        value = state.omega if curve.name == "omega" else state.values[curve.name]
+        # a short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H
+        return 3.0 * abs(value - guess.parameter)
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
         """Solved again with the harmonics that the tolerance for events asks for."""

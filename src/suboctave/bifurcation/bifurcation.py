@@ -50,7 +50,8 @@ class Bifurcation:
     kappa
         Frequency of the perturbation at an NS, rad per unit time; else 0.
     uncertainty
-        Half-width in the free parameter if the point could only be bracketed, else 0.
+        Half-width in the free parameter of what is not resolved: of the bracket if the point could only be bracketed;
+        behind a grazing that of the neglected harmonics, estimated with half as many more; else 0.
     contact
         The contact that grazes: at a grazing its own; at another bifurcation the one whose beginning or end brings it
         about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.
@@ -88,8 +89,12 @@ class Bifurcation:
         return (
             self.contact is not None
             and self.kind not in CONTACT_KINDS
-            and (self.uncertainty > 0.0 or self.contact.distance <= _RESOLVED)
+            and (self.contact.distance <= _RESOLVED or abs(self._behind(self.contact)) <= self.uncertainty)
         )
+
+    def _behind(self, contact: GrazingContact) -> float:
+        """How far behind its grazing it lies in the free parameter."""
+        return self.parameter(self.parameter_name) - contact.parameter
 
     def seen_backwards(self, arclength: float) -> Bifurcation:
         """The same on the curve followed the other way."""
@@ -130,15 +135,14 @@ class Bifurcation:
         return complex(min(mu, key=lambda m: abs(m - targets[self.kind])))
 
     def remark(self) -> str:
-        """What a table says beside the numbers: the contact that grazes, and what could only be bracketed."""
+        """What a table says beside the numbers: the contact that grazes, and what is not resolved."""
         words = []
         if self.uncertainty:
-            words.append(f"bracketed to +- {self.uncertainty:.1e} in {self.parameter_name}")
+            words.append(f"{self.parameter_name} +- {self.uncertainty:.0e}")
         if self.contact is not None and self.kind in CONTACT_KINDS:
             words.append(str(self.contact))
         elif self.contact is not None:
-            behind = self.parameter(self.parameter_name) - self.contact.parameter
-            nature = "discontinuous, at" if self.discontinuous else f"{behind:+.1e} from"
+            nature = "discontinuous, at" if self.discontinuous else f"{self._behind(self.contact):+.1e} from"
             words.append(f"{nature} the grazing of {self.contact.label}")
         return "; ".join(words)
 

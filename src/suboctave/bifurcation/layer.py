@@ -38,9 +38,11 @@ from suboctave.model.sampling import PiecewiseLinear
 
 #: exponent of the test function's path from the grazing below which it counts as a square root (1/2; smooth: 1)
 _SQUARE_ROOT = 0.75
-#: way from the grazing, in scaled arclength, beyond which no bifurcation is laid at its door
-_FAR = 0.05
-#: the same for a bifurcation that could only be bracketed
+#: largest force of a young contact, in units of the inertia force that turns the motion at the gap: (t sqrt(k/m))^2 / 2
+_YOUNG = 0.05
+#: excursion across the gap, in units of the motion, up to which grazings are looked for
+_NEAR = 0.05
+#: way from the grazing to a bifurcation that could only be bracketed, in scaled arclength, at most
 _BRACKETED = 1e-3
 
 
@@ -49,7 +51,7 @@ def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingCon
     if found.vectors is None:
         return None
     best: GrazingContact | None = None
-    for touch, grazing, distance in _grazings_near(found.state, guess, _FAR, young=True):
+    for touch, grazing, distance in _grazings_near(found.state, guess, young=True):
         if best is not None and distance >= best.distance:
             continue
         if _exponent(kind, found, grazing, guess) < _SQUARE_ROOT:
@@ -59,17 +61,15 @@ def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingCon
 
 def grazing_beside(guess: Guess) -> tuple[GrazingContact, Grazing] | None:
     """The grazing at a motion where a bifurcation could only be bracketed, if there is one that near."""
-    near = list(_grazings_near(guess.state(), guess, _BRACKETED, young=False))
+    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= _BRACKETED]
     if not near:
         return None
     touch, grazing, distance = min(near, key=lambda item: item[2])
     return replace(touch.contact(grazing, guess.name), change="", distance=distance), grazing
 
 
-def _grazings_near(
-    state: BalanceState, guess: Guess, limit: float, young: bool
-) -> Iterator[tuple[Touch, Grazing, float]]:
-    """Grazings of exact contacts up to some way along the curve; `young`: only those whose contact exists and is young."""
+def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
+    """Grazings of exact contacts beside a motion, with the way there; `young`: only of contacts that are, and young."""
     mass = state.linear.equation_of_motion()[0]
     for gap in gap_extrema(state):
         local = state.local_motions[gap.element]
@@ -83,20 +83,17 @@ def _grazings_near(
         size = float(np.abs(gap.value).max())
         for tau, value, curve in zip(gap.tau, gap.value, gap.curve, strict=True):
             beyond = value - gap.level
-            if curve == 0.0 or abs(beyond) > limit * size:
+            if curve == 0.0 or abs(beyond) > _NEAR * size:
                 continue
-            # half the time that the excursion across the gap takes, in units of the stop's own
-            duration = math.sqrt(2.0 * abs(beyond / curve) * stiffness * mobility) / state.rate
-            if young and (beyond * curve > 0.0 or duration > 1.0):
+            force = stiffness * mobility * abs(beyond / curve) / state.rate**2
+            if young and (beyond * curve > 0.0 or force > _YOUNG):
                 continue
             touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
             try:
                 grazing = touch.solve(replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values))
             except ConvergenceError:
                 continue
-            distance = float(np.linalg.norm(_chord(grazing.state, state, guess)))
-            if distance <= limit:
-                yield touch, grazing, distance
+            yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, state, guess)))
 
 
 def _weights(state: BalanceState, guess: Guess) -> Array:

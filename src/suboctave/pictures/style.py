@@ -2,7 +2,8 @@
 
 The colours are those of Okabe and Ito (*Color Universal Design*, 2008). Shape carries the kind on its own, so that
 a black-and-white print loses nothing: circles for limit points and triangles for period doublings, as in Alcorta
-et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points.
+et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Grazing
+contacts, which need not change the response, are crosses beneath the others.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ KINDS = {
     "PD": KindStyle("period doubling", "v", "#D55E00", MARKER_SIZE * 1.12),
     "NS": KindStyle("Neimark–Sacker", "s", "#009E73", MARKER_SIZE * 0.92),
     "BP": KindStyle("branch point", "D", "#F0E442", MARKER_SIZE * 0.88),
+    "grazing": KindStyle("grazing contact", "x", INK, MARKER_SIZE * 1.4),
 }
 
 

@@ -3,7 +3,7 @@
 Dimensions
 
     point        the points of the curve, in the order in which it was followed
-    event        the located bifurcations, in the order in which the curve meets them
+    event        the located bifurcations and grazing contacts, in the order in which the curve meets them
     parameter    the system's parameters, by name
     multiplier   the Floquet multipliers over the response period
 
@@ -11,7 +11,8 @@ Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, 
 `parameters` (point x parameter). A free parameter other than omega is a coordinate under its own name as well, unless
 the layout already uses that name. Variables on `event` carry the prefix `event_`; `event_after` is the index of the
 point after which the event lies, so that the curve with its events is one line: point `i`, the events with
-`event_after == i` in their order, point `i + 1`.
+`event_after == i` in their order, point `i + 1`. `event_contact` names the contact that grazes at an event, and is empty
+at a smooth bifurcation; `event_contact_at` is the value of the free parameter at which it does.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class EventRow:
 
     `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
     the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
-    `uncertainty` is the half-width in the free parameter where the event could only be bracketed.
+    `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at a
+    grazing, or at a bifurcation that it brings about) and `contact_at` the value of the free parameter where it does.
     """
 
     kind: str
@@ -60,7 +62,17 @@ class EventRow:
     criticality: str | None = None
     stable_after: bool | None = None
     uncertainty: float = 0.0
+    contact: str = ""
+    contact_at: float = np.nan
     parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+class ContactLike(Protocol):
+    """What the layout asks of a contact that grazes: words for it, and where in the free parameter it does."""
+
+    @property
+    def parameter(self) -> float: ...
+    def __str__(self) -> str: ...
 
 
 class EventLike(Protocol):
@@ -78,6 +90,8 @@ class EventLike(Protocol):
     def uncertainty(self) -> float: ...
     @property
     def criticality(self) -> str | None: ...
+    @property
+    def contact(self) -> ContactLike | None: ...
     @property
     def arclength(self) -> float: ...
     @property
@@ -112,6 +126,8 @@ class BranchLike(Protocol):
     def arclength(self) -> np.ndarray: ...
     @property
     def bifurcations(self) -> Iterable[EventLike]: ...
+    @property
+    def grazings(self) -> Iterable[EventLike]: ...
     @property
     def events(self) -> Iterable[EventLike]: ...
     @property
@@ -249,9 +265,10 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
 
 
 def _event_rows(branch: BranchLike, arclength: np.ndarray) -> list[EventRow]:
-    """The branch's bifurcations and events in the order met, each with its place and the verdict right after it."""
-    own = {id(event) for event in branch.events}
-    met = sorted([*branch.bifurcations, *branch.events], key=lambda event: event.arclength)
+    """The branch's bifurcations, grazings and events in the order met, each with its place and the verdict after it."""
+    passive = [*branch.grazings, *branch.events]  # stability goes on through these
+    own = {id(event) for event in passive}
+    met = sorted([*branch.bifurcations, *passive], key=lambda event: event.arclength)
     rows: list[EventRow] = []
     for event in met:
         place = int(np.searchsorted(arclength, event.arclength, side="right")) - 1
@@ -272,6 +289,8 @@ def _event_rows(branch: BranchLike, arclength: np.ndarray) -> list[EventRow]:
                     before if id(event) in own else not before and not _others_unstable(event.multipliers, critical)
                 ),
                 uncertainty=event.uncertainty,
+                contact="" if event.contact is None else str(event.contact),
+                contact_at=np.nan if event.contact is None else event.contact.parameter,
                 parameters=dict(event.parameters),
             )
         )
@@ -347,7 +366,17 @@ def _event_variables(
         "event_uncertainty": (
             "event",
             np.array([row.uncertainty for row in events], dtype=float),
-            {"long_name": "half-width in the free parameter of an event that was only bracketed, else 0"},
+            {"long_name": "half-width in the free parameter of what is not resolved of an event, else 0"},
+        ),
+        "event_contact": (
+            "event",
+            np.array([row.contact for row in events], dtype=object),
+            {"long_name": "the contact that grazes; empty at a smooth bifurcation"},
+        ),
+        "event_contact_at": (
+            "event",
+            np.array([row.contact_at for row in events], dtype=float),
+            {"long_name": "value of the free parameter at which that contact grazes"},
         ),
         "event_multiplier": (
             "event",
