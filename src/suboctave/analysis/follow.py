@@ -13,7 +13,7 @@ from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, GrazingContact, Sample
 from suboctave.bifurcation.finder import Located, locate
 from suboctave.bifurcation.grazing import locate_grazings
-from suboctave.bifurcation.layer import grazing_beside, layer_of
+from suboctave.bifurcation.layer import behind_grazing, grazing_beside, layer_of, solve_or_behind
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
@@ -170,7 +170,7 @@ class _Follower:
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self.trace.warnings.append(complaint)
-        self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
+        self.trace.bifurcations += [item for _, item in sorted(_behind_their_grazing(found), key=lambda pair: pair[0])]
         for event in self.settings.events:
             crossed = self._event(event, a, b)
             if crossed is not None:
@@ -192,13 +192,19 @@ class _Follower:
         arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
         curve = b.point.curve
         assert isinstance(curve, ResponseCurve)
-        if located.solution is None:
+        solution = located.solution
+        if solution is None:
+            guess = _guess(located.sample.point.u, located.sample.point, _kappa(located))
+            solution = behind_grazing(located.kind, guess)
+        if solution is None:
             orbit = self._orbit(located.sample)
-            point = located.sample.point
-            beside = grazing_beside(_guess(point.u, point, 0.0))
+            beside = grazing_beside(guess)
+            # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
+            width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
             self.trace.warnings.append(
-                f"{located.kind.name} near {curve.where(point.u)} could only be bracketed, to +- {located.width:.1e}: "
-                + (f"{beside[0].label} grazes there" if beside else "too few harmonics are kept, or a law is rough there")
+                f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
+                f"to +- {width:.1e}: "
+                + (f"{beside.label} grazes there" if beside else "too few harmonics are kept, or a law is rough there")
             )
             return Bifurcation(
                 located.kind.name,
@@ -207,11 +213,11 @@ class _Follower:
                 orbit.residual,
                 orbit.amplitude(self.settings.observe),
                 curve.name,
-                uncertainty=located.width,
+                uncertainty=width,
                 arclength=arclength,
-                contact=beside[0] if beside else None,
+                contact=beside,
             )
-        solution = self._refined(located, located.solution, curve)
+        solution = self._refined(located, solution, curve)
         state = solution.state
         guess = Guess(state.balance, state.x, state.omega, state.values, curve.name, curve.span, solution.kappa)
         layer = layer_of(located.kind, solution, guess)
@@ -242,7 +248,7 @@ class _Follower:
         x = basis.resized(guess.x, finer)
         balance = curve.with_basis(finer).balance.settle(x, guess.omega, guess.values)
         try:
-            state = kind.solve(replace(guess, balance=balance, x=x)).state
+            state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
         except ConvergenceError:
             return abs(guess.parameter - layer.parameter)
         value = state.omega if curve.name == "omega" else state.values[curve.name]
@@ -270,7 +276,7 @@ class _Follower:
             balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
             guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)
             try:
-                better = located.kind.solve(guess)
+                better = solve_or_behind(located.kind, guess)
             except ConvergenceError as failure:
                 self.trace.warnings.append(
                     f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
@@ -345,6 +351,34 @@ def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
     assert isinstance(curve, ResponseCurve)
     x, omega, values = curve.split(u)
     return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
+
+
+def _behind_their_grazing(found: list[tuple[float, Bifurcation]]) -> list[tuple[float, Bifurcation]]:
+    """Places on the step put right where a bifurcation and the grazing that brings it about lie too close to tell."""
+    result = []
+    for fraction, item in found:
+        partners = [
+            (at, other)
+            for at, other in found
+            if other.kind == "grazing" and item.kind != "grazing" and other.contact and item.contact
+            if other.contact.element == item.contact.element and abs(at - fraction) < 0.1
+        ]
+        if partners:
+            at, other = min(partners, key=lambda pair: abs(pair[0] - fraction))
+            assert other.contact is not None
+            # the contact exists after it begins and before it ceases
+            side = 1.0 if other.contact.change.startswith("begins") else -1.0
+            if (fraction - at) * side <= 0.0:
+                fraction, item = at + side * 1e-12, replace(item, arclength=other.arclength)
+        result.append((fraction, item))
+    return result
+
+
+def _kappa(located: Located) -> float:
+    try:
+        return located.kind.kappa(located.sample)
+    except ConvergenceError:
+        return 0.0
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:

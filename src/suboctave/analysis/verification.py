@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
-from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.stability import FloquetResult, floquet_multipliers
-from suboctave.timedomain import PeriodicSolution, locate_by_shooting, shoot
+from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 
 
 def stability(orbit: PeriodicOrbit | BranchPoint | Bifurcation) -> FloquetResult:
@@ -28,7 +28,8 @@ class Verification:
 
     distance
         Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement,
-        velocities by the largest velocity); for a bifurcation also the relative difference in omega, if larger.
+        velocities by the largest velocity); for a bifurcation also the relative difference in omega, if larger; for a
+        grazing the distance by which the motion misses the gap, relative to the relative displacement, if larger.
     multiplier_error
         Largest difference between multipliers, paired.
     stable
@@ -59,7 +60,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     Parameters
     ----------
     what
-        A motion; a `Bifurcation` is located again by shooting, with free omega.
+        A motion; a `Bifurcation` is located again by shooting, with free omega; at a grazing the motion found at the same
+        omega must reach the gap and not cross it.
     tolerance
         Relative distance up to which two motions, and two frequencies, count as the same.
 
@@ -76,7 +78,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         raise InputError("only motions with all DOFs of the system can be verified by shooting")
     floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else floquet_multipliers(motion.state())
     start = motion.start()
-    kind = what.kind if isinstance(what, Bifurcation) and what.kind in KINDS else None
+    touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
+    kind = what.kind if isinstance(what, Bifurcation) and what.kind in KINDS and not touches else None
     try:
         if kind is None:
             solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
@@ -89,6 +92,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     # a motion at rest differs from another only if that one moves
     distance = float(np.max(np.abs(solution.state - start) / np.maximum(sizes, np.finfo(float).tiny)))
     distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
+    if isinstance(what, Bifurcation) and touches:
+        distance = max(distance, _missed(what, solution))
     error = _pairing(floquet.multipliers, solution.multipliers)
 
     def verdict(agrees: bool, reason: str) -> Verification:
@@ -101,12 +106,31 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
         same = distance <= tolerance
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if not distance <= tolerance:
-        return verdict(False, f"Shooting arrives at another motion (relative distance {distance:.1e})")
+        other = "a motion that does not graze" if touches else "another motion"
+        return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
     if floquet.stable != solution.stable:
         doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"
         other = "stable" if solution.stable else "unstable"
         return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite{doubt}")
     return verdict(True, "The same motion, the same verdict")
+
+
+def _missed(what: Bifurcation, solution: PeriodicSolution) -> float:
+    """Distance of the motion's nearest extremum from the gap that it should graze, in units of the displacement."""
+    assert what.contact is not None
+    system, contact = what.orbit.system, what.contact
+    path = integrate(system, solution.state, (0.0, solution.period), solution.omega)
+    window = 0.5 * solution.period / (what.orbit.basis.harmonics + 1)
+    direction = system.elements[contact.element].direction(system.n)
+    grid, centre = np.linspace(-1.0, 1.0, 201), contact.time
+    for _ in range(3):  # the window closes on the extremum
+        u = path.at(np.mod(centre + window * grid, solution.period))[0] @ direction
+        a, b, c = np.polyfit(grid, u, 2)
+        at = float(np.clip(-0.5 * b / a, -1.0, 1.0)) if a != 0.0 else 0.0
+        value = float(c + at * b + at**2 * a)
+        centre, window = centre + at * window, 0.1 * window
+    size = float(np.abs(path.at(np.linspace(0.0, solution.period, 200))[0] @ direction).max())
+    return abs(value - contact.gap) / size
 
 
 def _by_shooting(motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:

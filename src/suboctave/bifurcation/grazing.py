@@ -134,6 +134,13 @@ class Touch(BifurcationKind):
         state, extra, residual, iterations = newton(guess, tau, np.ones(1), augmentation)
         return Grazing(state, None, 0.0, residual, iterations, float(extra[0]) % (2.0 * math.pi))
 
+    def rise(self, found: Grazing, name: str) -> Array:
+        """Gradient of the extremum's height over the gap by the coefficients and the free parameter, (dimension + 1,)."""
+        state = found.state
+        value = _rows(np.arange(1, state.basis.harmonics + 1), found.tau)[0]
+        direction = state.linear.retain(state.balance.elements[self.element].direction(state.balance.system.n))
+        return np.append(np.multiply.outer(value, direction), -level_rate(state, self.element, self.index, name))
+
     def _nearest(self, state: BalanceState) -> float:
         """The instant of the extremum of the right kind nearest to tau."""
         for gap in gap_extrema(state):

@@ -6,8 +6,9 @@ function g, like the square root of s:
     g(s) = g_0 + c sqrt(s) + O(s).
 
 Where that term carries g through zero, the bifurcation is one of the non-smooth system: it owes its place to the
-contact that begins, Newton's method converges only from within the layer, and the critical multiplier crosses the
-circle in a sliver of the parameter. The layer ends where the contact turns the motion by itself: the half-duration t of
+contact that begins, and the critical multiplier crosses the circle in a sliver of the parameter. Newton's method for
+such a g, `s <- 2 sqrt(s s_0) - s` with s_0 the zero, converges from every start between the grazing and 4 s_0 and leaves
+the layer from any other: so it begins right behind the grazing (`behind_grazing`). The layer ends where the contact turns the motion by itself: the half-duration t of
 contact is no longer small beside the stop's own time, t sqrt(k / m) = 1 with k its stiffness and m the mass behind it.
 
 With elastic stops the multipliers are continuous all the same: the force is continuous at a gap, so that no saltation
@@ -24,12 +25,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import at_values, bordered
+from suboctave.bifurcation.bordered import at_values, bordered, residual_scale
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.gaps import gap_extrema
 from suboctave.bifurcation.grazing import Grazing, Touch
 from suboctave.bifurcation.kinds import BifurcationKind
 from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
+from suboctave.continuation.linear import Factor
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.selection import motion_size
@@ -42,8 +44,10 @@ _SQUARE_ROOT = 0.75
 _YOUNG = 0.05
 #: excursion across the gap, in units of the motion, up to which grazings are looked for
 _NEAR = 0.05
-#: way from the grazing to a bifurcation that could only be bracketed, in scaled arclength, at most
+#: way from a grazing to a bifurcation that has to be started from there, in scaled arclength, at most
 _BRACKETED = 1e-3
+#: ways behind the grazing at which Newton's method starts
+_STARTS = (1e-8, 1e-6, 1e-4)
 
 
 def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingContact | None:
@@ -59,13 +63,69 @@ def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingCon
     return best
 
 
-def grazing_beside(guess: Guess) -> tuple[GrazingContact, Grazing] | None:
+def grazing_beside(guess: Guess) -> GrazingContact | None:
     """The grazing at a motion where a bifurcation could only be bracketed, if there is one that near."""
-    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= _BRACKETED]
+    near = list(_beside(guess))
     if not near:
         return None
-    touch, grazing, distance = min(near, key=lambda item: item[2])
-    return replace(touch.contact(grazing, guess.name), change="", distance=distance), grazing
+    touch, grazing, distance = near[0]
+    return replace(touch.contact(grazing, guess.name), change="", distance=distance)
+
+
+def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
+    """A bifurcation in the layer behind a grazing near the guess, started from that grazing; None if there is none."""
+    for touch, grazing, _ in _beside(guess):
+        for start in _starts(touch, grazing, guess):
+            try:
+                found = kind.solve(start)
+            except ConvergenceError:
+                continue
+            way = float(np.linalg.norm(_chord(grazing.state, found.state, guess)))
+            if kind.genuine(found, start) and way <= _BRACKETED:
+                return found
+    return None
+
+
+def solve_or_behind(kind: BifurcationKind, guess: Guess) -> Singular:
+    """Solve from a guess, or from the grazing beside it where Newton's method fails; raises ConvergenceError."""
+    try:
+        return kind.solve(guess)
+    except ConvergenceError:
+        found = behind_grazing(kind, guess)
+        if found is None:
+            raise
+        return found
+
+
+def _beside(guess: Guess) -> list[tuple[Touch, Grazing, float]]:
+    """Grazings close by, the nearest first."""
+    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= _BRACKETED]
+    return sorted(near, key=lambda item: item[2])
+
+
+def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
+    """Points along the curve's tangent at a grazing, on the side on which the contact is young."""
+    state = grazing.state
+    weights = _weights(state, guess)
+    dimension = state.balance.dimension
+    rows = residual_scale(state) / max(state.force_scale(), np.finfo(float).tiny)
+    matrix = np.zeros((dimension + 1, dimension + 1), order="F")
+    matrix[:-1, :-1] = state.jacobian * rows[:, None] / weights[:-1]
+    matrix[:-1, -1] = state.residual_by(guess.name) * rows / weights[-1]
+    rise = touch.rise(grazing, guess.name) / weights
+    matrix[-1] = rise / np.linalg.norm(rise)
+    factor = Factor.of(matrix, overwrite=True)
+    if factor.singular:
+        return
+    # along it the extremum rises through the gap at a rate of one: an excursion is a maximum above, a minimum below
+    unit = np.zeros(dimension + 1)
+    unit[-1] = 1.0
+    tangent = factor.solve(unit)
+    tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
+    for way in _STARTS:
+        u = _vector(state, guess) + way * tangent / weights
+        omega, values = at_values(state.values, guess.name, float(u[-1]), state.omega)
+        yield replace(guess, balance=state.balance, x=u[:-1].reshape(state.x.shape), omega=omega, values=values)
 
 
 def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
