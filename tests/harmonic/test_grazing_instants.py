@@ -40,8 +40,8 @@ def test_all_extrema_are_found(harmonics, decay):
         c[0] = c[0].real
         tau, value, curve = find(c)
         expected = roots_of_slope(c)
-        if len(expected) > 1 and np.diff(expected).min() < 0.02:
-            continue  # a ripple finer than the grid: its two extrema are left out together
+        if len(expected) > 1 and np.diff(expected).min() < 2e-3:
+            continue  # two that just come or go: whether they are there is a matter of rounding
         assert np.sort(np.mod(tau, 2.0 * np.pi)) == pytest.approx(expected, abs=1e-8)
         u, slope, bend = derivatives(c, tau)
         assert value == pytest.approx(u, abs=1e-13 * np.abs(c).sum())

@@ -236,9 +236,7 @@ class _Follower:
             contact=layer or located.kind.contact(solution, curve.name),
         )
 
-    def _unresolved(
-        self, kind: BifurcationKind, guess: Guess, layer: GrazingContact, curve: ResponseCurve
-    ) -> float:
+    def _unresolved(self, kind: BifurcationKind, guess: Guess, layer: GrazingContact, curve: ResponseCurve) -> float:
         """What the neglected harmonics may do to the place of a bifurcation behind a grazing: half as many more tell.
 
         If it is not found again with them, it is known up to the thickness of the layer.

@@ -60,8 +60,8 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     Parameters
     ----------
     what
-        A motion; a `Bifurcation` is located again by shooting, with free omega; at a grazing the motion found at the same
-        omega must reach the gap and not cross it.
+        A motion; a `Bifurcation` is located again by shooting, with free omega; at a grazing the motion found at the
+        same omega must just reach the gap.
     tolerance
         Relative distance up to which two motions, and two frequencies, count as the same.
 

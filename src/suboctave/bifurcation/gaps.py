@@ -6,7 +6,6 @@ of `SharpSampling`). Elements that act along the same direction share one search
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +13,10 @@ import numpy as np
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.grazing_instants import extrema
 from suboctave.harmonic.local_force import LocalMotion
-from suboctave.harmonic.quadrature import uniform_nodes
+from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.state import BalanceState
-from suboctave.model.sampling import PiecewiseLinear, SharpSampling
+from suboctave.model.sampling import PiecewiseLinear, Sampling, SharpSampling
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,25 +37,27 @@ class GapExtrema:
 
 def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     """Every gap of every element on a motion."""
+    coefficients, kinds, _ = state.balance.coefficients(state.values)
     found = []
-    for group in state.balance.groups:
+    for group, motion in zip(state.balance.groups, state.motions, strict=True):
         turns = None
         for i in group.members:
-            local = state.local_motions[i]
-            for index, level in enumerate(levels(local)):
+            for index, level in enumerate(_levels(kinds[i], coefficients[i])):
                 if turns is None:
-                    high = local.motion.shape[0] - 1
-                    grid = uniform_nodes(1 << math.ceil(math.log2(8 * high + 8)))
-                    turns = extrema(local.motion, grid.zr, grid.zi)
+                    grid = search_grid(motion.shape[0] - 1)
+                    turns = extrema(motion, grid.zr, grid.zi)
                 found.append(GapExtrema(i, index, level, *turns))
     return tuple(found)
 
 
 def levels(local: LocalMotion) -> tuple[float, ...]:
     """Displacements at which an element's law has a corner, or is sharp."""
-    kind = local.kind
+    return _levels(local.kind, local.coefficients)
+
+
+def _levels(kind: Sampling, coefficients: Array) -> tuple[float, ...]:
     if isinstance(kind, PiecewiseLinear):
-        return tuple(float(local.coefficients[piece.gap]) for piece in kind.pieces)
+        return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
     return kind.points if isinstance(kind, SharpSampling) else ()
 
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,7 @@ from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
 from suboctave.continuation.march import CurvePoint, between, point_between
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import Array, to_complex
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.grazing_instants import passages
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
@@ -72,7 +73,9 @@ class Touch(BifurcationKind):
 
     def changed(self, a: Sample, b: Sample) -> bool:
         """See `BifurcationKind.changed`."""
-        return any((t.element, t.index, t.maximum) == (self.element, self.index, self.maximum) for t in touches(a, b)[0])
+        return any(
+            (t.element, t.index, t.maximum) == (self.element, self.index, self.maximum) for t in touches(a, b)[0]
+        )
 
     def fraction(self, a: Sample, b: Sample) -> float:
         """See `BifurcationKind.fraction`."""
@@ -111,11 +114,11 @@ class Touch(BifurcationKind):
         start = guess.state()
         tau = np.array([self._nearest(start)])
         direction = start.linear.retain(start.balance.elements[self.element].direction(start.balance.system.n))
-        k = np.arange(1, start.basis.harmonics + 1)
+        high = start.basis.harmonics
         column = np.zeros(start.balance.dimension)
 
         def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
-            rows = _rows(k, float(extra[0]))
+            rows = _rows(high, float(extra[0]))
             u = state.x @ direction
             value, slope, curve = (float(row @ u) for row in rows)
             level = levels(state.local_motions[self.element])[self.index]
@@ -135,9 +138,9 @@ class Touch(BifurcationKind):
         return Grazing(state, None, 0.0, residual, iterations, float(extra[0]) % (2.0 * math.pi))
 
     def rise(self, found: Grazing, name: str) -> Array:
-        """Gradient of the extremum's height over the gap by the coefficients and the free parameter, (dimension + 1,)."""
+        """Gradient of the extremum's height over the gap by coefficients and free parameter, shape (dimension + 1,)."""
         state = found.state
-        value = _rows(np.arange(1, state.basis.harmonics + 1), found.tau)[0]
+        value = _rows(state.basis.harmonics, found.tau)[0]
         direction = state.linear.retain(state.balance.elements[self.element].direction(state.balance.system.n))
         return np.append(np.multiply.outer(value, direction), -level_rate(state, self.element, self.index, name))
 
@@ -151,8 +154,9 @@ class Touch(BifurcationKind):
         raise ConvergenceError("the motion has no extremum here")
 
 
-def _rows(k: Array, tau: float) -> tuple[Array, Array, Array]:
+def _rows(high: int, tau: float) -> tuple[Array, Array, Array]:
     """Basis functions at an instant and their first two derivatives by tau, shape (2 H + 1,) each."""
+    k = np.arange(1.0, high + 1.0)
     value, slope, curve = np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1)
     c, s = np.cos(k * tau), np.sin(k * tau)
     value[0], slope[0], curve[0] = 1.0, 0.0, 0.0
@@ -221,10 +225,8 @@ def _search(
         return found
     middle = None
     if depth < _BISECTIONS:
-        try:
+        with suppress(ConvergenceError):
             middle = make_sample(point_between(a.point, b.point, 0.5, options))
-        except ConvergenceError:
-            pass
     if middle is None:
         width = 0.5 * abs(b.point.parameter - a.point.parameter)
         return found + [

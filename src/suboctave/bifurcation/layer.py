@@ -7,14 +7,15 @@ function g, like the square root of s:
 
 Where that term carries g through zero, the bifurcation is one of the non-smooth system: it owes its place to the
 contact that begins, and the critical multiplier crosses the circle in a sliver of the parameter. Newton's method for
-such a g, `s <- 2 sqrt(s s_0) - s` with s_0 the zero, converges from every start between the grazing and 4 s_0 and leaves
-the layer from any other: so it begins right behind the grazing (`behind_grazing`). The layer ends where the contact turns the motion by itself: the half-duration t of
-contact is no longer small beside the stop's own time, t sqrt(k / m) = 1 with k its stiffness and m the mass behind it.
+such a g, `s <- 2 sqrt(s s_0) - s` with s_0 the zero, converges from every start between the grazing and 4 s_0 and
+leaves the layer from any other: so it begins right behind the grazing (`behind_grazing`). The layer ends where the stop
+turns the motion by itself: half the duration t of the contact is no longer small beside the stop's own time, `t
+sqrt(k/m) = 1`, k its stiffness and m the mass that it meets.
 
 With elastic stops the multipliers are continuous all the same: the force is continuous at a gap, so that no saltation
 matrix stands between contact and flight (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
-Springer 2004, chapters 7 and 8). They jump in the limit of a rigid stop only. A layer thinner than the engine's
-smallest step is a jump to whoever follows the curve, and called so (`Bifurcation.discontinuous`).
+Springer 2004). They jump in the limit of a rigid stop only. A layer thinner than the engine's smallest step is a jump
+to whoever follows the curve, and called so (`Bifurcation.discontinuous`).
 """
 
 from __future__ import annotations
@@ -47,11 +48,11 @@ _NEAR = 0.05
 #: way from a grazing to a bifurcation that has to be started from there, in scaled arclength, at most
 _BRACKETED = 1e-3
 #: ways behind the grazing at which Newton's method starts
-_STARTS = (1e-8, 1e-6, 1e-4)
+_STARTS = (1e-10, 1e-8, 1e-6, 1e-4)
 
 
 def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingContact | None:
-    """The grazing in whose layer a located bifurcation lies, None for a smooth one. `guess` is what it was solved from."""
+    """The grazing in whose layer a located bifurcation lies, None for a smooth one; `guess`: its start."""
     if found.vectors is None:
         return None
     best: GrazingContact | None = None
@@ -150,7 +151,9 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
                 continue
             touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
             try:
-                grazing = touch.solve(replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values))
+                grazing = touch.solve(
+                    replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values)
+                )
             except ConvergenceError:
                 continue
             yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, state, guess)))

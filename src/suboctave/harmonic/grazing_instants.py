@@ -15,51 +15,68 @@ from suboctave.harmonic.kernels import motion
 
 
 @njit(cache=True)
+def _turn(c, lo, hi, rises, first):
+    """The extremum in (lo, hi), before which the motion rises or falls, by safeguarded Newton: tau, value, curvature."""
+    t = first
+    x = s = 0.0
+    for _ in range(60):
+        x, d, s = _jet(c, math.cos(t), math.sin(t))
+        if (d > 0.0) == rises:
+            lo = t
+        else:
+            hi = t
+        new = t - d / s if s != 0.0 else 0.5 * (lo + hi)
+        if not (lo <= new <= hi):
+            new = 0.5 * (lo + hi)
+        # an error e of the instant is one of s e^2 / 2 in the value
+        done = abs(new - t) < 1e-9
+        t = new
+        if done:
+            break
+    # the sign that alternates, where rounding hides it
+    return t, x, -abs(s) if rises else abs(s)
+
+
+@njit(cache=True)
 def extrema(c, zr, zi):
     """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative; ascending in tau.
 
-    Brackets of the derivative's zeros on the uniform grid z, then safeguarded Newton. Maxima and minima alternate, so
-    that their number is even.
+    Brackets of the derivative's zeros on the uniform grid z, then safeguarded Newton. A pair hidden between two samples
+    is looked for where the cubic through them nearly turns. Maxima and minima alternate, so that their number is even.
     """
     n = zr.shape[0]
     h = 2.0 * math.pi / n
-    slope = motion(c, zr, zi)[1]
+    values = motion(c, zr, zi)
+    tau = np.empty(2 * n)
+    value = np.empty(2 * n)
+    curve = np.empty(2 * n)
     count = 0
     for j in range(n):
-        if (slope[j] > 0.0) != (slope[(j + 1) % n] > 0.0):
-            count += 1
-    tau = np.empty(count)
-    value = np.empty(count)
-    curve = np.empty(count)
-    i = 0
-    for j in range(n):
-        d0 = slope[j]
-        d1 = slope[(j + 1) % n]
-        if (d0 > 0.0) == (d1 > 0.0):
-            continue
+        d0 = values[1, j]
+        d1 = values[1, (j + 1) % n]
         lo = j * h
         hi = lo + h
-        t = lo + h * d0 / (d0 - d1)
-        for _ in range(60):
-            x, d, s = _jet(c, math.cos(t), math.sin(t))
-            if (d > 0.0) == (d0 > 0.0):
-                lo = t
-            else:
-                hi = t
-            new = t - d / s if s != 0.0 else 0.5 * (lo + hi)
-            if not (lo <= new <= hi):
-                new = 0.5 * (lo + hi)
-            # an error e of the instant is one of s e^2 / 2 in the value
-            done = abs(new - t) < 1e-9
-            t = new
-            if done:
-                break
-        tau[i] = t
-        value[i] = x
-        # the sign that alternates, where rounding hides it
-        curve[i] = -abs(s) if d0 > 0.0 else abs(s)
-        i += 1
-    return tau, value, curve
+        if (d0 > 0.0) != (d1 > 0.0):
+            tau[count], value[count], curve[count] = _turn(c, lo, hi, d0 > 0.0, lo + h * d0 / (d0 - d1))
+            count += 1
+            continue
+        # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
+        mean = (values[0, (j + 1) % n] - values[0, j]) / h
+        a = 3.0 * (d0 + d1 - 2.0 * mean)
+        b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
+        if not (a * d0 > 0.0 and 0.0 < -b / a < 2.0) or abs(d0) - b * b / (4.0 * abs(a)) > 0.5 * min(abs(d0), abs(d1)):
+            continue
+        middle = lo - 0.5 * h * b / a
+        x, d, s = _jet(c, math.cos(middle), math.sin(middle))
+        new = middle - 0.5 * h * h * s / a
+        if lo < new < hi:
+            middle = new
+            x, d, s = _jet(c, math.cos(middle), math.sin(middle))
+        if d * d0 < 0.0:
+            for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
+                tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
+                count += 1
+    return tau[:count].copy(), value[:count].copy(), curve[:count].copy()
 
 
 @njit(cache=True)

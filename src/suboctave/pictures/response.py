@@ -160,7 +160,14 @@ def _draw_events(axes: Axes, dataset: xarray.Dataset, horizontal: str) -> dict[s
             "markeredgewidth": 1.0,
         }
         chosen = kinds == kind
-        axes.plot(positions[chosen], amplitudes[chosen], zorder=4 if kind == "grazing" else 5, gid=kind, clip_on=False, **drawing)
+        axes.plot(
+            positions[chosen],
+            amplitudes[chosen],
+            zorder=4 if kind == "grazing" else 5,
+            gid=kind,
+            clip_on=False,
+            **drawing,
+        )
         legend[look.name] = Line2D([], [], **drawing)
     return legend
 

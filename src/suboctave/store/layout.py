@@ -11,8 +11,8 @@ Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, 
 `parameters` (point x parameter). A free parameter other than omega is a coordinate under its own name as well, unless
 the layout already uses that name. Variables on `event` carry the prefix `event_`; `event_after` is the index of the
 point after which the event lies, so that the curve with its events is one line: point `i`, the events with
-`event_after == i` in their order, point `i + 1`. `event_contact` names the contact that grazes at an event, and is empty
-at a smooth bifurcation; `event_contact_at` is the value of the free parameter at which it does.
+`event_after == i` in their order, point `i + 1`. `event_contact` names the contact that grazes at an event (empty at a
+smooth bifurcation), `event_contact_at` is the value of the free parameter at which it does.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class EventRow:
 
     `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
     the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
-    `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at a
-    grazing, or at a bifurcation that it brings about) and `contact_at` the value of the free parameter where it does.
+    `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at
+    a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does.
     """
 
     kind: str

@@ -1,0 +1,150 @@
+"""Bifurcations in the layer behind a grazing: told from smooth ones, and where shooting finds them.
+
+An oscillator with an elastic stop that it just reaches near resonance folds back at once (Ing, Pavlovskaia,
+Wiercigroch, Banerjee, Phil. Trans. R. Soc. A 366, 2008; Jiang, Chong, Ueda, Wiercigroch, Int. J. Mech. Sci. 127, 2017):
+the stiffer the stop, the closer the fold lies to the grazing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.bifurcation.kinds import LimitPoint
+from suboctave.bifurcation.layer import behind_grazing
+from suboctave.bifurcation.solve import Guess
+from suboctave.errors import ConvergenceError
+from suboctave.timedomain import locate_by_shooting, shoot
+
+
+def oscillator(Kc, zeta, share, length=1.0, time=1.0, regularization=None):
+    """Unit mass, spring and force; the gap is a share of the resonance's linear amplitude."""
+    return so.System(
+        mass=1.0,
+        damping=2.0 * zeta / time,
+        stiffness=1.0 / time**2,
+        elements=[
+            so.ElasticStop(
+                dof=0, stiffness=Kc / time**2, gap=share * length / (2.0 * zeta), regularization=regularization
+            )
+        ],
+        loads=[so.HarmonicLoad(dof=0, amplitude=length / time**2)],
+    )
+
+
+def first_fold(system, omega=(1.3, 0.95), harmonics="adaptive", **options):
+    curve = so.frequency_response(system, omega, harmonics, **options)
+    return curve, curve.bifurcations["LP"][0]
+
+
+def behind(b):
+    """How far behind its grazing a bifurcation lies, in omega."""
+    return b.omega - b.contact.parameter
+
+
+@pytest.mark.parametrize(
+    ("Kc", "zeta", "share"), [(30.0, 0.05, 0.5), (30.0, 0.01, 0.5), (200.0, 0.01, 0.999), (1000.0, 0.05, 0.999)]
+)
+def test_folds_behind_a_grazing_by_shooting(Kc, zeta, share):
+    curve, fold = first_fold(oscillator(Kc, zeta, share))
+    grazing = curve.grazings[0]
+    assert fold.residual < 1e-10
+    assert not fold.smooth
+    assert fold.contact.element == 0
+    assert fold.contact.parameter == pytest.approx(grazing.omega, abs=1e-10)
+    witness = locate_by_shooting(curve.system, "LP", fold.orbit.start(), fold.omega)
+    error = abs(fold.omega - witness.omega)
+    assert error < 0.05 * abs(behind(fold))  # the layer itself is resolved, not only its place
+    assert error < fold.uncertainty < 0.3 * abs(behind(fold))
+    assert fold.amplitude - grazing.amplitude == pytest.approx(witness.amplitude - grazing.amplitude, rel=0.1)
+    assert fold.arclength > grazing.arclength
+    row = next(r for r in repr(curve.bifurcations).splitlines() if r.startswith("LP"))
+    assert f"{behind(fold):+.1e} from the grazing of ElasticStop" in row
+
+
+def test_the_layer_is_thinner_by_the_square_of_the_stiffness():
+    """g_0 + c k sqrt(s) vanishes at s = (g_0 / (c k))^2: distance times stiffness squared is one number."""
+    constant = [behind(first_fold(oscillator(Kc, 0.01, 0.5), harmonics=9)[1]) * Kc**2 for Kc in (50.0, 150.0, 450.0)]
+    assert constant[1:] == pytest.approx(constant[:-1], rel=0.01)
+
+
+def test_beyond_the_smallest_steps_a_fold_is_discontinuous():
+    for Kc, thin in ((30.0, False), (3000.0, True)):
+        curve, fold = first_fold(oscillator(Kc, 0.01, 0.5))
+        assert fold.discontinuous is thin
+        assert ("discontinuous, at the grazing" in repr(curve.bifurcations)) is thin
+        assert (fold.contact.distance < 1e-7) is thin
+        # the multipliers on both sides of the fold: inside before the grazing, outside behind the layer
+        at = np.searchsorted(curve.arclength, fold.arclength)
+        assert curve.stable[at - 1]
+        assert not curve.stable[at + 1]
+        assert fold.omega == pytest.approx(curve.grazings[0].omega, abs=1e-7)
+
+
+@pytest.mark.parametrize(("length", "time"), [(1e-6, 1.0), (1e3, 1e-3)])
+def test_units_and_range_do_not_change_the_label(length, time):
+    _, fold = first_fold(oscillator(200.0, 0.05, 0.5, length, time), (1.3 / time, 0.95 / time))
+    _, other = first_fold(oscillator(200.0, 0.05, 0.5), (1.15, 1.0))
+    assert fold.smooth is other.smooth is False
+    assert behind(fold) * time == pytest.approx(behind(other), rel=1e-3)
+
+
+def test_smooth_bifurcations_are_not_laid_at_a_contacts_door(oscillator_curve):
+    curve = oscillator_curve(0.55, omega=(4.5, 1.3))
+    labelled = [(b.kind, b.smooth) for b in curve.bifurcations]
+    # the lower fold follows the first touch of the left stop; peak and period doublings are a matter of long contacts
+    assert labelled == [("PD", True), ("PD", True), ("LP", False), ("LP", True)]
+    assert not any(b.discontinuous for b in curve.bifurcations)
+    assert all(b.uncertainty == 0.0 for b in curve.bifurcations if b.smooth)
+
+
+def test_a_rounded_law_has_no_layer():
+    _, fold = first_fold(oscillator(30.0, 0.05, 0.5, regularization=300.0))
+    assert fold.smooth
+
+
+def test_a_pair_that_leaves_the_circle_behind_a_grazing():
+    """Two masses and a stop: a Neimark-Sacker point a millionth behind the grazing, seen by shooting on both sides."""
+    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.5, 0.6), 63)
+    (torus,) = curve.bifurcations["NS"]
+    (grazing,) = curve.grazings
+    assert not torus.smooth
+    assert 0.0 < behind(torus) < 3e-6
+    inside, outside = (
+        shoot(curve.system, torus.orbit.start(), grazing.omega + share * behind(torus)) for share in (0.5, 2.0)
+    )
+    assert np.abs(inside.multipliers).max() < 1.0
+    assert np.count_nonzero(np.abs(outside.multipliers) > 1.0) == 2
+
+
+def guess_at(orbit, name="omega", span=0.35):
+    return Guess(orbit.balance, orbit.coefficients, orbit.omega, orbit.values, name, span)
+
+
+def test_newton_starts_right_behind_the_grazing():
+    """From before the grazing no gradient leads to the fold; from right behind it Newton's method finds it."""
+    curve, fold = first_fold(oscillator(1000.0, 0.01, 0.5), harmonics=9)
+    before = guess_at(curve.grazings[0].orbit)
+    before = Guess(before.balance, before.x * (1.0 - 1e-6), before.omega, before.values, "omega", 0.35)
+    with pytest.raises(ConvergenceError):
+        LimitPoint().solve(before)
+    found = behind_grazing(LimitPoint(), before)
+    assert found is not None
+    assert found.state.omega == pytest.approx(fold.omega, abs=1e-12)
+
+
+def test_what_cannot_be_solved_is_bracketed_and_says_so(monkeypatch):
+    def refuse(self, guess):
+        raise ConvergenceError("refused by the test")
+
+    monkeypatch.setattr(LimitPoint, "solve", refuse)
+    curve, fold = first_fold(oscillator(200.0, 0.05, 0.5), (1.3, 1.0), 9)
+    assert fold.uncertainty >= abs(behind(fold)) > 0.0
+    assert fold.discontinuous
+    assert any("LP near omega" in note and "grazes there" in note for note in curve.warnings)
+    grazing = curve.grazings[0]
+    assert abs(fold.omega - grazing.omega) <= fold.uncertainty
+    dataset = curve.to_xarray()
+    kinds = [str(k) for k in dataset["event_kind"].to_numpy()]
+    assert float(dataset["event_uncertainty"][kinds.index("LP")]) == fold.uncertainty
