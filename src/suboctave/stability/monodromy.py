@@ -13,67 +13,23 @@ error estimate.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.harmonic import kernels as harmonic_kernels
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.local_force import LocalMotion
 from suboctave.harmonic.quadrature import sharp_nodes
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.sampling import PiecewiseLinear, SharpSampling
 from suboctave.stability import kernels
+from suboctave.stability.result import FloquetResult
 
 _GAUSS = np.array([-1.0, 1.0]) / math.sqrt(3.0)
 _RATIO = 2.5
 
-
-@dataclass(frozen=True)
-class FloquetResult:
-    """Floquet multipliers of a motion over its own period.
-
-    multipliers
-        Shape (2 n,), complex, by descending modulus.
-    errors
-        Estimated error of each, shape (2 n,): of the steps, of the harmonics that the motion neglects, of rounding.
-    """
-
-    multipliers: ComplexArray
-    errors: Array
-
-    @property
-    def error(self) -> float:
-        """Largest error estimate among the multipliers that decide (modulus above one half)."""
-        deciding = np.abs(self.multipliers) > 0.5
-        return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
-
-    @property
-    def margin(self) -> float:
-        """Largest modulus minus one: negative if stable."""
-        return float(np.abs(self.multipliers).max() - 1.0)
-
-    @property
-    def stable(self) -> bool:
-        """True if all multipliers lie inside the unit circle."""
-        return self.margin < 0.0
-
-    @property
-    def decided(self) -> bool:
-        """True if no multiplier is closer to the unit circle than its error estimate."""
-        return bool(np.all(np.abs(np.abs(self.multipliers) - 1.0) > self.errors))
-
-    @property
-    def unstable(self) -> int:
-        """Number of multipliers outside the unit circle."""
-        return int(np.count_nonzero(np.abs(self.multipliers) > 1.0))
-
-    @property
-    def unstable_pairs(self) -> int:
-        """Number of complex-conjugate pairs outside the unit circle."""
-        mu = self.multipliers[np.abs(self.multipliers) > 1.0]
-        return int(np.count_nonzero(mu.imag > 0.0))
+__all__ = ["FloquetResult", "floquet_multipliers"]
 
 
 def floquet_multipliers(state: BalanceState) -> FloquetResult:

@@ -1,0 +1,96 @@
+"""What a stability method says of a motion: multipliers, how far each may be off, and the verdict that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from suboctave.harmonic.basis import Array, ComplexArray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FloquetResult:
+    """Floquet multipliers of a motion over its own period.
+
+    multipliers
+        Shape (2 n,), complex, by descending modulus; nan where the method is not applicable.
+    errors
+        Estimated error of each, shape (2 n,): of the method, of the harmonics that the motion neglects, of rounding.
+    method
+        The method, or methods, that they come from.
+    note
+        A sentence where there is something to say: why the method is not applicable, what keeps the verdict undecided,
+        which methods contradict each other. Empty otherwise.
+    checks
+        What the method found when it checked itself, by name.
+    witnesses
+        The results that were weighed against each other, in the order asked; empty if one method was enough.
+    """
+
+    multipliers: ComplexArray
+    errors: Array
+    method: str = "monodromy"
+    note: str = ""
+    checks: Mapping[str, float] = field(default_factory=dict)
+    witnesses: tuple[FloquetResult, ...] = ()
+
+    @classmethod
+    def inapplicable(
+        cls, count: int, method: str, note: str, checks: Mapping[str, float] | None = None
+    ) -> FloquetResult:
+        """The result of a method that cannot say anything of a motion with `count` multipliers, and why."""
+        return cls(np.full(count, np.nan, dtype=complex), np.full(count, np.inf), method, note, checks or {})
+
+    @property
+    def applicable(self) -> bool:
+        """False if the method could not say anything; `note` says why."""
+        return bool(np.isfinite(self.multipliers).all())
+
+    @property
+    def error(self) -> float:
+        """Largest error estimate among the multipliers that decide (modulus above one half)."""
+        deciding = np.abs(self.multipliers) > 0.5
+        return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
+
+    @property
+    def margin(self) -> float:
+        """Largest modulus minus one: negative if stable."""
+        return float(np.abs(self.multipliers).max() - 1.0)
+
+    @property
+    def stable(self) -> bool:
+        """True if all multipliers lie inside the unit circle."""
+        return self.margin < 0.0
+
+    @property
+    def decided(self) -> bool:
+        """True if no multiplier is closer to the unit circle than its error estimate."""
+        return bool(np.all(np.abs(np.abs(self.multipliers) - 1.0) > self.errors))
+
+    @property
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return int(np.count_nonzero(np.abs(self.multipliers) > 1.0))
+
+    @property
+    def unstable_pairs(self) -> int:
+        """Number of complex-conjugate pairs outside the unit circle."""
+        mu = self.multipliers[np.abs(self.multipliers) > 1.0]
+        return int(np.count_nonzero(mu.imag > 0.0))
+
+    def __repr__(self) -> str:
+        if not self.applicable:
+            return f"FloquetResult: not applicable ({self.method}). {self.note}"
+        verdict = "stable" if self.stable else f"unstable, {self.unstable} of {len(self.multipliers)} outside"
+        doubt = "" if self.decided else ", UNDECIDED"
+        shown = [_number(mu, error) for mu, error in zip(self.multipliers[:4], self.errors, strict=False)]
+        more = f", ... ({len(self.multipliers)} in all)" if len(self.multipliers) > 4 else ""
+        note = f". {self.note}" if self.note else ""
+        return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
+
+
+def _number(mu: complex, error: float) -> str:
+    text = f"{mu.real:.6g}" if abs(mu.imag) <= 1e-12 * abs(mu) else f"({mu.real:.6g}{mu.imag:+.6g}i)"
+    return f"{text} +- {error:.0e}"
