@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
+    from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
 _HOME = {
@@ -60,6 +61,10 @@ _HOME = {
     "frequency_response": "suboctave.analysis",
     "continue_branch": "suboctave.analysis",
     "stability": "suboctave.analysis",
+    "Arbitration": "suboctave.stability",
+    "Monodromy": "suboctave.stability",
+    "Hill": "suboctave.stability",
+    "KoopmanHill": "suboctave.stability",
     "verify": "suboctave.analysis",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
@@ -68,6 +73,7 @@ _HOME = {
 
 __all__ = [
     "AdaptiveHarmonics",
+    "Arbitration",
     "Bifurcation",
     "Branch",
     "ConvergenceError",
@@ -78,7 +84,10 @@ __all__ = [
     "HarmonicBalance",
     "HarmonicBasis",
     "HarmonicLoad",
+    "Hill",
     "InputError",
+    "KoopmanHill",
+    "Monodromy",
     "NewtonOptions",
     "PeriodicOrbit",
     "PolynomialSpring",

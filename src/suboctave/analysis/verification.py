@@ -10,16 +10,35 @@ import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
 from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
+from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.stability import FloquetResult, floquet_multipliers
+from suboctave.stability import FloquetResult, StabilityMethod, method_of
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 
 
-def stability(orbit: PeriodicOrbit | BranchPoint | Bifurcation) -> FloquetResult:
-    """Floquet multipliers of a motion with error estimates and the verdict (`stable`, `decided`)."""
-    return floquet_multipliers(_orbit(orbit).state())
+def stability(
+    orbit: PeriodicOrbit | BranchPoint | Bifurcation, method: StabilityMethod | str | None = None
+) -> FloquetResult:
+    """Floquet multipliers of a motion with error estimates and the verdict (`stable`, `decided`).
+
+    Parameters
+    ----------
+    method
+        `Monodromy()`, `Hill()`, `KoopmanHill()`, or their names "monodromy", "hill", "koopman-hill". Default: the
+        monodromy matrix, and where a multiplier lies within its error of the unit circle the others as witnesses. A
+        method that cannot say anything says so (`applicable`, `note`).
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    """
+    chosen = method_of(method)
+    motion = _orbit(orbit)
+    with one_thread():
+        return chosen.multipliers(motion.state())
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +95,7 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     system = motion.system
     if motion.coefficients.shape[1] != system.n:
         raise InputError("only motions with all DOFs of the system can be verified by shooting")
-    floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else floquet_multipliers(motion.state())
+    floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else stability(motion)
     start = motion.start()
     touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
     kind = what.kind if isinstance(what, Bifurcation) and what.kind in KINDS and not touches else None
