@@ -118,7 +118,8 @@ class _Waves:
 
     def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
         """Right and left null vectors of P at an eigenvalue, by inverse iteration; shape (waves, n) each."""
-        factors = lu_factor(self.matrix(s), check_finite=False)
+        # a little beside the eigenvalue: exactly on it there may be a zero pivot
+        factors = lu_factor(self.matrix(s + 1e-11 * (1.0 + abs(s))), check_finite=False)
         found = []
         for transposed in (0, 1):
             x = np.ones(factors[0].shape[0], dtype=complex)

@@ -38,7 +38,7 @@ _FEWEST = 15
 #: share of what the motion's neglected harmonics do that is still missing when they are added to first order
 _MOTION = 0.5
 #: share of the harmonics that the coarser run has
-_COARSE = 0.6
+_COARSE = 0.5
 #: share of parts that cancel by which they are taken not to
 _CANCELLED = 0.01
 _NOTHING = np.zeros(0, dtype=complex)
