@@ -10,7 +10,7 @@ kept, which seldom decides, and the result says who said what.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -20,14 +20,14 @@ from suboctave.errors import InputError, suggest
 from suboctave.harmonic.state import BalanceState
 from suboctave.stability.methods import Hill, KoopmanHill, Monodromy, StabilityMethod
 from suboctave.stability.monodromy import floquet_multipliers
-from suboctave.stability.result import FloquetResult
+from suboctave.stability.result import FloquetResult, written
 
 #: least radius of a joint estimate in units of the better single one
 _BELIEVED = 0.5
 #: logarithm of the product of all multipliers below which a motion counts as undamped
 _UNDAMPED = 1e-9
-#: unknowns of a witness's matrix up to which it is asked unbidden
-_UNBIDDEN = 800
+#: rows of a witness's matrix up to which it is asked along a curve, where nobody waits for this one point
+_UNBIDDEN = 700
 
 
 @dataclass(frozen=True)
@@ -48,30 +48,36 @@ class Arbitration(StabilityMethod):
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
         """See `StabilityMethod.multipliers`."""
-        return self.settled(state, floquet_multipliers(state))
+        return self._weighed(state, floquet_multipliers(state), math.inf)
 
     def along(self, state: BalanceState) -> FloquetResult:
         """The monodromy matrix alone."""
         return floquet_multipliers(state)
 
     def settled(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
-        """The verdict, with witnesses where it is open."""
+        """The verdict, with witnesses where it is open and they cost little."""
+        return self._weighed(state, found, _UNBIDDEN)
+
+    def _weighed(self, state: BalanceState, found: FloquetResult, limit: float) -> FloquetResult:
         if found.decided:
             return found
         if abs(float(np.log(np.maximum(np.abs(found.multipliers), 1e-300)).sum())) < _UNDAMPED:
-            return replace(found, note="undamped: multipliers stay on the unit circle, and nothing settles the verdict")
-        asked, joint, contradiction = [found], found, ""
+            return replace(found, note="Undamped: multipliers stay on the unit circle, and nothing settles the verdict")
         size = len(found.multipliers) * (2 * state.basis.harmonics + 1)
-        for witness in self.witnesses if size <= _UNBIDDEN else ():
+        if size > limit:
+            skipped = f"Witnesses, with matrices of {size} rows, are not asked along a curve, but by so.stability"
+            return replace(found, note=f"{_open(found)}. {skipped}")
+        asked, joint, contradictions = [found], found, []
+        for witness in self.witnesses:
             said = witness.multipliers(state)
             asked.append(said)
             if not said.applicable:
                 continue
-            joint, conflict = combined(joint, said)
-            contradiction = contradiction or conflict
+            joint, contradiction = combined(joint, said)
+            contradictions += [contradiction] if contradiction else []
             if joint.decided:
                 break
-        return replace(joint, note=_words(state, asked, joint, contradiction), witnesses=tuple(asked))
+        return replace(joint, note=_words(state, asked, joint, contradictions), witnesses=tuple(asked))
 
 
 def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:
@@ -89,11 +95,11 @@ def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:
         mu[i], errors[i], consistent = _overlap(mu[i], errors[i], b.multipliers[j], b.errors[j])
         if not consistent and not contradiction:
             contradiction = (
-                f"{a.method} and {b.method} contradict each other: {_said(a.multipliers[i], a.errors[i])} against "
-                f"{_said(b.multipliers[j], b.errors[j])}"
+                f"{a.method} and {b.method} contradict each other: {written(a.multipliers[i], a.errors[i])} against "
+                f"{written(b.multipliers[j], b.errors[j])}"
             )
     order = np.argsort(-np.abs(mu), kind="stable")
-    return FloquetResult(mu[order], errors[order], f"{a.method} and {b.method}"), contradiction
+    return FloquetResult(mu[order], errors[order], f"{a.method} + {b.method}"), contradiction
 
 
 def _overlap(p: complex, a: float, q: complex, b: float) -> tuple[complex, float, bool]:
@@ -112,42 +118,30 @@ def _overlap(p: complex, a: float, q: complex, b: float) -> tuple[complex, float
     return p + along / d * (q - p), max(radius, _BELIEVED * b), True
 
 
-def _words(state: BalanceState, asked: Iterable[FloquetResult], joint: FloquetResult, contradiction: str) -> str:
-    first, *others = asked
+def _words(
+    state: BalanceState, asked: Sequence[FloquetResult], joint: FloquetResult, contradictions: Sequence[str]
+) -> str:
+    """How the verdict came about, or what keeps it open and what would settle it."""
+    first, others = asked[0], asked[1:]
     heard = [r.method for r in others if r.applicable]
-    silent = "; ".join(r.note for r in others if not r.applicable)
-    start = f"{_nearest(first)} by {first.method}"
-    if contradiction:
-        start = f"{contradiction[0].upper()}{contradiction[1:]}"
     if joint.decided:
-        return f"{start}; {' and '.join(heard)} settle{'s' if len(heard) == 1 else ''} it"
-    remaining = _nearest(joint) if heard else start
-    harmonics = state.basis.harmonics
-    text = start if contradiction else remaining
-    if contradiction:
-        text += f"; together: {remaining}"
-    if silent:
-        text += f"; {silent}"
-    return (
-        f"{text}. More harmonics than the motion's {harmonics} would settle it, or so.verify (shooting), unless the "
-        "motion is a bifurcation point itself"
+        settled = f"{' and '.join(heard)} settle{'s' if len(heard) == 1 else ''} it"
+        return ". ".join([_open(first), *contradictions, settled])
+    sentences = [_open(joint), *contradictions, *(r.note for r in others if not r.applicable)]
+    sentences.append(
+        f"More harmonics than the motion's {state.basis.harmonics} would settle it, or shooting (so.verify), unless "
+        "the motion is itself a bifurcation point"
     )
+    return ". ".join(sentences)
 
 
-def _nearest(result: FloquetResult) -> str:
-    """Where the multiplier lies that leaves the verdict open."""
+def _open(result: FloquetResult) -> str:
+    """Which multiplier leaves the verdict open."""
     distance = np.abs(result.multipliers) - 1.0
     i = int(np.argmin(np.abs(distance) - result.errors))
     side = "inside" if distance[i] < 0.0 else "outside"
-    mu = result.multipliers[i]
-    return f"multiplier {_said(mu, result.errors[i])} lies {abs(distance[i]):.1e} {side} the unit circle"
-
-
-def _said(mu: complex, error: float) -> str:
-    digits = 10 if not 1e-15 < error < 1.0 else max(4, 1 - math.floor(math.log10(error)))
-    real = f"{mu.real:.{digits}g}"
-    text = real if abs(mu.imag) <= error else f"{real}{mu.imag:+.{digits}g}i"
-    return f"{text} +- {error:.1e}"
+    where = f"multiplier {written(result.multipliers[i], result.errors[i])}, {abs(distance[i]):.1e} {side} the circle"
+    return f"Undecided by {result.method}: {where}"
 
 
 METHODS: dict[str, StabilityMethod] = {

@@ -28,8 +28,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
 
+from suboctave.continuation.linear import Factor
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState
@@ -118,15 +118,18 @@ class _Waves:
 
     def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
         """Right and left null vectors of P at an eigenvalue, by inverse iteration; shape (waves, n) each."""
-        # a little beside the eigenvalue: exactly on it there may be a zero pivot
-        factors = lu_factor(self.matrix(s + 1e-11 * (1.0 + abs(s))), check_finite=False)
+        factor = Factor.of(self.matrix(s))
+        # exactly on an eigenvalue there may be a zero pivot
+        pivots = np.diagonal(factor.lu)
+        tiny = 1e-16 * float(np.abs(pivots).max())
+        np.fill_diagonal(factor.lu, np.where(np.abs(pivots) < tiny, tiny, pivots))
         found = []
-        for transposed in (0, 1):
-            x = np.ones(factors[0].shape[0], dtype=complex)
+        for adjoint in (False, True):
+            x = np.ones(len(factor.lu), dtype=complex)
             for _ in range(2):
-                x = lu_solve(factors, x / np.linalg.norm(x), trans=transposed, check_finite=False)
+                x = factor.solve(x / np.linalg.norm(x), adjoint)
             found.append((x / np.linalg.norm(x)).reshape(len(self.index), self.system.n))
-        return found[0], found[1]
+        return found[0], found[1].conj()
 
     def widened(self, phi: ComplexArray) -> ComplexArray:
         """A vector of fewer waves with zeros for the others."""
@@ -178,7 +181,7 @@ def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
     size = count * (2 * harmonics + 1)
     if size > _LARGEST:
         return FloquetResult.inapplicable(
-            count, name, f"a Hill problem of {size} unknowns is larger than {_LARGEST}: use the monodromy matrix"
+            count, name, f"A Hill problem of {size} unknowns is larger than {_LARGEST}: use the monodromy matrix"
         )
     values = exponents(solved, harmonics)
     strip, gap = in_strip(values, harmonics)
@@ -196,8 +199,8 @@ def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
         chosen = smallest_imaginary(values, count)
     elif selection == "symmetry":
         chosen = most_central(_vectors(solved, harmonics, values), count)
-    if not same_exponents(values[chosen], values[strip], 0.25 * gap):
-        note = f"selection by {selection} takes an exponent twice and misses another: its multipliers are not those"
+    if not same_exponents(values[chosen], values[strip]):
+        note = f"Selection by {selection} takes an exponent twice and misses another: its multipliers are not those"
     s, spread = _second_level(state, solved, values[chosen])
     mu = np.exp(2.0 * math.pi * s)
     # exponents are known to `spread`, multipliers relative to their size

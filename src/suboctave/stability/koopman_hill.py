@@ -19,6 +19,7 @@ instead of N^-2. The sub-harmonic form does without that, up to N.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import expm
@@ -30,17 +31,19 @@ from suboctave.stability.result import FloquetResult
 from suboctave.stability.variational import Variational, liouville, refined
 
 #: size of Hill's matrix above which its exponential acts on the start by its Taylor series, never formed
-_DENSE = 300
+_DENSE = 400
 #: largest Hill matrix that is attempted
 _LARGEST = 6000
 #: perturbation harmonics, however few the motion has
 _FEWEST = 15
 #: share of what the motion's neglected harmonics do that is still missing when they are added to first order
 _MOTION = 0.5
-#: share of the harmonics that the coarser run has
-_COARSE = 0.5
+#: perturbation harmonics that are tried one after the other, in units of the motion's: direct, sub-harmonic
+_LADDER = ((0.5, 1.0, 1.5, 2.0, 3.0), (0.5, 1.0, 1.5, 2.0))
+#: move of a multiplier at which that ends
+_ACCURACY = 1e-4
 #: share of parts that cancel by which they are taken not to
-_CANCELLED = 0.01
+_CANCELLED = 0.02
 _NOTHING = np.zeros(0, dtype=complex)
 
 
@@ -132,47 +135,55 @@ def _by_taylor(
 
 
 def koopman_hill_multipliers(state: BalanceState, subharmonic: bool) -> FloquetResult:
-    """Multipliers by the Koopman-Hill projection on the motion with its neglected harmonics."""
-    name = "Koopman-Hill, sub-harmonic" if subharmonic else "Koopman-Hill, direct"
-    harmonics = max(_FEWEST, state.basis.harmonics) * (1 if subharmonic else 2)
-    coarse = math.ceil(_COARSE * harmonics)
-    count = 2 * state.linear.equation_of_motion()[0].shape[0]
-    if count * (2 * harmonics + 1) > _LARGEST:
-        return FloquetResult.inapplicable(
-            count,
-            name,
-            f"a Hill matrix of {count * (2 * harmonics + 1)} unknowns is larger than {_LARGEST}: "
-            "use the monodromy matrix",
-        )
+    """Multipliers by the Koopman-Hill projection on the motion with its neglected harmonics.
+
+    The series of the perturbation is lengthened until that moves no multiplier by more than a ten-thousandth, or by
+    more than what the motion neglects; the last move is the error estimate.
+    """
+    name = f"{'sub-harmonic' if subharmonic else 'direct'} Koopman-Hill"
+    base, count = max(_FEWEST, state.basis.harmonics), 2 * state.linear.equation_of_motion()[0].shape[0]
+    ladder = [math.ceil(share * base) for share in _LADDER[subharmonic]]
+    rows = [count * (2 * harmonics + 1) for harmonics in ladder]
+    if rows[1] > _LARGEST:
+        note = f"A Hill matrix of {rows[1]} rows is larger than {_LARGEST}: use the monodromy matrix"
+        return FloquetResult.inapplicable(count, name, note)
     motion, alternative = refined(state)
-    best = Variational.of(motion, 2 * harmonics)
-    phi, rough = transition(best, harmonics, subharmonic), transition(best, coarse, subharmonic)
-    plain = transition(Variational.of(state, 2 * coarse), coarse, subharmonic)
-    changes = [phi - rough, _MOTION * (rough - plain)]
+    best = Variational.of(motion, 2 * ladder[-1])
+    phi = transition(best, ladder[0], subharmonic)
+    of_motion = [_MOTION * (phi - transition(Variational.of(state, 2 * ladder[0]), ladder[0], subharmonic))]
     if alternative is not None:
-        changes.append(transition(Variational.of(alternative, 2 * coarse), coarse, subharmonic) - rough)
-    if not all(np.isfinite(change).all() for change in changes):
-        return FloquetResult.inapplicable(count, name, "the exponential of Hill's matrix is not finite")
-    mu, errors = eigenvalues(phi, changes)
-    errors, defect = liouville(mu, errors, best.decay)
-    return FloquetResult(mu, errors, name, checks={"Liouville": defect})
+        of_motion.append(phi - transition(Variational.of(alternative, 2 * ladder[0]), ladder[0], subharmonic))
+    for harmonics, size in zip(ladder[1:], rows[1:], strict=True):
+        if size > _LARGEST:
+            break
+        shorter, phi = phi, transition(best, harmonics, subharmonic)
+        if not all(np.isfinite(matrix).all() for matrix in (phi, shorter, *of_motion)):
+            return FloquetResult.inapplicable(count, name, "The exponential of Hill's matrix is not finite")
+        mu, (series, neglected) = eigenvalues(phi, ([phi - shorter], of_motion))
+        if np.all(series <= np.maximum(_ACCURACY * np.maximum(1.0, np.abs(mu)), neglected)):
+            break
+    errors, defect = liouville(mu, series + neglected, best.decay)
+    return FloquetResult(mu, errors, name, checks={"harmonics": float(harmonics), "Liouville": defect})
 
 
-def eigenvalues(phi: Array, changes: list[Array]) -> tuple[ComplexArray, Array]:
-    """Eigenvalues by falling modulus and how far changes of the matrix move each, to first order."""
+def eigenvalues(phi: Array, changes: Sequence[Sequence[Array]]) -> tuple[ComplexArray, list[Array]]:
+    """Eigenvalues by falling modulus, and how far each set of changes of the matrix, and rounding, moves each."""
     mu, vectors = np.linalg.eig(phi)
-    size = sum(float(np.linalg.norm(change)) for change in changes) + 1e-15 * float(np.linalg.norm(phi))
+    order = np.argsort(-np.abs(mu), kind="stable")
     try:
         left = np.linalg.inv(vectors)
-        moved = np.zeros(len(mu))
-        for change in changes:
-            moved += np.abs(((left @ change) * vectors.T).sum(axis=1))
+    except np.linalg.LinAlgError:
+        left = np.full_like(vectors, np.nan)
+    rounding = 1e-15 * ((np.abs(left) @ np.abs(phi)) * np.abs(vectors).T).sum(axis=1)
+    moves = []
+    for together in changes:
+        moved, size = rounding + 1e-14, 1e-15 * float(np.linalg.norm(phi))
+        for change in together:
+            moved = moved + np.abs(((left @ change) * vectors.T).sum(axis=1))
             # what cancels in this sum need not cancel in the truth
             moved += _CANCELLED * ((np.abs(left) @ np.abs(change)) * np.abs(vectors).T).sum(axis=1)
-        moved = moved + 1e-15 * ((np.abs(left) @ np.abs(phi)) * np.abs(vectors).T).sum(axis=1)
-    except np.linalg.LinAlgError:
-        moved = np.full(len(mu), np.inf)
-    # a double eigenvalue moves by the root of the change
-    moved = np.minimum(np.nan_to_num(moved, nan=np.inf), math.sqrt(size * max(1.0, float(np.abs(mu).max()))))
-    order = np.argsort(-np.abs(mu), kind="stable")
-    return mu.astype(complex)[order], moved[order] + 1e-14
+            size += float(np.linalg.norm(change))
+        # a double eigenvalue moves by the root of the change
+        root = math.sqrt(size * max(1.0, float(np.abs(mu).max())))
+        moves.append(np.minimum(np.nan_to_num(moved, nan=np.inf), root)[order])
+    return mu.astype(complex)[order], moves

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -83,14 +84,20 @@ class FloquetResult:
     def __repr__(self) -> str:
         if not self.applicable:
             return f"FloquetResult: not applicable ({self.method}). {self.note}"
-        verdict = "stable" if self.stable else f"unstable, {self.unstable} of {len(self.multipliers)} outside"
+        count, outside = len(self.multipliers), self.unstable
+        verdict = "stable" if self.stable else f"unstable, {outside} of {count} outside" if outside else "not stable"
         doubt = "" if self.decided else ", UNDECIDED"
-        shown = [_number(mu, error) for mu, error in zip(self.multipliers[:4], self.errors, strict=False)]
-        more = f", ... ({len(self.multipliers)} in all)" if len(self.multipliers) > 4 else ""
+        shown = [written(mu, error) for mu, error in zip(self.multipliers[:4], self.errors, strict=False)]
+        more = f", ... ({count} in all)" if count > 4 else ""
         note = f". {self.note}" if self.note else ""
         return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
 
 
-def _number(mu: complex, error: float) -> str:
-    text = f"{mu.real:.6g}" if abs(mu.imag) <= 1e-12 * abs(mu) else f"({mu.real:.6g}{mu.imag:+.6g}i)"
-    return f"{text} +- {error:.0e}"
+def written(mu: complex, error: float) -> str:
+    """A multiplier with the digits that its error leaves, and the error."""
+    size, digits = max(abs(mu), 1e-300), 6
+    if 0.0 < error < 1.0:
+        digits = min(12, max(4, 2 + math.floor(math.log10(size)) - math.floor(math.log10(error))))
+    real = f"{mu.real:#.{digits}g}"
+    text = real if abs(mu.imag) <= max(error, 1e-12 * size) else f"({real}{mu.imag:+#.{digits}g}i)"
+    return f"{text} +- {error:.1g}"

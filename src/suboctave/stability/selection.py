@@ -44,16 +44,8 @@ def most_central(vectors: ComplexArray, count: int) -> np.ndarray:
     return np.argsort(np.abs(harmonic @ weights) / weights.sum(axis=0), kind="stable")[:count]
 
 
-def same_exponents(a: ComplexArray, b: ComplexArray, tolerance: float) -> bool:
-    """True if two sets of exponents are the same up to shifts by i, each met once."""
-    if len(a) != len(b):
-        return False
+def same_exponents(a: ComplexArray, b: ComplexArray) -> bool:
+    """True if a has each of the exponents b once, up to shifts by i: each is the nearest of another one."""
     difference = a[:, None] - b[None, :]
     distance: Array = np.abs(difference - 1j * np.round(difference.imag))
-    left = list(range(len(b)))
-    for row in distance:
-        nearest = min(left, key=row.__getitem__)
-        if row[nearest] > tolerance:
-            return False
-        left.remove(nearest)
-    return True
+    return len(a) == len(b) and sorted(distance.argmin(axis=1)) == list(range(len(b)))

@@ -1,0 +1,409 @@
+"""Hill's method and the Koopman-Hill projection against shooting, closed forms and identities; monodromy with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+from suboctave.stability import floquet_multipliers, koopman_hill
+from suboctave.stability.koopman_hill import transition
+from suboctave.stability.variational import Variational, two_sided
+from suboctave.timedomain import integrate, shoot
+
+METHODS = [so.Monodromy(), so.Hill(), so.KoopmanHill(), so.KoopmanHill(subharmonic=False)]
+WITNESSES = METHODS[1:]
+#: what the multipliers of shooting are good to themselves
+SHOOTING = 1e-9
+each_method = pytest.mark.parametrize("method", METHODS, ids=repr)
+each_witness = pytest.mark.parametrize("method", WITNESSES, ids=repr)
+
+
+def exponents(system):
+    """Roots of the quadratic eigenvalue problem of a system without elements."""
+    m, c, k = system.matrices()
+    zero, one = np.zeros_like(m), np.eye(len(m))
+    return np.linalg.eigvals(np.block([[zero, one], [-np.linalg.solve(m, k), -np.linalg.solve(m, c)]]))
+
+
+# ------------------------------------------------------------------------------------------------------- shooting
+@each_method
+def test_fifty_motions_by_shooting(fifty, distances, method):
+    """Within its own error estimate of shooting everywhere, the estimate below 1e-3, every verdict the same."""
+    for draw in fifty:
+        result = so.stability(draw.orbit, method)
+        assert result.applicable, (draw.name, result)
+        assert np.all(distances(result.multipliers, draw.exact) <= result.errors + SHOOTING), (draw.name, result)
+        assert result.errors.max() <= 1e-3, (draw.name, result)
+        assert result.stable == draw.stable, (draw.name, result)
+
+
+def test_hill_is_the_sharpest(fifty, distances):
+    """The truncations of motion and perturbation cancel in Hill's method: with contacts it is ten times closer to
+    shooting than the exact propagation along the motion with its neglected harmonics.
+    """
+    contacts = [d for d in fifty if d.name.startswith("p=") and "j=0.0" in d.name]
+    errors = {
+        name: np.mean([distances(so.stability(d.orbit, name).multipliers, d.exact).max() for d in contacts])
+        for name in ("monodromy", "hill")
+    }
+    assert len(contacts) > 20
+    assert errors["hill"] < 3e-7
+    assert errors["hill"] < 0.3 * errors["monodromy"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+@pytest.mark.parametrize("harmonics", [15, 31])
+def test_coverage_on_the_reference_curves(draw, distances, method, harmonics):
+    """Ninety-five percent of all multipliers lie within their error estimates."""
+    covered = []
+    for item in draw(harmonics, 12, seed=harmonics):
+        result = so.stability(item.orbit, method)
+        covered += list(distances(result.multipliers, item.exact) <= result.errors + SHOOTING)
+    assert len(covered) > 400
+    assert np.mean(covered) >= 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+def test_coverage_on_random_systems(random_motions, distances, method):
+    """The same for systems of one to three DOFs and 7 to 31 harmonics; no decided verdict is wrong."""
+    covered, silent, wrong = [], 0, []
+    for item in random_motions(11, 150):
+        result = so.stability(item.orbit, method)
+        if not result.applicable:
+            silent += 1
+            continue
+        covered += list(distances(result.multipliers, item.exact) <= result.errors + SHOOTING)
+        if result.decided and result.stable != item.stable:
+            wrong.append((item.name, result))
+    assert silent <= 10
+    assert np.mean(covered) >= 0.95
+    assert not wrong
+
+
+def test_a_few_random_systems(random_motions, distances):
+    """A small share of the slow test above."""
+    covered = {method: [] for method in METHODS}
+    for item in random_motions(3, 8):
+        for method in METHODS:
+            result = so.stability(item.orbit, method)
+            if result.applicable:
+                covered[method] += list(distances(result.multipliers, item.exact) <= result.errors + SHOOTING)
+                assert result.stable == item.stable or not result.decided, item.name
+    for method, inside in covered.items():
+        assert np.mean(inside) >= 0.9, method
+
+
+@each_witness
+def test_gyroscopic_and_circulatory_forces(distances, method):
+    """Unsymmetric C and K, a stop between the DOFs: neither method may rely on symmetry."""
+    system = so.System(
+        [[1.0, 0.1], [0.1, 0.7]],
+        [[0.05, 0.6], [-0.5, 0.04]],
+        [[2.0, -0.4], [0.3, 1.5]],
+        [so.ElasticStop((0, 1), 3.0, 0.2), so.CubicSpring(1, 0.4)],
+        [so.HarmonicLoad(0, 0.5)],
+    )
+    orbit = so.frequency_response(system, (2.6, 1.9), harmonics=25).orbits[-1]
+    exact = shoot(system, orbit.start(), orbit.omega).multipliers
+    result = so.stability(orbit, method)
+    assert np.all(distances(result.multipliers, exact) <= result.errors + SHOOTING)
+    assert result.error < 1e-3
+
+
+@each_witness
+def test_forces_of_velocity(drag, distances, method):
+    """A law in displacement and velocity of which nothing is told."""
+    system = so.System(1.0, 0.01, 1.0, [drag(0, [0.02, 0.3, 0.1])], [so.HarmonicLoad(0, 1.2)])
+    orbit = so.frequency_response(system, (2.0, 1.1), harmonics=13).orbits[-1]
+    exact = shoot(system, orbit.start(), orbit.omega).multipliers
+    result = so.stability(orbit, method)
+    assert np.all(distances(result.multipliers, exact) <= result.errors + SHOOTING)
+    assert result.error < 1e-4
+
+
+@pytest.fixture(scope="module", params=[None, 3000.0], ids=["exact", "regularised"])
+def doubled(request):
+    """A stable motion of two load periods between the period doublings of the reference oscillator, and by shooting."""
+    system, omega, nu, harmonics = so.library.reference_oscillator(regularization=request.param), 3.0, 2, 50
+    period = 2.0 * np.pi * nu / omega
+    settled = integrate(system, [0.1, 0.0], [0.0, 60 * period], omega).end
+    solution = shoot(system, settled, omega, periods=nu)
+    samples = integrate(system, solution.state, [0.0, period], omega).at(period * np.arange(512) / 512)[0]
+    c = np.fft.rfft(samples, axis=0)[: harmonics + 1] / 256
+    x = np.zeros((2 * harmonics + 1, 1))
+    x[0], x[1::2], x[2::2] = 0.5 * c[0].real, c[1:].real, -c[1:].imag
+    balance = HarmonicBalance(system, HarmonicBasis(harmonics, nu)).settle(x, omega)
+    for _ in range(8):
+        state = balance.at(x, omega)
+        x = x - np.linalg.solve(state.jacobian, state.residual).reshape(x.shape)
+    assert np.abs(x[1::4]).max() > 1e-2  # it does not repeat after one period
+    return so.PeriodicOrbit(balance, x, omega, dict(system.parameters), 1e-12), solution
+
+
+@each_method
+def test_motions_of_two_periods(doubled, distances, method):
+    orbit, solution = doubled
+    result = so.stability(orbit, method)
+    assert np.all(distances(result.multipliers, solution.multipliers) <= result.errors + SHOOTING)
+    assert result.error < 1e-3
+    assert result.stable
+    assert solution.stable
+
+
+# --------------------------------------------------------------------------------------- closed forms and identities
+@each_witness
+@pytest.mark.parametrize("n", [1, 2, 4])
+@pytest.mark.parametrize("nu", [1, 3])
+def test_linear_system(distances, method, n, nu):
+    """Multipliers are exp(lambda T), lambda the roots of the quadratic eigenvalue problem."""
+    rng = np.random.default_rng(n)
+    k = 3.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    c = 0.05 * k + 0.03 * rng.normal(size=(n, n))
+    system = so.System(np.eye(n) + 0.2 * np.diag(np.arange(n)), c, k, loads=[so.HarmonicLoad(0, 1.0)])
+    state = HarmonicBalance(system, HarmonicBasis(5 * nu, nu)).at(np.zeros((10 * nu + 1, n)), 1.3)
+    result = method.multipliers(state)
+    difference = distances(result.multipliers, np.exp(exponents(system) * 2 * np.pi * nu / 1.3))
+    assert difference.max() < 1e-11
+    assert np.all(difference <= 10 * result.errors)
+    assert np.all(np.diff(np.abs(result.multipliers)) <= 1e-12)
+
+
+@each_witness
+@pytest.mark.parametrize(("damping", "stiffness"), [(5.0, 1.0), (2.0, 1.0), (0.1, -0.3), (0.0, 0.0), (-0.5, 1.0)])
+def test_overdamped_critical_and_unstable(method, damping, stiffness):
+    """Real exponents, a double one at critical damping, a free mass, negative damping."""
+    system = so.System(1.0, damping, stiffness, loads=[so.HarmonicLoad(0, 1.0)])
+    result = method.multipliers(HarmonicBalance(system, HarmonicBasis(4)).at(np.zeros(9), 2.0))
+    expected = np.exp(np.roots([1.0, damping, stiffness]) * np.pi)
+    # a double one is as good as the square root of rounding
+    for mu in expected:
+        assert np.abs(result.multipliers - mu).min() < 1e-6
+    assert result.unstable == np.count_nonzero(np.abs(expected) > 1.0)
+
+
+@each_method
+def test_liouville(fifty, drag, method):
+    """The product of all multipliers is exp(-int trace(M^-1 (C + f_v)) dt), to what their errors allow."""
+    for draw in fifty[::5]:
+        mass, damping, _ = draw.orbit.system.matrices()
+        expected = np.exp(-np.trace(np.linalg.solve(mass, damping)) * draw.orbit.period)
+        check(so.stability(draw.orbit, method), expected)
+    system = so.System(1.0, 0.05, 1.0, [drag(0, [-0.1, 0.3, 0.0])], [so.HarmonicLoad(0, 2.0)])
+    orbit = so.frequency_response(system, (2.5, 2.0), harmonics=15).orbits[-1]
+    x = orbit.coefficients[:, 0]
+    square = x[0] ** 2 + 0.5 * (x[1:] ** 2).sum()
+    check(so.stability(orbit, method), np.exp(-orbit.period * (0.05 - 0.1 + 0.3 * square)))
+
+
+def check(result, expected):
+    product = np.prod(result.multipliers)
+    slack = np.sum(result.errors / np.abs(result.multipliers)) + 1e-9
+    assert product.real == pytest.approx(expected, rel=slack)
+    assert abs(product.imag) <= slack * expected
+
+
+@each_witness
+def test_multipliers_are_closed_under_conjugation(fifty, method):
+    """Of a real equation; a negative real one must not carry an imaginary part."""
+    negative = 0
+    for draw in fifty:
+        mu = so.stability(draw.orbit, method).multipliers
+        assert np.abs(mu[:, None] - mu.conj()[None, :]).min(axis=1).max() < 1e-12 * np.abs(mu).max()
+        real = (draw.exact.real < 0.0) & (np.abs(draw.exact.imag) < 1e-9)
+        if real.all():
+            negative += 1
+            assert not mu.imag.any()
+    assert negative >= 3
+
+
+@each_witness
+def test_units_and_order_of_dofs_do_not_matter(method):
+    """Seconds to milliseconds, metres to millimetres, kilograms to tonnes, the DOFs renamed: the same multipliers."""
+
+    def multipliers(mass, length, time, order):
+        m, c, k = (
+            np.diag([1.0, 0.6]),
+            np.array([[0.06, -0.02], [-0.02, 0.04]]),
+            np.array([[2.0, -1.0], [-1.0, 1.5]]),
+        )
+        at = [order.index(i) for i in (0, 1)]
+        system = so.System(
+            (mass * m)[np.ix_(order, order)],
+            (mass / time * c)[np.ix_(order, order)],
+            (mass / time**2 * k)[np.ix_(order, order)],
+            [
+                so.ElasticStop((at[0], at[1]), 3.0 * mass / time**2, 0.1 * length),
+                so.CubicSpring(at[1], 0.2 * mass / time**2 / length**2),
+            ],
+            [so.HarmonicLoad(at[0], 0.3 * mass * length / time**2)],
+        )
+        orbit = so.frequency_response(system, (2.4 / time, 1.9 / time), harmonics=15).orbits[-1]
+        return np.sort_complex(so.stability(orbit, method).multipliers)
+
+    expected = multipliers(1.0, 1.0, 1.0, [0, 1])
+    np.testing.assert_allclose(multipliers(1e-3, 1e3, 1e3, [1, 0]), expected, rtol=1e-7, atol=1e-9)
+
+
+@each_witness
+def test_condensed_linear_part(condensed, distances, method):
+    """Six masses with one unknown: the multipliers are those of all twelve dimensions."""
+    n = 6
+    k = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    elements = [so.ElasticStop(0, 3.0, 0.5), so.CubicSpring(0, 0.05)]
+    system = so.System(np.eye(n), 0.06 * k, k, elements, [so.HarmonicLoad(0, 0.4)])
+    orbit = so.frequency_response(system, (0.6, 0.7), 9, linear=condensed(system, [0])).orbits[-1]
+    whole = so.frequency_response(system, (0.6, 0.7), 9).orbits[-1]
+    exact = shoot(system, whole.start(), whole.omega).multipliers
+    result = so.stability(orbit, method)
+    assert result.multipliers.shape == (2 * n,)
+    assert np.all(distances(result.multipliers, exact) <= result.errors + SHOOTING)
+    assert result.error < 1e-2
+
+
+# --------------------------------------------------------------------------------------------------- parts of methods
+def test_linearised_motion_as_a_series(drag):
+    """The Fourier series of K(t), C(t) against the tangents themselves, at instants."""
+    system = so.System(
+        np.diag([1.0, 4.0]), np.eye(2), np.eye(2), [so.CubicSpring((0, 1), 0.7), drag(1, [0.1, 0.2, 0.3])]
+    )
+    x = np.array([[0.1, 0.2], [0.5, -0.3], [0.2, 0.4]])
+    state = HarmonicBalance(system, HarmonicBasis(1)).settle(x, 1.5).at(x, 1.5)
+    series = Variational.of(state, 12)
+    tau = np.array([0.3, 2.0])
+    u = x[0] + np.outer(np.cos(tau), x[1]) + np.outer(np.sin(tau), x[2])
+    v = 1.5 * (np.outer(np.cos(tau), x[2]) - np.outer(np.sin(tau), x[1]))
+    weight = np.array([1.0, 2.0])
+    for i in range(2):
+        waves = np.where(np.arange(13) > 0, 2.0, 1.0) * np.exp(1j * np.arange(13) * tau[i])
+        k = series.stiffness + np.einsum("g,gi,gj->ij", (series.k @ waves).real, series.left, series.right)
+        c = series.damping + np.einsum("g,gi,gj->ij", (series.c @ waves).real, series.left, series.right)
+        spring = 1.0 * 3 * 0.7 * (u[i, 0] - u[i, 1]) ** 2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        expected = np.eye(2) + spring
+        expected[1, 1] += 2 * 0.2 * u[i, 1] * v[i, 1]
+        np.testing.assert_allclose(k, weight[:, None] * np.diag([1.0, 0.25]) @ expected / weight, atol=1e-10)
+        drag_slope = 0.1 + 0.2 * u[i, 1] ** 2 + 3 * 0.3 * v[i, 1] ** 2
+        expected = np.diag([1.0, 1.0 + drag_slope])
+        np.testing.assert_allclose(c, weight[:, None] * np.diag([1.0, 0.25]) @ expected / weight, atol=1e-10)
+
+
+def test_toeplitz_matrix_of_waves():
+    """Entry (k, l) is the coefficient k - l of a real function."""
+    g = np.array([0.5, 1.0 + 2.0j, 3.0 - 1.0j])
+    matrix = two_sided(g, 1)
+    assert matrix.tolist() == [[g[0], g[1].conj(), g[2].conj()], [g[1], g[0], g[1].conj()], [g[2], g[1], g[0]]]
+
+
+def test_the_subharmonic_projection_converges_faster():
+    """For smooth forces it does with N harmonics about what the direct one does with 2 N (Bayer & Leine 2025)."""
+    orbit = so.frequency_response(so.library.duffing(c=0.1, F=0.8), (2.6, 1.2), 21).orbits[-1]
+    system = Variational.of(orbit.state(), 120)
+    exact = transition(system, 60, subharmonic=True)
+    assert np.abs(exact - transition(system, 60, subharmonic=False)).max() < 1e-11
+
+    def error(harmonics, subharmonic):
+        return np.abs(transition(system, harmonics, subharmonic) - exact).max()
+
+    for harmonics in (6, 8, 10):
+        assert error(harmonics, True) < 0.01 * error(harmonics, False)
+        assert error(harmonics, True) < error(round(1.5 * harmonics), False)
+    assert error(16, False) < 1e-6
+
+
+@pytest.mark.parametrize("subharmonic", [True, False])
+def test_the_exponential_by_its_action(monkeypatch, subharmonic):
+    """Large Hill matrices are never formed: the Taylor series of the action is the same."""
+    orbit = so.frequency_response(so.library.nltva(), (0.8, 1.0), 9).orbits[-1]
+    system = Variational.of(orbit.state(), 18)
+    dense = transition(system, 9, subharmonic)
+    monkeypatch.setattr(koopman_hill, "_DENSE", 0)
+    np.testing.assert_allclose(transition(system, 9, subharmonic), dense, atol=1e-11 * np.abs(dense).max())
+
+
+def test_the_monodromy_matrix_itself():
+    """Not only its eigenvalues: column by column the perturbed motion after one period, by shooting."""
+    system = so.library.duffing(c=0.1, F=0.8)
+    orbit = so.frequency_response(system, (2.6, 1.2), 21).orbits[-1]
+    scale = np.diag([1.0, orbit.omega])
+    phi = transition(Variational.of(orbit.state(), 60), 25, subharmonic=True)
+    exact = shoot(system, orbit.start(), orbit.omega).monodromy
+    np.testing.assert_allclose(scale @ phi @ np.linalg.inv(scale), exact, atol=1e-7)
+
+
+# ------------------------------------------------------------------------------------------------ limits of methods
+def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
+    """With too few harmonics for the highest natural frequency there is no number, but how many would do."""
+    system = so.System(
+        np.eye(2), 0.02 * np.eye(2), np.diag([1.0, 400.0]), [so.CubicSpring(0, 0.1)], [so.HarmonicLoad(0, 0.5)]
+    )
+    for harmonics in (5, 25):
+        orbit = so.frequency_response(system, (1.4, 1.5), harmonics).orbits[-1]
+        result = so.stability(orbit, "hill")
+        assert not result.applicable
+        assert np.isnan(result.multipliers).all()
+        assert np.isinf(result.errors).all()
+        assert not result.stable
+        assert not result.decided
+        assert "27 would do" in result.note
+        assert "not applicable" in repr(result)
+    orbit = so.frequency_response(system, (1.4, 1.5), 27).orbits[-1]
+    result = so.stability(orbit, "hill")
+    assert result.applicable
+    assert distances(result.multipliers, floquet_multipliers(orbit.state()).multipliers).max() < 1e-9
+    # the projection propagates the linear part exactly: no such limit
+    assert so.stability(orbit, "koopman-hill").applicable
+
+
+def test_hill_checks_itself(fifty):
+    """Exactly 2 n eigenvalues in the strip, reported on the result."""
+    for draw in fifty[::7]:
+        checks = so.stability(draw.orbit, "hill").checks
+        assert checks["inside the strip"] == checks["expected"] == len(draw.exact)
+        assert checks["gap"] >= 0.99 / len(draw.exact)
+        assert checks["Liouville"] < 1e-6
+
+
+def test_a_strip_that_holds_another_number_is_no_result(monkeypatch):
+    """A spurious eigenvalue inside the strip is found out."""
+    from suboctave.stability import hill
+
+    honest = hill.exponents
+    monkeypatch.setattr(hill, "exponents", lambda system, h: np.append(honest(system, h), -0.1 + 0.01j))
+    orbit = so.frequency_response(so.library.duffing(), (2.0, 1.9), 9).orbits[-1]
+    result = so.stability(orbit, "hill")
+    assert not result.applicable
+    assert "3 of Hill's eigenvalues lie in a strip that must hold 2" in result.note
+
+
+def test_too_large_a_problem_is_refused():
+    n = 60
+    k = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    system = so.System(np.eye(n), 0.05 * k, k, [so.CubicSpring(0, 0.1)], [so.HarmonicLoad(0, 0.1)])
+    state = HarmonicBalance(system, HarmonicBasis(27)).at(np.zeros((55, n)), 0.3)
+    for method in WITNESSES:
+        result = method.multipliers(state)
+        assert not result.applicable
+        assert "use the monodromy matrix" in result.note
+
+
+@each_witness
+def test_a_motion_at_rest(method):
+    """No load, no motion: the multipliers of the structure as it hangs there."""
+    system = so.System(1.0, 0.1, 2.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.0)])
+    result = method.multipliers(HarmonicBalance(system, HarmonicBasis(5)).at(np.zeros(11), 1.3))
+    expected = np.exp(exponents(system) * 2 * np.pi / 1.3)
+    assert np.abs(np.sort_complex(result.multipliers) - np.sort_complex(expected)).max() < 1e-12
+
+
+@each_witness
+def test_a_limit_point_itself_stays_undecided(method):
+    """There the motion answers without bound to what it neglects; the estimate says so instead of a false digit."""
+    curve = so.frequency_response(so.library.duffing(), (0.3, 1.0))
+    assert len(curve.bifurcations["LP"]) == 2
+    for point in curve.bifurcations["LP"]:
+        result = so.stability(point, method)
+        assert np.abs(result.multipliers - 1.0).min() <= result.errors[np.abs(result.multipliers - 1.0).argmin()]
+        assert not result.decided
