@@ -252,7 +252,7 @@ def _conjugate(values: ComplexArray, s: complex) -> int | None:
     """The index of an eigenvalue whose conjugate is s up to a shift by i, to rounding."""
     difference = values.conj() - s
     difference -= 1j * np.round(difference.imag)
-    same = np.flatnonzero(np.abs(difference) < 1e-11)
+    same = np.flatnonzero(np.abs(difference) < 1e-9)
     return int(same[0]) if same.size else None
 
 
