@@ -16,7 +16,7 @@ from suboctave.harmonic.kernels import motion
 
 @njit(cache=True)
 def _turn(c, lo, hi, rises, first):
-    """The extremum in (lo, hi), before which the motion rises or falls, by safeguarded Newton: tau, value, curvature."""
+    """The extremum in (lo, hi), before which the motion rises or falls: tau, value, curvature (safeguarded Newton)."""
     t = first
     x = s = 0.0
     for _ in range(60):
@@ -67,11 +67,11 @@ def extrema(c, zr, zi):
         if not (a * d0 > 0.0 and 0.0 < -b / a < 2.0) or abs(d0) - b * b / (4.0 * abs(a)) > 0.5 * min(abs(d0), abs(d1)):
             continue
         middle = lo - 0.5 * h * b / a
-        x, d, s = _jet(c, math.cos(middle), math.sin(middle))
+        _x, d, s = _jet(c, math.cos(middle), math.sin(middle))
         new = middle - 0.5 * h * h * s / a
         if lo < new < hi:
             middle = new
-            x, d, s = _jet(c, math.cos(middle), math.sin(middle))
+            _x, d, s = _jet(c, math.cos(middle), math.sin(middle))
         if d * d0 < 0.0:
             for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
                 tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
