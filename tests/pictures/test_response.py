@@ -47,8 +47,8 @@ def test_each_kind_has_its_own_marker_and_an_unknown_one_its_own_name():
     figure = plot_response(curve_dataset(x, x, stable=x < 2, events=rows))
     drawn = {line.get_gid(): line.get_marker() for line in figure.axes[0].get_lines() if line.get_gid() in kinds}
     assert drawn == {"LP": "o", "PD": "v", "NS": "s", "BP": "D", "grazing": "x", "mine": "*"}
-    named = {"limit point", "period doubling", "Neimark–Sacker", "branch point", "grazing contact", "mine"}
-    assert named < set(texts(figure))
+    names = {"limit point", "period doubling", "Neimark–Sacker", "branch point", "grazing contact", "mine"}
+    assert names < set(texts(figure))
 
 
 def test_several_curves_are_told_apart_by_what_differs(duffing):

@@ -10,16 +10,22 @@ import numpy as np
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, GrazingContact, Sample
+from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate
 from suboctave.bifurcation.grazing import locate_grazings
-from suboctave.bifurcation.layer import behind_grazing, grazing_beside, layer_of, solve_or_behind
+from suboctave.bifurcation.layer import (
+    behind_grazing,
+    behind_their_grazings,
+    grazing_beside,
+    layer_of,
+    solve_or_behind,
+    unresolved,
+)
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
 from suboctave.harmonic.state import BalanceState
@@ -170,7 +176,7 @@ class _Follower:
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self.trace.warnings.append(complaint)
-        self.trace.bifurcations += [item for _, item in sorted(_behind_their_grazing(found), key=lambda pair: pair[0])]
+        self.trace.bifurcations += behind_their_grazings(found)
         for event in self.settings.events:
             crossed = self._event(event, a, b)
             if crossed is not None:
@@ -231,27 +237,10 @@ class _Follower:
             curve.name,
             solution.vectors,
             solution.kappa,
-            0.0 if layer is None else self._unresolved(located.kind, guess, layer, curve),
+            0.0 if layer is None else unresolved(located.kind, guess, layer),
             arclength=arclength,
             contact=layer or located.kind.contact(solution, curve.name),
         )
-
-    def _unresolved(self, kind: BifurcationKind, guess: Guess, layer: GrazingContact, curve: ResponseCurve) -> float:
-        """What the neglected harmonics may do to the place of a bifurcation behind a grazing: half as many more tell.
-
-        If it is not found again with them, it is known up to the thickness of the layer.
-        """
-        basis = guess.balance.basis
-        finer = HarmonicBasis((3 * basis.harmonics + 1) // 2, basis.nu)
-        x = basis.resized(guess.x, finer)
-        balance = curve.with_basis(finer).balance.settle(x, guess.omega, guess.values)
-        try:
-            state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
-        except ConvergenceError:
-            return abs(guess.parameter - layer.parameter)
-        value = state.omega if curve.name == "omega" else state.values[curve.name]
-        # a short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H
-        return 3.0 * abs(value - guess.parameter)
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
         """Solved again with the harmonics that the tolerance for events asks for."""
@@ -349,27 +338,6 @@ def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
     assert isinstance(curve, ResponseCurve)
     x, omega, values = curve.split(u)
     return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
-
-
-def _behind_their_grazing(found: list[tuple[float, Bifurcation]]) -> list[tuple[float, Bifurcation]]:
-    """Places on the step put right where a bifurcation and the grazing that brings it about lie too close to tell."""
-    result = []
-    for fraction, item in found:
-        partners = [
-            (at, other)
-            for at, other in found
-            if other.kind == "grazing" and item.kind != "grazing" and other.contact and item.contact
-            if other.contact.element == item.contact.element and abs(at - fraction) < 0.1
-        ]
-        if partners:
-            at, other = min(partners, key=lambda pair: abs(pair[0] - fraction))
-            assert other.contact is not None
-            # the contact exists after it begins and before it ceases
-            side = 1.0 if other.contact.change.startswith("begins") else -1.0
-            if (fraction - at) * side <= 0.0:
-                fraction, item = at + side * 1e-12, replace(item, arclength=other.arclength)
-        result.append((fraction, item))
-    return result
 
 
 def _kappa(located: Located) -> float:

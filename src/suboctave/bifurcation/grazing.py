@@ -170,11 +170,11 @@ def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:
     """Extrema that pass a gap between two neighbours, and whether they explain the numbers of crossings there."""
     found, clear = [], True
     for p, q in zip(a.gaps, b.gaps, strict=True):
-        pairs, before, after = passages(p.tau, p.value, p.curve, p.level, q.tau, q.value, q.curve, q.level)
-        if before == after and not pairs.size:
+        pairs, count, before, after = passages(p.tau, p.value, p.curve, p.level, q.tau, q.value, q.curve, q.level)
+        if before == after and not count:
             continue
         explained = 0
-        for i, j in pairs.T:
+        for i, j in pairs[:count]:
             above, maximum = bool(q.value[j] > q.level), bool(q.curve[j] < 0.0)
             # a maximum above the gap and a minimum below it have two crossings beside them
             explained += 2 if above == maximum else -2

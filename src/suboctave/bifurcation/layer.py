@@ -26,6 +26,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.bordered import at_values, bordered, residual_scale
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.gaps import gap_extrema
@@ -34,7 +35,7 @@ from suboctave.bifurcation.kinds import BifurcationKind
 from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
 from suboctave.continuation.linear import Factor
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.sampling import PiecewiseLinear
@@ -47,6 +48,8 @@ _YOUNG = 0.05
 _NEAR = 0.05
 #: way from a grazing to a bifurcation that has to be started from there, in scaled arclength, at most
 _BRACKETED = 1e-3
+#: unknowns beyond which neglected harmonics are judged by fewer rather than by more of them
+_LARGE = 800
 #: ways behind the grazing at which Newton's method starts
 _STARTS = (1e-10, 1e-8, 1e-6, 1e-4)
 
@@ -96,6 +99,51 @@ def solve_or_behind(kind: BifurcationKind, guess: Guess) -> Singular:
         if found is None:
             raise
         return found
+
+
+def unresolved(kind: BifurcationKind, guess: Guess, contact: GrazingContact) -> float:
+    """What the neglected harmonics may do to the place of a bifurcation behind a grazing, in the free parameter.
+
+    A short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H: half as many harmonics
+    more (or a third less, where the matrices are large) tell it. A bifurcation that is not found again with them is
+    known up to the thickness of the layer.
+    """
+    basis, size = guess.balance.basis, guess.balance.size
+    other, factor = HarmonicBasis((3 * basis.harmonics + 1) // 2, basis.nu), 3.0
+    if size * other.size > _LARGE:
+        other, factor = HarmonicBasis(2 * basis.harmonics // 3, basis.nu), 2.0
+    x = basis.resized(guess.x, other)
+    balance = guess.balance.with_basis(other).settle(x, guess.omega, guess.values)
+    try:
+        state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
+    except ConvergenceError:
+        return abs(guess.parameter - contact.parameter)
+    value = state.omega if guess.name == "omega" else state.values[guess.name]
+    return factor * abs(value - guess.parameter)
+
+
+def behind_their_grazings(found: list[tuple[float, Bifurcation]]) -> list[Bifurcation]:
+    """What was located in a step, each with its place on the way from 0 to 1, in the order met.
+
+    Where a bifurcation and the grazing that brings it about lie too close to tell, the contact tells the side.
+    """
+    result = []
+    for place, item in found:
+        fraction, contact = place, item.contact
+        grazings = [
+            (at, other, other.contact)
+            for at, other in found
+            if contact is not None and item.kind not in CONTACT_KINDS and other.kind in CONTACT_KINDS
+            if other.contact is not None and other.contact.element == contact.element and abs(at - place) < 0.1
+        ]
+        if grazings:
+            at, grazing, its = min(grazings, key=lambda entry: abs(entry[0] - place))
+            # the contact exists after it begins and before it ceases
+            side = 1.0 if its.change.startswith("begins") else -1.0
+            if (place - at) * side <= 0.0:
+                fraction, item = at + side * 1e-12, replace(item, arclength=grazing.arclength)
+        result.append((fraction, item))
+    return [item for _, item in sorted(result, key=lambda pair: pair[0])]
 
 
 def _beside(guess: Guess) -> list[tuple[Touch, Grazing, float]]:

@@ -16,7 +16,7 @@ from suboctave.harmonic.kernels import motion
 
 @njit(cache=True)
 def _turn(c, lo, hi, rises, first):
-    """The extremum in (lo, hi), before which the motion rises or falls: tau, value, curvature (safeguarded Newton)."""
+    """The extremum in (lo, hi), before which the motion rises or falls: tau, value, second derivative."""
     t = first
     x = s = 0.0
     for _ in range(60):
@@ -67,11 +67,11 @@ def extrema(c, zr, zi):
         if not (a * d0 > 0.0 and 0.0 < -b / a < 2.0) or abs(d0) - b * b / (4.0 * abs(a)) > 0.5 * min(abs(d0), abs(d1)):
             continue
         middle = lo - 0.5 * h * b / a
-        _x, d, s = _jet(c, math.cos(middle), math.sin(middle))
+        _, d, s = _jet(c, math.cos(middle), math.sin(middle))
         new = middle - 0.5 * h * h * s / a
         if lo < new < hi:
             middle = new
-            _x, d, s = _jet(c, math.cos(middle), math.sin(middle))
+            _, d, s = _jet(c, math.cos(middle), math.sin(middle))
         if d * d0 < 0.0:
             for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
                 tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
@@ -90,13 +90,15 @@ def _level_count(x, level):
 
 
 @njit(cache=True)
-def _smoothed(keep, x, wanted):
-    """Drop neighbouring pairs of extrema, the least different first, until `wanted` are kept: ripples that have just
-    come, or are about to go.
+def _smoothed(x, wanted):
+    """Indices of `wanted` extrema: neighbouring pairs are dropped, the least different first, ripples that have just
+    come or are about to go.
     """
-    index = np.flatnonzero(keep)
-    while index.shape[0] > wanted:
-        m = index.shape[0]
+    m = x.shape[0]
+    index = np.empty(m, dtype=np.int64)
+    for i in range(m):
+        index[i] = i
+    while m > wanted:
         best = 0
         least = np.inf
         for i in range(m):
@@ -104,9 +106,13 @@ def _smoothed(keep, x, wanted):
             if difference < least:
                 least = difference
                 best = i
-        keep[index[best]] = False
-        keep[index[(best + 1) % m]] = False
-        index = np.flatnonzero(keep)
+        other = (best + 1) % m
+        kept = 0
+        for i in range(m):
+            if i != best and i != other:
+                index[kept] = index[i]
+                kept += 1
+        m = kept
     return index
 
 
@@ -115,16 +121,18 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).
 
     Extrema are paired in their cyclic order, so that two that pass at once in opposite senses are both seen. Returns
-    pairs of indices, shape (2, m), and how often each motion crosses its level. If the crossings differ by other than
-    what the pairs explain, extrema have come or gone as well.
+    pairs of indices, shape (m, 2), the number m of them that count, and how often each motion crosses its level. If the
+    crossings differ by other than what the pairs explain, extrema have come or gone as well.
     """
     crossed_a = _level_count(xa, level_a)
     crossed_b = _level_count(xb, level_b)
     wanted = min(xa.shape[0], xb.shape[0])
+    found = np.empty((wanted, 2), dtype=np.int64)
+    count = 0
     if wanted == 0:
-        return np.empty((2, 0), dtype=np.int64), crossed_a, crossed_b
-    ia = _smoothed(np.ones(xa.shape[0], dtype=np.bool_), xa, wanted)
-    ib = _smoothed(np.ones(xb.shape[0], dtype=np.bool_), xb, wanted)
+        return found, count, crossed_a, crossed_b
+    ia = _smoothed(xa, wanted)
+    ib = _smoothed(xb, wanted)
     # maxima to maxima
     first = 0 if (sa[ia[0]] < 0.0) == (sb[ib[0]] < 0.0) else 1
     best = first
@@ -137,13 +145,11 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
         if total < least:
             least = total
             best = shift
-    found = np.empty((2, wanted), dtype=np.int64)
-    count = 0
     for i in range(wanted):
         p = ia[i]
         q = ib[(i + best) % wanted]
         if (xa[p] > level_a) != (xb[q] > level_b):
-            found[0, count] = p
-            found[1, count] = q
+            found[count, 0] = p
+            found[count, 1] = q
             count += 1
-    return found[:, :count], crossed_a, crossed_b
+    return found, count, crossed_a, crossed_b
