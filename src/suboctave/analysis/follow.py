@@ -7,14 +7,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
-from suboctave.bifurcation.finder import Located, locate
+from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import make_point, point_between
+from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -24,6 +28,14 @@ from suboctave.stability import floquet_multipliers
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
+
+#: a limit point closer to a branch point than this, in scaled arclength, is the branch point
+_APART = 1e-5
+_NOT_FOUND = {
+    "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
+    "LP": "the branch turns back, but its limit point could not be located",
+    "PD": "a multiplier passes -1, but no period doubling could be located",
+}
 
 
 @dataclass(frozen=True)
@@ -45,19 +57,20 @@ class Trace:
     bifurcations: list[Bifurcation] = field(default_factory=list)
     events: list[Bifurcation] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    audit: Audit = field(default_factory=Audit)
     closed: bool = False
     ended: str = ""
     interrupted: bool = False
 
     def reversed_before(self, other: Trace) -> Trace:
         """This trace walked backwards, then `other`, which started from the same point."""
-        length = self.points[-1].arclength
-        back = [replace(p, arclength=length - p.arclength) for p in reversed(self.points)]
-        on = [replace(p, arclength=length + p.arclength) for p in other.points[1:]]
+        whole = self.points[-1].arclength
+        back = [replace(p, arclength=whole - p.arclength) for p in reversed(self.points)]
+        on = [replace(p, arclength=whole + p.arclength) for p in other.points[1:]]
 
         def joined(first: list[Bifurcation], second: list[Bifurcation]) -> list[Bifurcation]:
-            flipped = [replace(b, arclength=length - b.arclength) for b in reversed(first)]
-            return flipped + [replace(b, arclength=length + b.arclength) for b in second]
+            flipped = [replace(b, arclength=whole - b.arclength) for b in reversed(first)]
+            return flipped + [replace(b, arclength=whole + b.arclength) for b in second]
 
         return Trace(
             back + on,
@@ -83,7 +96,8 @@ class _Follower:
         self.trace = Trace()
         self.previous: Sample | None = None
         self._candidate: Sample | None = None
-        self._guard = StepGuard(lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
+        self._guard = StepGuard(self._between, lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
+        self._again: tuple[Sample, ResponseCurve, Sample] | None = None
         self._count = CountCheck()
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._done = 0.0
@@ -98,6 +112,10 @@ class _Follower:
             where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
             trace.ended = f"interrupted at {where}; what was computed is kept"
+        trace.audit = self._guard.audit
+        trace.warnings += [
+            f"{stretch}; a smaller max_step or more harmonics may settle it" for stretch in trace.audit.unsettled
+        ]
         if trace.closed:
             _drop_seam(trace.bifurcations)
             _drop_seam(trace.events)
@@ -111,19 +129,55 @@ class _Follower:
         return Sample(point, point.evaluation.state)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
-        """True if a step hides nothing that could be told from its ends, or is short already."""
+        """True if a step stays on its curve and its interior could be looked at."""
         self._candidate = new = self._sample(b)
         if self.previous is None or _at_rest(self.previous) or _at_rest(new):
             return True
-        return not self._guard.hides(self.previous, new)
+        return not self._guard.refuses(self._solved_again(self.previous, new), new)
+
+    def _solved_again(self, sample: Sample, next_one: Sample) -> Sample:
+        """A sample in the discretisation of the step that leaves it: where harmonics change, the motion moves a little
+        and test functions with it.
+        """
+        point, curve = sample.point, next_one.point.curve
+        assert isinstance(curve, ResponseCurve)
+        if point.curve is curve:
+            return sample
+        known = self._again
+        if known is None or known[0] is not sample or known[1] is not curve:
+            weights = next_one.point.weights
+            along = curve.transfer(point.tangent, point.curve)
+            row = weights * along / length(weights * along)
+            try:
+                solved = correct(curve, curve.transfer(point.u, point.curve), row, weights, self.settings.newton)
+                again = self._sample(make_point(solved, curve, along, point.arclength))
+            except ConvergenceError:
+                again = sample
+            self._again = known = (sample, curve, again)
+        return known[2]
+
+    def _between(self, a: Sample, b: Sample, fraction: float) -> Sample:
+        """The motion at a fraction of the way between two neighbours."""
+        return self._sample(point_between(a.point, b.point, fraction, self.settings.newton))
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
+        passed = [sample]
         if self.previous is not None:
-            self._search(self.previous, sample)
-        self.trace.points.append(BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations))
-        self.previous = sample
-        self._guard.passed(sample)
+            if _at_rest(self.previous) or _at_rest(sample):
+                self._guard.forget()
+            else:
+                again = self._solved_again(self.previous, sample)
+                if again is not self.previous:
+                    self._search_here(self.previous, again)
+                    self.previous = again
+                passed = self._guard.passage(again, sample).samples
+        for new in passed:
+            if self.previous is not None:
+                self._search(self.previous, new)
+            where = new.point
+            self.trace.points.append(BranchPoint(self._orbit(new), new.floquet, where.arclength, where.iterations))
+            self.previous = new
         report = self.settings.report
         if report is not None:
             low, high = self.bounds
@@ -139,32 +193,46 @@ class _Follower:
         assert isinstance(curve, ResponseCurve)
         return _as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
 
+    def _search_here(self, old: Sample, again: Sample) -> None:
+        """Events that lie behind a point in one discretisation and before it in the next."""
+        kinds = [kind for kind in ALL_KINDS if kind.changed(old, again)]
+        if not kinds:
+            return
+        points = self.trace.points
+        reach = points[-1].arclength - points[-2].arclength if len(points) > 1 else self.settings.stepping.initial_step
+        for kind in kinds:
+            located = locate_near(kind, again, reach, _guess)
+            if located is not None:
+                item = self._bifurcation(located, again, again)
+                if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
+                    self.trace.bifurcations.append(item)
+                    continue
+            self._guard.doubt(old, again, f"{kind.name} may have happened twice within what more harmonics change")
+
     def _search(self, a: Sample, b: Sample) -> None:
         found: list[tuple[float, Bifurcation]] = []
-        branch_point = None
+        branch_point: Located | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
         for kind in () if _at_rest(a) or _at_rest(b) else ALL_KINDS:
             if not kind.changed(a, b):
                 continue
+            located = self._located(kind, a, b)
+            if kind is BRANCH_POINT:
+                branch_point = located
             if kind.name == "LP" and branch_point is not None:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
-                continue
-            located = self._located(kind, a, b)
-            if located is None and kind is BRANCH_POINT:
-                self.trace.warnings.append(
-                    f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)} the curve may have "
-                    "jumped to another branch: its orientation changes without a branch point; try a smaller max_step"
-                )
+                size = b.point.arclength - a.point.arclength
+                if located is None or size * abs(located.fraction - branch_point.fraction) < _APART:
+                    continue
             if located is None:
+                if kind.name != "NS":  # several real multipliers may pass for a pair: the count tells
+                    self._guard.doubt(a, b, _NOT_FOUND[kind.name])
                 continue
-            item = self._bifurcation(located, a, b)
-            found.append((located.fraction, item))
-            if kind.name == "BP":
-                branch_point = item
+            found.append((located.fraction, self._bifurcation(located, a, b)))
+        self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
         complaint = self._count.complaint(b, [item for _, item in found])
         if complaint is not None:
-            self.trace.warnings.append(complaint)
-        self.trace.bifurcations += [item for _, item in sorted(found, key=lambda pair: pair[0])]
+            self._guard.doubt(*complaint)
         for event in self.settings.events:
             crossed = self._event(event, a, b)
             if crossed is not None:
@@ -315,13 +383,16 @@ def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
     return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
 
 
+def _same_event(a: Bifurcation, b: Bifurcation) -> bool:
+    same = a.kind == b.kind and np.isclose(a.omega, b.omega, rtol=1e-9)
+    return bool(same and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
+
+
 def _drop_seam(items: list[Bifurcation]) -> None:
     """A bifurcation on the seam of a closed curve is met at both ends: keep the first."""
     if len(items) < 2:
         return
-    first, last = items[0], items[-1]
-    same = first.kind == last.kind and np.isclose(first.omega, last.omega, rtol=1e-9)
-    if same and np.isclose(first.amplitude, last.amplitude, rtol=1e-6):
+    if _same_event(items[0], items[-1]):
         items.pop()
 
 
