@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,21 @@ class Audit:
     def complete(self) -> bool:
         """True if nothing is in doubt."""
         return not self.unsettled
+
+    def reversed_before(self, other: Audit, whole: float) -> Audit:
+        """This audit's stretch, of length `whole`, walked backwards, and then that of `other`."""
+        back = [
+            replace(u, first=u.last, last=u.first, arclength=(whole - u.arclength[1], whole - u.arclength[0]))
+            for u in reversed(self.unsettled)
+        ]
+        on = [replace(u, arclength=(whole + u.arclength[0], whole + u.arclength[1])) for u in other.unsettled]
+        return Audit(
+            min(self.finest, other.finest),
+            max(self.longest, other.longest),
+            self.probes + other.probes,
+            self.refused + other.refused,
+            (*back, *on),
+        )
 
     def __repr__(self) -> str:
         if self.longest == 0.0:

@@ -77,6 +77,7 @@ class Trace:
             joined(self.bifurcations, other.bifurcations),
             joined(self.events, other.events),
             self.warnings + other.warnings,
+            self.audit.reversed_before(other.audit, whole),
             other.closed,
             other.ended if self.ended == other.ended else f"{self.ended} in one direction, {other.ended} in the other",
         )
@@ -206,6 +207,7 @@ class _Follower:
                 item = self._bifurcation(located, again, again)
                 if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
                     self.trace.bifurcations.append(item)
+                    self._count.noted(item)
                     continue
             self._guard.doubt(old, again, f"{kind.name} may have happened twice within what more harmonics change")
 

@@ -31,8 +31,8 @@ from suboctave.continuation.march import CurvePoint, between
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 
-#: intervals of scaled arclength that are not cut any further
-FINEST = 1e-4
+#: intervals of scaled arclength that are not cut any further: events closer together are not told apart
+FINEST = 1e-5
 #: samples inside one step after which it is halved, or called unsettled
 MOST_PROBES = 60
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
@@ -102,7 +102,7 @@ class StepGuard:
         self._unsettled += step.unsettled
         for interval in step.settled:
             self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
-        self._behind = step.samples[-3:]
+        self._behind = step.samples[-4:]
         return Passage(_separating(step.inside), step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
@@ -115,7 +115,8 @@ class StepGuard:
 
     def _examined(self, old: Sample, new: Sample) -> _Step:
         if self._last is None or self._last[0] is not old or self._last[1] is not new:
-            behind = self._behind if self._behind and self._behind[-1] is old else [old]
+            # the last one may have been solved again with other harmonics
+            behind = [*(s for s in self._behind if _place(s) < _place(old)), old]
             self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point))
         return self._last[2]
 
@@ -152,10 +153,12 @@ class _Step:
             if doubt is None:
                 self.settled.append(_place(q) - _place(p))
                 continue
+            if _place(q) - _place(p) <= least:
+                self.settled.append(_place(q) - _place(p))
+                continue
             share, reason = doubt
-            cut = _place(q) - _place(p) > least and self.probes < MOST_PROBES
-            halves = self._cut(p, q, share) if cut else []
-            if not halves:
+            halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
+            if not halves and not self.refused:
                 self.unsettled.append(_unsettled(p, q, reason))
             pending += halves
 
@@ -191,6 +194,8 @@ class _Step:
                 f"the number of unstable multipliers changes from {p.floquet.unstable} to {q.floquet.unstable}, which "
                 "no bifurcation there explains"
             )
+        if _mixed(p, q):
+            return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
@@ -205,22 +210,34 @@ class _Step:
         return None
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
-        """The samples to interpolate through, up to four, and the position of p among them."""
+        """The samples to interpolate through, up to two on either side, and the position of p among them.
+
+        They should be about as far apart as p and q: farther ones foretell nothing, and closer ones only rounding.
+        """
         i = self.samples.index(p)
         h = _place(q) - _place(p)
-        left: list[Sample] = []
-        for sample in reversed(self.samples[:i]):
-            if _place(left[-1] if left else p) - _place(sample) > 0.1 * h:
-                left.append(sample)
-        right: list[Sample] = []
-        for sample in self.samples[i + 2 :]:
-            if _place(sample) - _place(right[-1] if right else q) > 0.1 * h:
-                right.append(sample)
-        if left and right:
-            return [left[0], p, q, right[0]], 1
-        if left:
-            return [*reversed(left[:2]), p, q], len(left[:2])
-        return [p, q, *right[:2]], 0
+        left = _spaced([_place(p) - _place(s) for s in self.samples[:i][::-1]], h)
+        right = _spaced([_place(s) - _place(q) for s in self.samples[i + 2 :]], h)
+        # one at least
+        far = [_place(p) - _place(self.samples[i - 1]) if i else np.inf]
+        far.append(_place(self.samples[i + 2]) - _place(q) if i + 2 < len(self.samples) else np.inf)
+        if not left and not right and min(far) < np.inf:
+            left, right = ([0], []) if far[0] <= far[1] else ([], [0])
+        before = [self.samples[i - 1 - k] for k in reversed(left)]
+        return [*before, p, q, *(self.samples[i + 2 + k] for k in right)], len(before)
+
+
+def _spaced(distances: list[float], h: float) -> list[int]:
+    """Up to two of the ascending distances, neither too close together nor too far, for an interval of length h."""
+    chosen: list[int] = []
+    last = 0.0
+    for k, distance in enumerate(distances):
+        if distance - last > 4.0 * h or len(chosen) == 2:
+            break
+        if distance - last > 0.1 * h:
+            chosen.append(k)
+            last = distance
+    return chosen
 
 
 _REASONS = (
@@ -255,16 +272,18 @@ def _joined(items: list[Unsettled]) -> list[Unsettled]:
 
 
 def _separating(samples: list[Sample]) -> list[Sample]:
-    """The fewest of the samples (the first left out, the last kept) between which no test changes twice."""
+    """The fewest of the samples (the first left out, the last kept) between which no test changes twice.
+
+    A pair of multipliers that crosses the circle is seen in their count: it wants an interval of its own.
+    """
     kept = [samples[0]]
-    changes = dict.fromkeys((kind.name for kind in ALL_KINDS), 0)
+    since: set[str] = set()
     for p, q in pairwise(samples):
-        now = [kind.name for kind in ALL_KINDS if kind.changed(p, q)]
-        if any(changes[name] for name in now):
+        now = {kind.name for kind in ALL_KINDS if kind.changed(p, q)}
+        if now & since or (now and since and "NS" in now | since):
             kept.append(p)
-            changes = dict.fromkeys(changes, 0)
-        for name in now:
-            changes[name] += 1
+            since = set()
+        since |= now
     return [*kept[1:], samples[-1]]
 
 
@@ -293,12 +312,26 @@ def _explained(p: Sample, q: Sample) -> bool:
     return change <= most and (change - single) % 2 == 0
 
 
+def _mixed(p: Sample, q: Sample) -> bool:
+    """Whether a pair that leaves the circle could be set off in the count by a real multiplier that enters it.
+
+    Its product changes sign there (and where two real ones are each other's inverses): alone the count tells which.
+    """
+    if p.measures[-1][0] == q.measures[-1][0]:
+        return False
+    return any(kind.changed(p, q) for kind in ALL_KINDS if kind.name != "NS")
+
+
 class CountCheck:
     """Holds the number of unstable multipliers against the located bifurcations."""
 
     def __init__(self) -> None:
         self._last: Sample | None = None
         self._since: list[Bifurcation] = []
+
+    def noted(self, item: Bifurcation) -> None:
+        """A bifurcation that belongs to no step."""
+        self._since.append(item)
 
     def complaint(self, sample: Sample, found: list[Bifurcation]) -> tuple[Sample, Sample, str] | None:
         """From where to where, and a sentence, if the count has changed by what the bifurcations since the last clear
