@@ -256,7 +256,8 @@ class _Follower:
         arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
         curve = b.point.curve
         assert isinstance(curve, ResponseCurve)
-        if located.solution is None:
+        solution = located.solution or self._with_more_harmonics(located, a, b)
+        if solution is None:
             orbit = self._orbit(located.sample)
             self.trace.warnings.append(
                 f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
@@ -272,7 +273,7 @@ class _Follower:
                 uncertainty=located.width,
                 arclength=arclength,
             )
-        solution = self._refined(located, located.solution, curve)
+        solution = self._refined(located, solution, curve)
         state = solution.state
         orbit = _as_orbit(state, solution.residual, truncation(state), curve)
         return Bifurcation(
@@ -286,6 +287,35 @@ class _Follower:
             solution.kappa,
             arclength=arclength,
         )
+
+    def _with_more_harmonics(self, located: Located, a: Sample, b: Sample) -> Singular | None:
+        """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
+        the way with fewer.
+        """
+        sample = located.sample
+        curve = sample.point.curve
+        assert isinstance(curve, ResponseCurve)
+        state, size = sample.state, b.point.arclength - a.point.arclength
+        while curve.adaptive is not None:
+            basis = next_harmonics(state, curve.adaptive)
+            if basis.harmonics <= state.basis.harmonics:
+                break
+            x = state.basis.resized(state.x, basis)
+            balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+            state = balance.at(x, state.omega, state.values)
+            try:
+                guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, located.kind.kappa(sample))
+                found = located.kind.solve(guess)
+            except ConvergenceError:
+                continue
+            wide = curve.with_balance(balance)
+            there = wide.join(
+                found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name]
+            )
+            away = sample.point.weights * (sample.point.curve.transfer(there, wide) - sample.point.u)
+            if located.kind.genuine(found, guess) and length(away) <= size:
+                return found
+        return None
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
         """Solved again with the harmonics that the tolerance for events asks for."""
