@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.analysis.audit import Audit
 from suboctave.bifurcation import Bifurcation, BifurcationList
 from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, suggest
@@ -62,6 +63,7 @@ class Branch:
         observe: int,
         options: Mapping[str, Any],
         warnings: tuple[str, ...] = (),
+        audit: Audit | None = None,
     ) -> None:
         self.system = system
         self.name = name
@@ -73,6 +75,7 @@ class Branch:
         self.observe = observe
         self.options = dict(options)
         self.warnings = warnings
+        self.audit = audit or Audit()
 
     def __len__(self) -> int:
         return len(self.points)

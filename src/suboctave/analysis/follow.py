@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
-from suboctave.bifurcation.finder import Located, locate
+from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings
 from suboctave.bifurcation.layer import (
     behind_grazing,
@@ -24,6 +25,9 @@ from suboctave.bifurcation.layer import (
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import make_point, point_between
+from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -33,6 +37,14 @@ from suboctave.stability import floquet_multipliers
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
+
+#: a limit point closer to a branch point than this, in scaled arclength, is the branch point
+_APART = 1e-5
+_NOT_FOUND = {
+    "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
+    "LP": "the branch turns back, but its limit point could not be located",
+    "PD": "a multiplier passes -1, but no period doubling could be located",
+}
 
 
 @dataclass(frozen=True)
@@ -54,25 +66,27 @@ class Trace:
     bifurcations: list[Bifurcation] = field(default_factory=list)
     events: list[Bifurcation] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    audit: Audit = field(default_factory=Audit)
     closed: bool = False
     ended: str = ""
     interrupted: bool = False
 
     def reversed_before(self, other: Trace) -> Trace:
         """This trace walked backwards, then `other`, which started from the same point."""
-        length = self.points[-1].arclength
-        back = [replace(p, arclength=length - p.arclength) for p in reversed(self.points)]
-        on = [replace(p, arclength=length + p.arclength) for p in other.points[1:]]
+        whole = self.points[-1].arclength
+        back = [replace(p, arclength=whole - p.arclength) for p in reversed(self.points)]
+        on = [replace(p, arclength=whole + p.arclength) for p in other.points[1:]]
 
         def joined(first: list[Bifurcation], second: list[Bifurcation]) -> list[Bifurcation]:
-            flipped = [b.seen_backwards(length - b.arclength) for b in reversed(first)]
-            return flipped + [replace(b, arclength=length + b.arclength) for b in second]
+            flipped = [b.seen_backwards(whole - b.arclength) for b in reversed(first)]
+            return flipped + [replace(b, arclength=whole + b.arclength) for b in second]
 
         return Trace(
             back + on,
             joined(self.bifurcations, other.bifurcations),
             joined(self.events, other.events),
             self.warnings + other.warnings,
+            self.audit.reversed_before(other.audit, whole),
             other.closed,
             other.ended if self.ended == other.ended else f"{self.ended} in one direction, {other.ended} in the other",
         )
@@ -92,7 +106,8 @@ class _Follower:
         self.trace = Trace()
         self.previous: Sample | None = None
         self._candidate: Sample | None = None
-        self._guard = StepGuard(lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
+        self._guard = StepGuard(self._between, lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
+        self._again: tuple[Sample, ResponseCurve, Sample] | None = None
         self._count = CountCheck()
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._done = 0.0
@@ -107,6 +122,10 @@ class _Follower:
             where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
             trace.ended = f"interrupted at {where}; what was computed is kept"
+        trace.audit = self._guard.audit
+        trace.warnings += [
+            f"{stretch}; a smaller max_step or more harmonics may settle it" for stretch in trace.audit.unsettled
+        ]
         if trace.closed:
             _drop_seam(trace.bifurcations)
             _drop_seam(trace.events)
@@ -120,19 +139,55 @@ class _Follower:
         return Sample(point, point.evaluation.state)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
-        """True if a step hides nothing that could be told from its ends, or is short already."""
+        """True if a step stays on its curve and its interior could be looked at."""
         self._candidate = new = self._sample(b)
         if self.previous is None or _at_rest(self.previous) or _at_rest(new):
             return True
-        return not self._guard.hides(self.previous, new)
+        return not self._guard.refuses(self._solved_again(self.previous, new), new)
+
+    def _solved_again(self, sample: Sample, next_one: Sample) -> Sample:
+        """A sample in the discretisation of the step that leaves it: where harmonics change, the motion moves a little
+        and test functions with it.
+        """
+        point, curve = sample.point, next_one.point.curve
+        assert isinstance(curve, ResponseCurve)
+        if point.curve is curve:
+            return sample
+        known = self._again
+        if known is None or known[0] is not sample or known[1] is not curve:
+            weights = next_one.point.weights
+            along = curve.transfer(point.tangent, point.curve)
+            row = weights * along / length(weights * along)
+            try:
+                solved = correct(curve, curve.transfer(point.u, point.curve), row, weights, self.settings.newton)
+                again = self._sample(make_point(solved, curve, along, point.arclength))
+            except ConvergenceError:
+                again = sample
+            self._again = known = (sample, curve, again)
+        return known[2]
+
+    def _between(self, a: Sample, b: Sample, fraction: float) -> Sample:
+        """The motion at a fraction of the way between two neighbours."""
+        return self._sample(point_between(a.point, b.point, fraction, self.settings.newton))
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
+        passed = [sample]
         if self.previous is not None:
-            self._search(self.previous, sample)
-        self.trace.points.append(BranchPoint(self._orbit(sample), sample.floquet, point.arclength, point.iterations))
-        self.previous = sample
-        self._guard.passed(sample)
+            if _at_rest(self.previous) or _at_rest(sample):
+                self._guard.forget()
+            else:
+                again = self._solved_again(self.previous, sample)
+                if again is not self.previous:
+                    self._search_here(self.previous, again)
+                    self.previous = again
+                passed = self._guard.passage(again, sample).samples
+        for new in passed:
+            if self.previous is not None:
+                self._search(self.previous, new)
+            where = new.point
+            self.trace.points.append(BranchPoint(self._orbit(new), new.floquet, where.arclength, where.iterations))
+            self.previous = new
         report = self.settings.report
         if report is not None:
             low, high = self.bounds
@@ -148,34 +203,49 @@ class _Follower:
         assert isinstance(curve, ResponseCurve)
         return _as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
 
+    def _search_here(self, old: Sample, again: Sample) -> None:
+        """Events that lie behind a point in one discretisation and before it in the next."""
+        kinds = [kind for kind in ALL_KINDS if kind.changed(old, again)]
+        if not kinds:
+            return
+        points = self.trace.points
+        reach = points[-1].arclength - points[-2].arclength if len(points) > 1 else self.settings.stepping.initial_step
+        for kind in kinds:
+            located = locate_near(kind, again, reach, _guess)
+            if located is not None:
+                item = self._bifurcation(located, again, again)
+                if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
+                    self.trace.bifurcations.append(item)
+                    self._count.noted(item)
+                    continue
+            self._guard.doubt(old, again, f"{kind.name} may have happened twice within what more harmonics change")
+
     def _search(self, a: Sample, b: Sample) -> None:
         found: list[tuple[float, Bifurcation]] = []
-        branch_point = None
+        branch_point: Located | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
         for kind in () if _at_rest(a) or _at_rest(b) else ALL_KINDS:
             if not kind.changed(a, b):
                 continue
+            located = self._located(kind, a, b)
+            if kind is BRANCH_POINT:
+                branch_point = located
             if kind.name == "LP" and branch_point is not None:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
-                continue
-            located = self._located(kind, a, b)
-            if located is None and kind is BRANCH_POINT:
-                self.trace.warnings.append(
-                    f"between {a.point.curve.where(a.point.u)} and {b.point.curve.where(b.point.u)} the curve may have "
-                    "jumped to another branch: its orientation changes without a branch point; try a smaller max_step"
-                )
+                size = b.point.arclength - a.point.arclength
+                if located is None or size * abs(located.fraction - branch_point.fraction) < _APART:
+                    continue
             if located is None:
+                if kind.name != "NS":  # several real multipliers may pass for a pair: the count tells
+                    self._guard.doubt(a, b, _NOT_FOUND[kind.name])
                 continue
-            item = self._bifurcation(located, a, b)
-            found.append((located.fraction, item))
-            if kind.name == "BP":
-                branch_point = item
+            found.append((located.fraction, self._bifurcation(located, a, b)))
         complaint = self._count.complaint(b, [item for _, item in found])
         if not (_at_rest(a) or _at_rest(b)):
             for touched in locate_grazings(a, b, self.settings.newton, self._sample, _guess):
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
-            self.trace.warnings.append(complaint)
+            self._guard.doubt(*complaint)
         self.trace.bifurcations += behind_their_grazings(found)
         for event in self.settings.events:
             crossed = self._event(event, a, b)
@@ -201,7 +271,7 @@ class _Follower:
         solution = located.solution
         if solution is None:
             guess = _guess(located.sample.point.u, located.sample.point, _kappa(located))
-            solution = behind_grazing(located.kind, guess)
+            solution = behind_grazing(located.kind, guess) or self._with_more_harmonics(located, a, b)
         if solution is None:
             orbit = self._orbit(located.sample)
             beside = grazing_beside(guess)
@@ -241,6 +311,35 @@ class _Follower:
             arclength=arclength,
             contact=layer or located.kind.contact(solution, curve.name),
         )
+
+    def _with_more_harmonics(self, located: Located, a: Sample, b: Sample) -> Singular | None:
+        """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
+        the way with fewer.
+        """
+        sample = located.sample
+        curve = sample.point.curve
+        assert isinstance(curve, ResponseCurve)
+        state, size = sample.state, b.point.arclength - a.point.arclength
+        while curve.adaptive is not None:
+            basis = next_harmonics(state, curve.adaptive)
+            if basis.harmonics <= state.basis.harmonics:
+                break
+            x = state.basis.resized(state.x, basis)
+            balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+            state = balance.at(x, state.omega, state.values)
+            try:
+                guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, located.kind.kappa(sample))
+                found = located.kind.solve(guess)
+            except ConvergenceError:
+                continue
+            wide = curve.with_balance(balance)
+            there = wide.join(
+                found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name]
+            )
+            away = sample.point.weights * (sample.point.curve.transfer(there, wide) - sample.point.u)
+            if located.kind.genuine(found, guess) and length(away) <= size:
+                return found
+        return None
 
     def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
         """Solved again with the harmonics that the tolerance for events asks for."""
@@ -347,13 +446,16 @@ def _kappa(located: Located) -> float:
         return 0.0
 
 
+def _same_event(a: Bifurcation, b: Bifurcation) -> bool:
+    same = a.kind == b.kind and np.isclose(a.omega, b.omega, rtol=1e-9)
+    return bool(same and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
+
+
 def _drop_seam(items: list[Bifurcation]) -> None:
     """A bifurcation on the seam of a closed curve is met at both ends: keep the first."""
     if len(items) < 2:
         return
-    first, last = items[0], items[-1]
-    same = first.kind == last.kind and np.isclose(first.omega, last.omega, rtol=1e-9)
-    if same and np.isclose(first.amplitude, last.amplitude, rtol=1e-6):
+    if _same_event(items[0], items[-1]):
         items.pop()
 
 

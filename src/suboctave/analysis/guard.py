@@ -1,90 +1,325 @@
-"""Whether a step may hide something: what its two ends and the steps before tell.
+"""Whether a step hides something: its interior is looked at until every test function is known well enough.
 
-Two events inside one step cancel in every test at its ends. A step is refused (and halved by the engine) if more than
-one test changes in it, if the multipliers move too far for their path to be known, if one could have reached +1 or -1
-and come back, if a complex pair could have met on the real axis, parted and met again, and if the orientation of the
-curve changes without a branch point: then the step has jumped from one branch to another that passes close by.
+Two events inside one step cancel in every test at its ends. A step is therefore cut into intervals between samples
+(solved motions with all their tests), and an interval is done when
+
+- the smooth test functions of `bifurcation.measures` have no zero in it that is not seen at its ends
+  (`analysis.crossings`: interpolation through its ends and the samples beside it);
+- the number of unstable multipliers changes across it by what the tests at its ends explain;
+- no multiplier of modulus above one half moves further than MOVEMENT (a fast rotation may look like none).
+
+Otherwise a motion is solved for where the doubt is largest, and its two halves are looked at. A step whose interior is
+not where its two ends say has jumped from one curve to another that passes close by, as has one across which the
+orientation of the curve changes without a branch point: it is refused and halved by the engine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
+from suboctave.analysis.audit import Audit, Unsettled
+from suboctave.analysis.crossings import doubtful
+from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, Sample
+from suboctave.bifurcation.measures import scaled
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import CurvePoint, between
+from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 
-#: two changes in one step are separated by halving it, down to this distance in scaled arclength
-_SEPARATE = 2e-3
-#: steps shorter than this, in scaled arclength, are not halved for the multipliers' sake
+#: intervals of scaled arclength that are not cut any further: events closer together are not told apart
+FINEST = 1e-5
+#: samples inside one step after which it is halved, or called unsettled
+MOST_PROBES = 60
+#: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
+MOVEMENT = 0.5
+#: intervals shorter than this are not cut for the multipliers' movement
 _EXAMINED = 0.01
-#: multipliers of modulus above one half may move by this much per step (relative to their modulus where it exceeds one)
-_MOVEMENT = 0.4
-#: steps shorter than this are not halved to tell a branch point from a jump between branches
+#: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
+#: a step belongs to one curve if its middle lies within this share of its length from where its ends say
+_AWAY = 0.03
+#: the ends say so themselves if chord and tangents agree to this share of the length
+_AGREE = 0.03
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
 _NEAR_CIRCLE = 0.02
 
 BRANCH_POINT = next(kind for kind in ALL_KINDS if kind.name == "BP")
 
 
+@dataclass
+class Passage:
+    """An examined step: the samples that separate its events, its end included, and what stayed in doubt."""
+
+    samples: list[Sample]
+    unsettled: list[Unsettled] = field(default_factory=list)
+
+
 class StepGuard:
-    """Judges steps along one curve; `passed` tells it of every accepted point."""
+    """Examines the steps along one curve.
 
-    def __init__(self, is_branch_point: Callable[[Sample, Sample], bool]) -> None:
+    Parameters
+    ----------
+    solve
+        Gives the sample at a fraction of the way between two neighbours; may raise ConvergenceError.
+    is_branch_point
+        Whether a change of orientation between two samples is a branch point.
+    """
+
+    def __init__(
+        self,
+        solve: Callable[[Sample, Sample, float], Sample],
+        is_branch_point: Callable[[Sample, Sample], bool],
+    ) -> None:
+        self._solve = solve
         self._is_branch_point = is_branch_point
-        self._before: Sample | None = None
-        self._last: Sample | None = None
-        self._changed: tuple[Sample, list[str]] | None = None
-        self._recent: list[str] = []
-        self._speed = 0.0
+        self._behind: list[Sample] = []
+        self._probes = self._refused = 0
+        self._finest, self._longest = np.inf, 0.0
+        self._unsettled: list[Unsettled] = []
+        self._last: tuple[Sample, Sample, _Step] | None = None
 
-    def passed(self, sample: Sample) -> None:
-        """The step to this sample was accepted."""
-        changed = self._changed
-        self._recent = changed[1] if changed is not None and changed[0] is sample else []
-        if self._last is not None:
-            step = sample.point.arclength - self._last.point.arclength
-            moved = _movement(self._last.floquet.multipliers, sample.floquet.multipliers)
-            self._speed = moved / step if step > 0.0 else 0.0
-        self._before, self._last = self._last, sample
+    @property
+    def audit(self) -> Audit:
+        """What was examined so far."""
+        return Audit(self._finest, self._longest, self._probes, self._refused, tuple(_joined(self._unsettled)))
 
-    def hides(self, old: Sample, new: Sample) -> bool:
-        """True if the step from the last accepted sample to a new one may hide something, and is long enough to
-        halve.
-        """
-        step = new.point.arclength - old.point.arclength
-        # along one branch the orientation changes at branch points only
-        if BRANCH_POINT.changed(old, new) and step > _JUMP and not self._is_branch_point(old, new):
-            return True
-        if step < _SEPARATE:
-            return False
-        changed = [kind.name for kind in ALL_KINDS if kind.changed(old, new)]
-        crossed = abs(old.floquet.unstable - new.floquet.unstable)
-        if len(changed) > 1 or crossed > 2 or (crossed == 2 and not changed):
-            return True
-        self._changed = (new, changed)
-        return step >= _EXAMINED and self._path_unknown(old, new, step, changed)
+    def refuses(self, old: Sample, new: Sample) -> bool:
+        """True if a step has left its curve, or hides more than can be told while it is that long."""
+        step = self._examined(old, new)
+        if step.refused:
+            self._refused += 1
+        return step.refused
 
-    def _path_unknown(self, old: Sample, new: Sample, step: float, changed: list[str]) -> bool:
-        """True if the multipliers may have visited +1, -1 or the real axis within a step and come back."""
-        a, b = old.floquet.multipliers, new.floquet.multipliers
-        # how far they went, seen directly and at the speed of the step before (a fast rotation may look like none)
-        moved = _movement(a, b)
-        way = max(moved, self._speed * step)
-        if moved > _MOVEMENT or way > 1.5 * _MOVEMENT:
-            return True
-        for target, kinds in ((1.0, ("LP", "BP")), (-1.0, ("PD",))):
-            if any(kind in changed or kind in self._recent for kind in kinds):
+    def passage(self, old: Sample, new: Sample) -> Passage:
+        """What lies on the way between two neighbours, the step being accepted."""
+        step = self._examined(old, new)
+        self._probes += step.probes
+        self._unsettled += step.unsettled
+        for interval in step.settled:
+            self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
+        self._behind = step.samples[-4:]
+        return Passage(_separating(step.inside), step.unsettled)
+
+    def doubt(self, old: Sample, new: Sample, reason: str) -> None:
+        """Something between two samples could not be settled."""
+        self._unsettled.append(_unsettled(old, new, reason))
+
+    def forget(self) -> None:
+        """What lies behind says nothing of what comes (a corner of the equations)."""
+        self._behind = []
+
+    def _examined(self, old: Sample, new: Sample) -> _Step:
+        if self._last is None or self._last[0] is not old or self._last[1] is not new:
+            # the last one may have been solved again with other harmonics
+            behind = [*(s for s in self._behind if _place(s) < _place(old)), old]
+            self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point))
+        return self._last[2]
+
+
+class _Step:
+    """One step under examination; `samples` are all that are known, in order, those behind the step included."""
+
+    def __init__(
+        self,
+        behind: list[Sample],
+        new: Sample,
+        solve: Callable[[Sample, Sample, float], Sample],
+        is_branch_point: Callable[[Sample, Sample], bool],
+    ) -> None:
+        self.samples = [*behind, new]
+        self.old, self.new = behind[-1], new
+        self.solve = solve
+        self.size = _place(new) - _place(self.old)
+        self.probes = 0
+        self.refused = False
+        self.unsettled: list[Unsettled] = []
+        self.settled: list[float] = []
+        pending = [(self.old, new)]
+        # a step may be short already
+        least = min(FINEST, self.size / 30.0)
+        if self.size > _JUMP:
+            # along one branch the orientation changes at branch points only
+            self.refused = BRANCH_POINT.changed(self.old, new) and not is_branch_point(self.old, new)
+            if not self.refused and self.size > FINEST and _disagreement(self.old.point, new.point) > _AGREE:
+                pending = self._cut(self.old, new, 0.5)
+        while pending and not self.refused:
+            p, q = pending.pop()
+            doubt = self._doubt(p, q)
+            if doubt is None:
+                self.settled.append(_place(q) - _place(p))
                 continue
-            if float(np.abs(a - target).min() + np.abs(b - target).min()) < 1.3 * way:
-                return True
-        if self._before is not None:
-            last = old.point.arclength - self._before.point.arclength
-            if _turned_back(self._before.floquet.multipliers, a, b, step / last):
-                return True
-        return _height(a, b) < 1.5 * way
+            if _place(q) - _place(p) <= least:
+                self.settled.append(_place(q) - _place(p))
+                continue
+            share, reason = doubt
+            halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
+            if not halves and not self.refused:
+                self.unsettled.append(_unsettled(p, q, reason))
+            pending += halves
+
+    @property
+    def inside(self) -> list[Sample]:
+        """The samples of the step, both ends included."""
+        return self.samples[self.samples.index(self.old) :]
+
+    def _cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
+        """The two parts of an interval, the second first; none if there is no motion where the curve should be."""
+        a, b = self.old.point, self.new.point
+        place = _place(p) + share * (_place(q) - _place(p))
+        fraction = (place - a.arclength) / self.size
+        self.probes += 1
+        try:
+            sample = self.solve(self.old, self.new, fraction)
+        except ConvergenceError:
+            self.refused = self.size > _JUMP
+            return []
+        point = sample.point
+        away = length(b.weights * (point.u - between(a, b, fraction)))
+        if away > _AWAY * self.size and self.size > FINEST:
+            self.refused = True
+            return []
+        self.samples.insert(self.samples.index(q), sample)
+        return [(sample, q), (p, sample)]
+
+    def _doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
+        """Where to look into an interval, as a fraction of it, and why; None if it is done."""
+        h = _place(q) - _place(p)
+        if not _explained(p, q):
+            return 0.5, (
+                f"the number of unstable multipliers changes from {p.floquet.unstable} to {q.floquet.unstable}, which "
+                "no bifurcation there explains"
+            )
+        if _mixed(p, q):
+            return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
+        stencil, at = self._around(p, q)
+        if len(stencil) < 3:
+            return 0.5, "nothing was looked at"
+        if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
+            return 0.5, "multipliers move too fast to be followed"
+        places = [_place(s) for s in stencil]
+        columns = zip(*(s.measures for s in stencil), strict=True)
+        for reason, column in zip(_REASONS, columns, strict=True):
+            where = doubtful(places, scaled(list(column)), at)
+            if where is not None:
+                return where, reason
+        return None
+
+    def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
+        """The samples to interpolate through, up to two on either side, and the position of p among them.
+
+        They should be about as far apart as p and q: farther ones foretell nothing, and closer ones only rounding.
+        """
+        i = self.samples.index(p)
+        h = _place(q) - _place(p)
+        left = _spaced([_place(p) - _place(s) for s in self.samples[:i][::-1]], h)
+        right = _spaced([_place(s) - _place(q) for s in self.samples[i + 2 :]], h)
+        # one at least
+        far = [_place(p) - _place(self.samples[i - 1]) if i else np.inf]
+        far.append(_place(self.samples[i + 2]) - _place(q) if i + 2 < len(self.samples) else np.inf)
+        if not left and not right and min(far) < np.inf:
+            left, right = ([0], []) if far[0] <= far[1] else ([], [0])
+        before = [self.samples[i - 1 - k] for k in reversed(left)]
+        return [*before, p, q, *(self.samples[i + 2 + k] for k in right)], len(before)
+
+
+def _spaced(distances: list[float], h: float) -> list[int]:
+    """Up to two of the ascending distances, neither too close together nor too far, for an interval of length h."""
+    chosen: list[int] = []
+    last = 0.0
+    for k, distance in enumerate(distances):
+        if distance - last > 4.0 * h or len(chosen) == 2:
+            break
+        if distance - last > 0.1 * h:
+            chosen.append(k)
+            last = distance
+    return chosen
+
+
+_REASONS = (
+    "the branch may turn back and turn again",
+    "a multiplier may pass +1 and come back",
+    "a multiplier may pass -1 and come back",
+    "a pair of multipliers may leave the unit circle and come back",
+)
+
+
+def _place(sample: Sample) -> float:
+    return sample.point.arclength
+
+
+def _unsettled(p: Sample, q: Sample, reason: str) -> Unsettled:
+    a, b = p.point, q.point
+    assert isinstance(a.curve, ResponseCurve)
+    return Unsettled(a.curve.name, a.parameter, b.parameter, (a.arclength, b.arclength), reason)
+
+
+def _joined(items: list[Unsettled]) -> list[Unsettled]:
+    """Stretches that touch and are in doubt for the same reason are one."""
+    result: list[Unsettled] = []
+    for item in sorted(items, key=lambda u: u.arclength):
+        last = result[-1] if result else None
+        if last is not None and last.reason == item.reason and item.arclength[0] - last.arclength[1] < 2.0 * FINEST:
+            arclength = (last.arclength[0], item.arclength[1])
+            result[-1] = Unsettled(item.parameter, last.first, item.last, arclength, item.reason)
+        else:
+            result.append(item)
+    return result
+
+
+def _separating(samples: list[Sample]) -> list[Sample]:
+    """The fewest of the samples (the first left out, the last kept) between which no test changes twice.
+
+    A pair of multipliers that crosses the circle is seen in their count: it wants an interval of its own.
+    """
+    kept = [samples[0]]
+    since: set[str] = set()
+    for p, q in pairwise(samples):
+        now = {kind.name for kind in ALL_KINDS if kind.changed(p, q)}
+        if now & since or (now and since and "NS" in now | since):
+            kept.append(p)
+            since = set()
+        since |= now
+    return [*kept[1:], samples[-1]]
+
+
+def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
+    """Distance between the chord and the mean tangent of a step, in units of its length."""
+    chord = b.u - b.curve.transfer(a.u, a.curve)
+    size = length(b.weights * chord)
+    if size == 0.0:
+        return 0.0
+    tangents = b.weights * (b.curve.transfer(a.tangent, a.curve)), b.weights * b.tangent
+    mean = sum(t / length(t) for t in tangents) / 2.0
+    return length(b.weights * chord / size - mean)
+
+
+def _explained(p: Sample, q: Sample) -> bool:
+    """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
+    change = abs(p.floquet.unstable - q.floquet.unstable)
+    if not (p.floquet.decided and q.floquet.decided):
+        return True
+    changed = {kind.name for kind in ALL_KINDS if kind.changed(p, q)}
+    if {"LP", "BP"} <= changed:
+        # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
+        return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)
+    single = len(changed & {"LP", "BP", "PD"})
+    most = single + 2 * ("NS" in changed)
+    return change <= most and (change - single) % 2 == 0
+
+
+def _mixed(p: Sample, q: Sample) -> bool:
+    """Whether a pair that leaves the circle could be set off in the count by a real multiplier that enters it.
+
+    Its product changes sign there (and where two real ones are each other's inverses): alone the count tells which.
+    """
+    if p.measures[-1][0] == q.measures[-1][0]:
+        return False
+    return any(kind.changed(p, q) for kind in ALL_KINDS if kind.name != "NS")
 
 
 class CountCheck:
@@ -94,8 +329,14 @@ class CountCheck:
         self._last: Sample | None = None
         self._since: list[Bifurcation] = []
 
-    def complaint(self, sample: Sample, found: list[Bifurcation]) -> str | None:
-        """A sentence if the count has changed by what the bifurcations since the last clear point do not explain."""
+    def noted(self, item: Bifurcation) -> None:
+        """A bifurcation that belongs to no step."""
+        self._since.append(item)
+
+    def complaint(self, sample: Sample, found: list[Bifurcation]) -> tuple[Sample, Sample, str] | None:
+        """From where to where, and a sentence, if the count has changed by what the bifurcations since the last clear
+        sample do not explain.
+        """
         self._since += found
         mu = sample.floquet.multipliers
         if not sample.floquet.decided or np.any(np.abs(np.abs(mu) - 1.0) < _NEAR_CIRCLE):
@@ -112,12 +353,12 @@ class CountCheck:
         branching = any(item.kind == "BP" for item in items)
         if change <= odd + 2 * pairs and (branching or (change - odd) % 2 == 0):
             return None
-        a, b = last.point, sample.point
         names = ", ".join(item.kind for item in items) or "none"
         return (
-            f"between {a.curve.where(a.u)} and {b.curve.where(b.u)} the number of unstable multipliers changes from "
-            f"{before} to {now}, which the bifurcations located there ({names}) do not explain; a smaller max_step or "
-            "more harmonics may resolve it"
+            last,
+            sample,
+            f"the number of unstable multipliers changes from {before} to {now}, which the bifurcations located there "
+            f"({names}) do not explain",
         )
 
 
@@ -128,29 +369,3 @@ def _movement(old: ComplexArray, new: ComplexArray) -> float:
         return 0.0
     nearest = np.abs(relevant[:, None] - old[None, :]).min(axis=1)
     return float(np.max(nearest / np.maximum(1.0, np.abs(relevant))))
-
-
-def _height(old: ComplexArray, new: ComplexArray) -> float:
-    """Least way of a complex pair (modulus above one half) down to the real axis and up again between two points."""
-    relevant = new[(new.imag > 0.0) & (np.abs(new) > 0.5)]
-    before = old[old.imag > 0.0]
-    if not (relevant.size and before.size):
-        return np.inf
-    partner = before[np.abs(relevant[:, None] - before[None, :]).argmin(axis=1)]
-    return float(np.min(relevant.imag + partner.imag))
-
-
-def _turned_back(before: ComplexArray, old: ComplexArray, new: ComplexArray, ratio: float) -> bool:
-    """True if a complex pair that would have reached the real axis is still far from it: it may have been there.
-
-    `ratio` is the length of the step from old to new in units of the one before it.
-    """
-    before, old = before[before.imag > 0.0], old[old.imag > 0.0]
-    if not (before.size and old.size):
-        return False
-    for mu in new[(new.imag > 0.0) & (np.abs(new) > 0.5)]:
-        now = old[np.abs(old - mu).argmin()]
-        fall = before[np.abs(before - now).argmin()].imag - now.imag
-        if mu.imag > 0.3 * now.imag and 2.5 * ratio * fall > now.imag:
-            return True
-    return False

@@ -287,6 +287,7 @@ def _branch(system: System, name: str, trace: Trace, settings: Settings, options
         settings.observe,
         options,
         tuple(trace.warnings),
+        trace.audit,
     )
 
 

@@ -7,6 +7,7 @@ equations are not smooth enough), the bracket itself is the answer, with its wid
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,10 +15,14 @@ import numpy as np
 
 from suboctave.bifurcation.kinds import BifurcationKind, Sample
 from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, point_between
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
+
+#: fractions of a step by which rounding may carry a solution beyond its ends
+_SLACK = 1e-7
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,9 @@ def locate(
         if depth % 3 == 0:
             # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
             found = _try(kind, at_low, at_high, share, nearer, make_guess)
-            if found is not None:
+            # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
+            # here
+            if found is not None and -_SLACK <= low + found[1] * (high - low) <= 1.0 + _SLACK:
                 return Located(kind, low + found[1] * (high - low), nearer, found[0], 0.0)
         middle = None
         for part in (0.5, 0.4, 0.65):
@@ -103,13 +110,41 @@ def _try(
         return None
     if not kind.genuine(found, guess):
         return None
-    solution = np.append(
-        found.state.x.ravel(), found.state.omega if guess.name == "omega" else found.state.values[guess.name]
-    )
-    fraction = position(low.point, high.point, solution)
+    fraction = position(low.point, high.point, _unknowns(found, guess))
     if fraction is None or not -0.05 <= fraction <= 1.05:
         return None
     return found, fraction
+
+
+def locate_near(
+    kind: BifurcationKind,
+    sample: Sample,
+    reach: float,
+    make_guess: Callable[[Array, CurvePoint, float], Guess],
+) -> Located | None:
+    """A bifurcation within `reach` (scaled arclength) of a sample, on its curve: for tests that change in one place
+    because the discretisation does.
+    """
+    point = sample.point
+    try:
+        guess = make_guess(point.u, point, kind.kappa(sample))
+        found = kind.solve(guess)
+    except ConvergenceError:
+        return None
+    if not kind.genuine(found, guess):
+        return None
+    way = point.weights * (_unknowns(found, guess) - point.u)
+    along = point.weights * point.tangent
+    ahead = float(way @ along) / length(along)
+    aside = math.sqrt(max(0.0, float(way @ way) - ahead**2))
+    if abs(ahead) > reach or aside > 0.1 * abs(ahead) + 1e-7:
+        return None
+    return Located(kind, 0.0, sample, found, 0.0)
+
+
+def _unknowns(found: Singular, guess: Guess) -> Array:
+    value = found.state.omega if guess.name == "omega" else found.state.values[guess.name]
+    return np.append(found.state.x.ravel(), value)
 
 
 def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
@@ -118,13 +153,13 @@ def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
     """
     ua = b.curve.transfer(a.u, a.curve)
     chord = b.weights * (b.u - ua)
-    length = float(np.linalg.norm(chord))
-    if length == 0.0:
+    size = length(chord)
+    if size == 0.0:
         return None
-    fraction = float((b.weights * (u - ua)) @ chord) / length**2
+    fraction = float((b.weights * (u - ua)) @ chord) / size**2
     for _ in range(3):
         # the interpolating cubic runs at uneven speed along the chord
-        rest = float((b.weights * (u - between(a, b, fraction))) @ chord) / length**2
+        rest = float((b.weights * (u - between(a, b, fraction))) @ chord) / size**2
         fraction += rest
-    away = float(np.linalg.norm(b.weights * (u - between(a, b, min(1.0, max(0.0, fraction))))))
-    return fraction if away <= 0.1 * length + 1e-7 else None
+    away = length(b.weights * (u - between(a, b, min(1.0, max(0.0, fraction)))))
+    return fraction if away <= 0.1 * size + 1e-7 else None

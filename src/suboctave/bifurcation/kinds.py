@@ -13,25 +13,24 @@ neighbours, where in between, how to solve for it, and whether a solution is one
 from __future__ import annotations
 
 import cmath
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from suboctave.bifurcation import measures
 from suboctave.bifurcation.branch import locate_branch_point
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.solve import Guess, Singular, locate_singular
-from suboctave.continuation.linear import Factor
+from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
 from suboctave.stability import FloquetResult, floquet_multipliers
-
-#: logarithm of the product of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
-_UNDAMPED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +59,20 @@ class Sample:
     def slope(self) -> float:
         """Component of the tangent along the free parameter."""
         return float(self.point.tangent[self.point.curve.parameter])
+
+    @cached_property
+    def measures(self) -> tuple[measures.Value, ...]:
+        """The smooth test functions turn, fold, double, torus of `bifurcation.measures`."""
+        point, mu = self.point, self.floquet.multipliers
+        turn = self.slope * float(point.weights[point.curve.parameter]) / length(point.weights * point.tangent)
+        up = 1.0 if turn > 0.0 else -1.0
+        straight = 1.0 if point.orientation > 0.0 else -1.0
+        return (
+            (up, math.log(abs(turn)) if turn else -math.inf),
+            (up * straight, measures.fold(mu)),
+            (1.0 if self.half_sign > 0.0 else -1.0, measures.double(mu)),
+            measures.torus(mu),
+        )
 
 
 class BifurcationKind(ABC):
@@ -169,7 +182,7 @@ class NeimarkSacker(BifurcationKind):
         out, partner = min(((m, p) for m in candidates for p in partners), key=lambda pair: abs(pair[0] - pair[1]))
         with np.errstate(divide="ignore"):
             product = float(np.log(np.abs(outside.floquet.multipliers)).sum())
-        if abs(product) < _UNDAMPED:
+        if abs(product) < measures.UNDAMPED:
             # pairs stay on the circle and rounding alone carries them across
             return None
         return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))

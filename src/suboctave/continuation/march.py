@@ -98,11 +98,12 @@ def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
     h = length(b.weights * (b.u - ua))
     s = fraction
+    # unit tangents in the scaling of this step: a comes with that of the step before
     return (
         (1.0 + 2.0 * s) * (1.0 - s) ** 2 * ua
-        + s * (1.0 - s) ** 2 * h * ta
+        + s * (1.0 - s) ** 2 * h / length(b.weights * ta) * ta
         + s**2 * (3.0 - 2.0 * s) * b.u
-        + s**2 * (s - 1.0) * h * b.tangent
+        + s**2 * (s - 1.0) * h / length(b.weights * b.tangent) * b.tangent
     )
 
 
