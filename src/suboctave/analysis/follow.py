@@ -13,7 +13,7 @@ from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate, locate_near
-from suboctave.bifurcation.grazing import locate_grazings
+from suboctave.bifurcation.grazing import locate_grazings, touches
 from suboctave.bifurcation.layer import (
     behind_grazing,
     behind_their_grazings,
@@ -205,7 +205,8 @@ class _Follower:
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""
-        kinds = [kind for kind in ALL_KINDS if kind.changed(old, again)]
+        kinds: list[BifurcationKind] = [kind for kind in ALL_KINDS if kind.changed(old, again)]
+        kinds += touches(old, again)[0]
         if not kinds:
             return
         points = self.trace.points
@@ -447,15 +448,17 @@ def _kappa(located: Located) -> float:
 
 
 def _same_event(a: Bifurcation, b: Bifurcation) -> bool:
-    same = a.kind == b.kind and np.isclose(a.omega, b.omega, rtol=1e-9)
+    name = a.parameter_name
+    same = a.kind == b.kind and np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9)
+    if a.kind == "grazing" and a.contact is not None and b.contact is not None:
+        same = same and a.contact.element == b.contact.element
     return bool(same and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:
-    """A bifurcation on the seam of a closed curve is met at both ends: keep the first."""
-    if len(items) < 2:
-        return
-    if _same_event(items[0], items[-1]):
+    """What lies on the seam of a closed curve is met at both ends: keep the first."""
+    # several contacts may graze at once
+    while len(items) > 1 and any(_same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
         items.pop()
 
 

@@ -46,7 +46,9 @@ _SQUARE_ROOT = 0.75
 _YOUNG = 0.05
 #: excursion across the gap, in units of the motion, up to which grazings are looked for
 _NEAR = 0.05
-#: way from a grazing to a bifurcation that has to be started from there, in scaled arclength, at most
+#: way from a grazing to a bifurcation that is started from there, in scaled arclength, at most
+_REACH = 0.01
+#: the same for one that is bracketed only
 _BRACKETED = 1e-3
 #: unknowns beyond which neglected harmonics are judged by fewer rather than by more of them
 _LARGE = 800
@@ -69,7 +71,7 @@ def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingCon
 
 def grazing_beside(guess: Guess) -> GrazingContact | None:
     """The grazing at a motion where a bifurcation could only be bracketed, if there is one that near."""
-    near = list(_beside(guess))
+    near = _beside(guess, _BRACKETED)
     if not near:
         return None
     touch, grazing, distance = near[0]
@@ -78,14 +80,14 @@ def grazing_beside(guess: Guess) -> GrazingContact | None:
 
 def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
     """A bifurcation in the layer behind a grazing near the guess, started from that grazing; None if there is none."""
-    for touch, grazing, _ in _beside(guess):
+    for touch, grazing, _ in _beside(guess, _REACH):
         for start in _starts(touch, grazing, guess):
             try:
                 found = kind.solve(start)
             except ConvergenceError:
                 continue
             way = float(np.linalg.norm(_chord(grazing.state, found.state, guess)))
-            if kind.genuine(found, start) and way <= _BRACKETED:
+            if kind.genuine(found, start) and way <= _REACH:
                 return found
     return None
 
@@ -146,9 +148,9 @@ def behind_their_grazings(found: list[tuple[float, Bifurcation]]) -> list[Bifurc
     return [item for _, item in sorted(result, key=lambda pair: pair[0])]
 
 
-def _beside(guess: Guess) -> list[tuple[Touch, Grazing, float]]:
-    """Grazings close by, the nearest first."""
-    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= _BRACKETED]
+def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
+    """Grazings up to some way off, the nearest first."""
+    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= limit]
     return sorted(near, key=lambda item: item[2])
 
 
