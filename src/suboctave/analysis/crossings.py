@@ -20,10 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numba import njit
+
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
-#: fractions of an interval at which it is looked at
-_GRID = tuple(i / 10.0 for i in range(1, 10))
+#: an interval is looked at in so many places
+_LOOKS = 9
 
 
 def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float | None:
@@ -36,74 +39,98 @@ def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float
     values
         The function there. A zero counts as positive: the side of an exact zero is the caller's business.
     """
+    share = _doubtful(np.array(places), np.array(values), at)
+    # not too close to the ends, so that both parts shrink
+    return None if share < 0.0 else min(0.6, max(0.4, share))
+
+
+@njit(cache=True)
+def _rate(places, first, last, size, s):
+    """The distance between the cubic and what is foretold from one side, without its factor (s - p) or (q - s)."""
+    for i in range(first, last):
+        size *= abs(s - places[i])
+    return size
+
+
+@njit(cache=True)
+def _doubtful(places, values, at):
+    """`doubtful`; -1 for nowhere."""
     p, q = places[at], places[at + 1]
     fp, fq = values[at], values[at + 1]
     h = q - p
     chord = (fq - fp) / h
-    # f[p, q, x] for the places beside, the nearest first
-    left = [(places[i], _second(p, q, fp, chord, places[i], values[i])) for i in range(at - 1, -1, -1)]
-    right = [(places[i], _second(p, q, fp, chord, places[i], values[i])) for i in range(at + 2, len(places))]
-    before, behind = _Side(left), _Side(right)
-    nearest = [left[0], right[0]] if left and right else [*left, *right][:2]
-    shift, second = nearest[0]
-    third = (nearest[1][1] - second) / (nearest[1][0] - shift) if len(nearest) == 2 else 0.0
+    n = places.shape[0]
+    # f[p, q, x] for the places beside
+    second = np.empty(n)
+    for i in range(n):
+        if i != at and i != at + 1:
+            second[i] = ((values[i] - fp) / (places[i] - p) - chord) / (places[i] - q)
+    left, right = at, n - at - 2
+    before = behind = 0.0
+    if left == 1:
+        before = abs(second[at - 1])
+    elif left > 1:
+        before = abs((second[at - 2] - second[at - 1]) / (places[at - 2] - places[at - 1]))
+    if right == 1:
+        behind = abs(second[at + 2])
+    elif right > 1:
+        behind = abs((second[at + 3] - second[at + 2]) / (places[at + 3] - places[at + 2]))
+    first, other = -1, -1
+    if left > 0 and right > 0:
+        first, other = at - 1, at + 2
+    elif left > 0:
+        first, other = at - 1, at - 2 if left > 1 else -1
+    elif right > 0:
+        first, other = at + 2, at + 3 if right > 1 else -1
+    bent, third, shift = 0.0, 0.0, p
+    if first >= 0:
+        bent, shift = second[first], places[first]
+        if other >= 0:
+            third = (second[other] - bent) / (places[other] - shift)
+    low, high = max(0, at - 2), min(n, at + 4)
     same = (fp > 0.0) == (fq > 0.0)
     if same:
         # all that may come off the chord against its lower end
-        bend = 0.25 * h * h * (abs(second) + abs(third) * max(abs(shift - p), abs(shift - q)))
-        if min(abs(fp), abs(fq)) > bend + SAFETY * h * max(before.rate(q), behind.rate(p)):
-            return None
+        bend = 0.25 * h * h * (abs(bent) + abs(third) * max(abs(shift - p), abs(shift - q)))
+        stray = max(_rate(places, low, at, before, q), _rate(places, at + 2, high, behind, p))
+        if min(abs(fp), abs(fq)) > bend + SAFETY * h * stray:
+            return -1.0
     sign = 1.0 if fp > 0.0 else -1.0
-    curve = []
-    for share in _GRID:
+    value = np.empty(_LOOKS)
+    doubt = np.empty(_LOOKS)
+    for k in range(_LOOKS):
+        share = (k + 1) / (_LOOKS + 1)
         ahead, back = share * h, (1.0 - share) * h
         s = p + ahead
-        value = fp + ahead * chord - ahead * back * (second + third * (s - shift))
-        doubt = SAFETY * max(ahead * before.rate(s), back * behind.rate(s))
-        curve.append((share, sign * value, doubt))
-    if same:
-        margin, where = min((value - doubt, share) for share, value, doubt in curve)
-        return _kept(where) if margin <= 0.0 else None
-    # one zero: where the cubic says, and nowhere else
-    root, last, value_last = 1.0, 0.0, sign * fp
-    for share, value, _ in [*curve, (1.0, sign * fq, 0.0)]:
-        if value <= 0.0:
-            root = last + (share - last) * (value_last / (value_last - value) if value_last > value else 0.5)
-            break
-        last, value_last = share, value
-    margin, where = min(
-        ((value if share < root else -value) - 0.25 * doubt * min(1.0, 4.0 * abs(share - root)), share)
-        for share, value, doubt in curve
-    )
-    return _kept(where) if margin < 0.0 else None
-
-
-def _kept(share: float) -> float:
-    """Not too close to the ends, so that both parts shrink."""
-    return min(0.6, max(0.4, share))
-
-
-def _second(p: float, q: float, fp: float, chord: float, x: float, fx: float) -> float:
-    """Divided difference f[p, q, x]."""
-    return ((fx - fp) / (x - p) - chord) / (x - q)
-
-
-class _Side:
-    """The distance between the cubic and what is foretold from one side, without its factor (s - p) or (q - s)."""
-
-    def __init__(self, beside: list[tuple[float, float]]) -> None:
-        self.places = [x for x, _ in beside]
-        seconds = [d for _, d in beside]
-        if len(beside) < 2:
-            self.size = abs(seconds[0]) if beside else 0.0
+        value[k] = sign * (fp + ahead * chord - ahead * back * (bent + third * (s - shift)))
+        doubt[k] = SAFETY * max(
+            ahead * _rate(places, low, at, before, s), back * _rate(places, at + 2, high, behind, s)
+        )
+    # one zero between places of opposite sign: where the cubic says, and nowhere else
+    root = 1.0
+    if not same:
+        last, value_last = 0.0, sign * fp
+        for k in range(_LOOKS + 1):
+            share = (k + 1) / (_LOOKS + 1)
+            here = value[k] if k < _LOOKS else sign * fq
+            if here <= 0.0:
+                part = value_last / (value_last - here) if value_last > here else 0.5
+                root = last + (share - last) * part
+                break
+            last, value_last = share, here
+    margin, where = np.inf, -1.0
+    for k in range(_LOOKS):
+        share = (k + 1) / (_LOOKS + 1)
+        if same:
+            left_over = value[k] - doubt[k]
         else:
-            self.size = abs((seconds[1] - seconds[0]) / (self.places[1] - self.places[0]))
-
-    def rate(self, s: float) -> float:
-        result = self.size
-        for x in self.places:
-            result *= abs(s - x)
-        return result
+            left_over = value[k] if share < root else -value[k]
+            left_over -= 0.25 * doubt[k] * min(1.0, 4.0 * abs(share - root))
+        if left_over < margin:
+            margin, where = left_over, share
+    if margin < 0.0 or (same and margin == 0.0):
+        return where
+    return -1.0
 
 
 __all__ = ["SAFETY", "doubtful"]

@@ -449,7 +449,7 @@ def _kappa(located: Located) -> float:
 
 def _same_event(a: Bifurcation, b: Bifurcation) -> bool:
     name = a.parameter_name
-    same = a.kind == b.kind and np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9)
+    same = a.kind == b.kind and bool(np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9))
     if a.kind == "grazing" and a.contact is not None and b.contact is not None:
         same = same and a.contact.element == b.contact.element
     return bool(same and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
