@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.lazy import lazy
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +56,7 @@ class FloquetResult:
         deciding = np.abs(self.multipliers) > 0.5
         return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
 
-    @property
+    @lazy
     def margin(self) -> float:
         """Largest modulus minus one: negative if stable."""
         return float(np.abs(self.multipliers).max() - 1.0)
@@ -65,12 +66,12 @@ class FloquetResult:
         """True if all multipliers lie inside the unit circle."""
         return self.margin < 0.0
 
-    @property
+    @lazy
     def decided(self) -> bool:
         """True if no multiplier is closer to the unit circle than its error estimate."""
         return bool(np.all(np.abs(np.abs(self.multipliers) - 1.0) > self.errors))
 
-    @property
+    @lazy
     def unstable(self) -> int:
         """Number of multipliers outside the unit circle."""
         return int(np.count_nonzero(np.abs(self.multipliers) > 1.0))
