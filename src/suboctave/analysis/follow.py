@@ -449,10 +449,14 @@ def _kappa(located: Located) -> float:
 
 def _same_event(a: Bifurcation, b: Bifurcation) -> bool:
     name = a.parameter_name
-    same = a.kind == b.kind and bool(np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9))
-    if a.kind == "grazing" and a.contact is not None and b.contact is not None:
-        same = same and a.contact.element == b.contact.element
-    return bool(same and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
+    if a.kind != b.kind or (a.kind == "grazing" and _element(a) != _element(b)):
+        return False
+    same_place = np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9)
+    return bool(same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
+
+
+def _element(item: Bifurcation) -> int | None:
+    return None if item.contact is None else item.contact.element
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:
