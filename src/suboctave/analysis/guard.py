@@ -6,6 +6,8 @@ Two events inside one step cancel in every test at its ends. A step is therefore
 - the smooth test functions of `bifurcation.measures` have no zero in it that is not seen at its ends
   (`analysis.crossings`: interpolation through its ends and the samples beside it);
 - the number of unstable multipliers changes across it by what the tests at its ends explain;
+- no contact begins or ceases to touch in it, or it is short: behind a grazing everything changes like a square root,
+  which no interpolation across it foretells;
 - no multiplier of modulus above one half moves further than MOVEMENT (a fast rotation may look like none).
 
 Otherwise a motion is solved for where the doubt is largest, and its two halves are looked at. A step whose interior is
@@ -25,6 +27,7 @@ from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import doubtful
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import ALL_KINDS, Bifurcation, Sample
+from suboctave.bifurcation.grazing import touches
 from suboctave.bifurcation.measures import scaled
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between
@@ -37,6 +40,8 @@ FINEST = 1e-5
 MOST_PROBES = 60
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
+#: intervals shorter than this are not cut because a contact grazes in them
+_LAYER = 1e-3
 #: intervals shorter than this are not cut for the multipliers' movement
 _EXAMINED = 0.01
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
@@ -153,10 +158,13 @@ class _Step:
             if doubt is None:
                 self.settled.append(_place(q) - _place(p))
                 continue
+            share, reason = doubt
             if _place(q) - _place(p) <= least:
                 self.settled.append(_place(q) - _place(p))
+                if not any(kind.changed(p, q) for kind in ALL_KINDS):
+                    # a test comes as close to zero as it can be told
+                    self.unsettled.append(_unsettled(p, q, reason))
                 continue
-            share, reason = doubt
             halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
             if not halves and not self.refused:
                 self.unsettled.append(_unsettled(p, q, reason))
@@ -196,6 +204,8 @@ class _Step:
             )
         if _mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
+        if _grazes(p, q):
+            return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
@@ -216,15 +226,31 @@ class _Step:
         """
         i = self.samples.index(p)
         h = _place(q) - _place(p)
-        left = _spaced([_place(p) - _place(s) for s in self.samples[:i][::-1]], h)
-        right = _spaced([_place(s) - _place(q) for s in self.samples[i + 2 :]], h)
+        before, behind = _smooth(self.samples[: i + 1][::-1]), _smooth(self.samples[i + 1 :])
+        left = _spaced([_place(p) - _place(s) for s in before], h)
+        right = _spaced([_place(s) - _place(q) for s in behind], h)
         # one at least
-        far = [_place(p) - _place(self.samples[i - 1]) if i else np.inf]
-        far.append(_place(self.samples[i + 2]) - _place(q) if i + 2 < len(self.samples) else np.inf)
+        far = [_place(p) - _place(before[0]) if before else np.inf]
+        far.append(_place(behind[0]) - _place(q) if behind else np.inf)
         if not left and not right and min(far) < np.inf:
             left, right = ([0], []) if far[0] <= far[1] else ([], [0])
-        before = [self.samples[i - 1 - k] for k in reversed(left)]
-        return [*before, p, q, *(self.samples[i + 2 + k] for k in right)], len(before)
+        return [*(before[k] for k in reversed(left)), p, q, *(behind[k] for k in right)], len(left)
+
+
+def _grazes(p: Sample, q: Sample) -> bool:
+    """Whether a contact begins or ceases to touch between two samples."""
+    passing, clear = touches(p, q)
+    return bool(passing) or not clear
+
+
+def _smooth(samples: list[Sample]) -> list[Sample]:
+    """Up to four of the samples behind the first, as far as no contact begins or ceases to touch on the way."""
+    kept: list[Sample] = []
+    for near, far in pairwise(samples[:5]):
+        if _grazes(near, far):
+            break
+        kept.append(far)
+    return kept
 
 
 def _spaced(distances: list[float], h: float) -> list[int]:
