@@ -18,17 +18,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState
 from suboctave.stability.linearisation import Linearisation
 from suboctave.stability.panels import NODES
-from suboctave.stability.several import POWERS, monodromy_several, respond_several
-from suboctave.stability.single import BETWEEN, STEPS, monodromy_single, respond_single
+from suboctave.stability.several import POWERS, corrected_several, perturbed, standing_several, weighted
+from suboctave.stability.single import BETWEEN, STEPS, corrected, standing
 
 #: a correction larger than this share of the motion is cut down to it
 _LARGEST = 0.1
@@ -93,87 +92,51 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
 
 def _single(along: Linearisation, mass: float, damping: float, stiffness: float) -> FloquetResult:
     """One degree of freedom: the multipliers are the roots of `mu^2 - trace mu + exp(-int c dt)`."""
-    linear = along.state.linear
-    d = np.array([linear.expand(direction)[0] for direction in along.directions])
-    square = d * d / mass
-    scale = 1.0 / along.state.rate
-    c = damping / mass
-    base = square @ along.base + stiffness / mass
-    still = np.zeros(len(base))
-    k, cv = square @ along.stiffness, square @ along.damping
-
-    def multipliers(k: Array, cv: Array, kick: Array, fine: bool) -> ComplexArray:
-        trace, decay = monodromy_single(along.stretch, scale, base, k, c, cv, kick, STEPS, fine)
-        return _roots(trace, decay)
-
-    before = multipliers(k, cv, still, False)
-    force = (d / mass) @ along.defect
-    size = float(np.min(along.size() / np.abs(d))) if len(d) else 0.0
-    response, share = respond_single(along.stretch, scale, base, k, c, cv, force, BETWEEN, _LARGEST * size)
-
-    def after(part: float) -> ComplexArray:
-        k, cv, kick = along.changed(np.multiply.outer(part * d, response))
-        return multipliers(square @ k, square @ cv, square @ kick, True)
-
-    mu = after(1.0)
-    shift = np.abs(mu - before)
-    trace = abs(mu.sum())
-    rounding = 1e-14 * (1.0 + trace)
-    apart = abs(mu[0] - mu[1])
-    errors = shift + np.array([min(math.sqrt(rounding), rounding * abs(m) / apart if apart > 0.0 else 1.0) for m in mu])
-    return FloquetResult(mu, errors)
+    linear, scale = along.state.linear, 1.0 / along.state.rate
+    shape = np.array([linear.expand(direction)[0] for direction in along.directions])
+    matrices = (mass, damping, stiffness)
+    trace, decay, change, share = standing(
+        along.stretch,
+        scale,
+        along.path,
+        along.law,
+        along.base,
+        along.moving,
+        shape,
+        matrices,
+        STEPS,
+        BETWEEN,
+        NODES,
+        _LARGEST,
+    )
+    before = _roots(trace, decay)
+    law, kick = along.changed(change)
+    after = _roots(*corrected(along.stretch, scale, law, along.base, kick, along.moving, shape, matrices, STEPS))
+    shift = [abs(a - b) for a, b in zip(after, before)]
+    return FloquetResult(np.array(after, dtype=complex), np.array(shift))
 
 
-def _roots(trace: float, decay: float) -> ComplexArray:
+def _roots(trace: float, decay: float) -> tuple[complex, complex]:
     """Roots of `mu^2 - trace mu + exp(-decay)`, the larger one first."""
     product = math.exp(-decay)
     square = 0.25 * trace * trace - product
     if square < 0.0:
         part = math.sqrt(-square)
-        return np.array([complex(0.5 * trace, part), complex(0.5 * trace, -part)])
+        return complex(0.5 * trace, part), complex(0.5 * trace, -part)
     larger = 0.5 * trace + math.copysign(math.sqrt(square), trace)
-    return np.array([larger, product / larger if larger != 0.0 else 0.0], dtype=complex)
+    return larger, product / larger if larger != 0.0 else 0.0
 
 
 def _several(along: Linearisation, mass: Array, damping: Array, stiffness: Array) -> FloquetResult:
-    """Several degrees of freedom, in DOFs weighted by the square roots of their masses: norms have no units there."""
-    n, linear = len(mass), along.state.linear
-    weight = np.sqrt(np.diag(mass))
-    inverse = np.linalg.inv(mass) * weight[:, None]
-    d = np.array([linear.expand(direction) for direction in along.directions]).reshape(-1, n)
-    left, right = d @ inverse.T, d / weight
-    k0 = np.ascontiguousarray(inverse @ stiffness / weight)
-    c0 = np.ascontiguousarray(inverse @ damping / weight)
-    scale = 1.0 / along.state.rate
-
-    def run(k: Array, c: Array, force: Array, kick: Array) -> tuple[Array, Array, Array]:
-        return monodromy_several(
-            along.stretch, scale, k0, c0, left, right, along.base, k, c, force, kick, POWERS, NODES
-        )
-
-    total, alone, rows = run(along.stiffness, along.damping, along.defect, np.zeros_like(along.base))
-    phi = total[:, :-1]
-    start = np.linalg.solve(np.eye(2 * n) - phi, total[:, -1])
-    response = respond_several(start, alone, rows)
-    k, c, kick = along.changed(response)
-    better = run(k, c, np.zeros((len(d), 0)), kick)[0][:, :-1]
-    return _result(better, (better - phi,))
-
-
-def _result(phi: Array, changes: tuple[Array, ...]) -> FloquetResult:
-    """Multipliers of phi, with errors from first-order perturbation by the changes seen."""
-    mu, vectors = np.linalg.eig(phi)
-    shift = np.zeros(len(mu))
-    try:
-        left = np.linalg.inv(vectors)
-        for change in changes:
-            shift += np.abs(((left @ change) * vectors.T).sum(axis=1))
-        # rounding, in any units of the DOFs: beside a large multiplier the small ones have fewer digits
-        shift += 1e-15 * ((np.abs(left) @ np.abs(phi)) * np.abs(vectors).T).sum(axis=1)
-    except np.linalg.LinAlgError:
-        shift[:] = np.inf
-    # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
-    size = sum(float(np.linalg.norm(change)) for change in changes) + 1e-15 * float(np.linalg.norm(phi))
-    shift = np.minimum(np.nan_to_num(shift, nan=np.inf), math.sqrt(size * max(1.0, float(np.abs(mu).max())))) + 1e-14
-    order = np.argsort(-np.abs(mu), kind="stable")
-    return FloquetResult(mu.astype(complex)[order], shift[order])
+    """Several degrees of freedom."""
+    n, linear, scale = len(mass), along.state.linear, 1.0 / along.state.rate
+    shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
+    matrices = weighted(mass, damping, stiffness, shapes)
+    about = (along.moving, along.varying, matrices, POWERS, NODES)
+    before, change, share, alone = standing_several(
+        along.stretch, scale, along.path, along.law, along.base, *about, _LARGEST
+    )
+    law, kick = along.changed(change)
+    after = corrected_several(along.stretch, scale, law, along.base, kick, *about, alone)
+    real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
+    return FloquetResult(*perturbed(real, imaginary, left, right, after, after - before))

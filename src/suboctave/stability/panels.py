@@ -2,10 +2,9 @@
 
 A period is cut into panels on which everything is smooth: at the instants where the motion crosses the gap of a
 piecewise-linear law (there the stiffness jumps), and towards the passages of a sharp law. A law with singularities at
-`u = point +- i width` has, along the motion, singularities at complex instants `tau_s +- i depth`; near them panels are
-equal in v, with `tau = tau_s + depth sinh(v)`, in which they lie at `+- i pi / 2` whatever the sharpness is (the
-substitution is that of Johnston & Elliott, Int. J. Numer. Meth. Engng 62 (2005) 564-578, for nearly singular
-integrals). Elsewhere panels are equal in tau and as long as the motion's harmonics allow.
+`u = point +- i width` has, along the motion, singularities at complex instants `s +- i d`; near them panels are equal
+in v, with `tau = s + d sinh(v)`, in which they lie at `+- i pi / 2` whatever the sharpness is (as in
+`harmonic.sharp_nodes`). Elsewhere panels are equal in tau and as long as the motion's harmonics allow.
 
 Every element is asked once for all nodes; what needs more is interpolated by the polynomials through a panel's nodes.
 """
@@ -17,17 +16,21 @@ import math
 import numpy as np
 from numba import njit
 
+from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import motion
+from suboctave.harmonic.sharp_nodes import singular_instants
 
 #: nodes per panel, both ends among them: quadrature of order 12
 ORDER = 7
-#: longest panel in v: with half-length 1.5 the singularities lie at 1.05 half-lengths from the middle, and the
-#: polynomials gain a factor of 2.5 per degree
-_STEP = 3.0
-#: longest panel in tau: radians of the highest harmonic of the tangent, and of the highest harmonic of the motion
-_CONTENT, _HARMONICS = 6.0, 8.0
+#: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
+#: period that it covers
+_NEAR, _FAR = 3.0, 4.5
+#: how close to a singularity panels are as long as elsewhere, in units of their length
+_CLEAR = 0.25
+#: longest panel in tau: phase of the highest harmonic of the tangent, and of the highest harmonic of the motion
+_TANGENT, _MOTION = 7.0, 9.0
 #: harmonics of less than this share of the largest do not count for the former
-_RELEVANT = 1e-4
+_RELEVANT = 1e-3
 #: extrema that miss a gap by less than this share of the motion are kept in sight: the true motion may touch it
 _MISS = 1e-3
 
@@ -49,166 +52,80 @@ def moments(low: float, high: float, count: int) -> np.ndarray:
     `(s - middle) / (high - low)`, 0 .. count - 1; shape (count, ORDER).
     """
     points, weights = np.polynomial.legendre.leggauss(ORDER + 2)
-    share = 0.5 * points
-    s = 0.5 * (low + high) + (high - low) * share
+    s = 0.5 * (low + high) + 0.5 * (high - low) * points
     others = [np.delete(NODES, j) for j in range(ORDER)]
     basis = np.array([np.prod((s[:, None] - o) / (NODES[j] - o), axis=1) for j, o in enumerate(others)])
-    return np.array([basis @ (0.5 * (high - low) * weights * share**i) for i in range(count)])
+    return np.array([basis @ (0.5 * (high - low) * weights * (0.5 * points) ** i) for i in range(count)])
 
 
 @njit(cache=True)
-def _jet(c, tau):
-    """Value and first two derivatives of `Re sum_k c_k exp(i k tau)` with respect to tau."""
-    zr = math.cos(tau)
-    zi = math.sin(tau)
-    pr = pi = dr = di = sr = si = 0.0
-    for k in range(c.shape[0] - 1, -1, -1):
-        a = c[k].real
-        b = c[k].imag
-        t = pr * zr - pi * zi + a
-        pi = pr * zi + pi * zr + b
-        pr = t
-        t = dr * zr - di * zi + k * a
-        di = dr * zi + di * zr + k * b
-        dr = t
-        t = sr * zr - si * zi + k * k * a
-        si = sr * zi + si * zr + k * k * b
-        sr = t
-    return pr, -di, -sr
-
-
-@njit(cache=True)
-def _crossing(c, level, lo, hi, f0, f1):
-    """The instant in (lo, hi) at which the motion crosses `level`, with its derivatives there."""
-    tau = lo + (hi - lo) * f0 / (f0 - f1)
-    x, d, s = _jet(c, tau)
-    for _ in range(80):
-        if ((x - level) > 0.0) == (f0 > 0.0):
-            lo = tau
-        else:
-            hi = tau
-        new = tau - (x - level) / d if d != 0.0 else lo
-        if not (lo < new < hi):
-            new = 0.5 * (lo + hi)
-        moved = abs(new - tau)
-        tau = new
-        x, d, s = _jet(c, tau)
-        if moved < 1e-13:
-            break
-    return tau, d, s
-
-
-@njit(cache=True)
-def _turning(c, lo, hi, d0, d1):
-    """The instant in (lo, hi) at which the derivative changes sign, with value and second derivative there."""
-    tau = lo + (hi - lo) * d0 / (d0 - d1)
-    x, d, s = _jet(c, tau)
-    for _ in range(60):
-        if (d > 0.0) == (d0 > 0.0):
-            lo = tau
-        else:
-            hi = tau
-        new = tau - d / s if s != 0.0 else lo
-        if not (lo < new < hi):
-            new = 0.5 * (lo + hi)
-        moved = abs(new - tau)
-        tau = new
-        x, d, s = _jet(c, tau)
-        if moved < 1e-13:
-            break
-    return tau, x, s
-
-
-@njit(cache=True)
-def _singular(d, s, width):
-    """The nearest complex root of `d z + s z^2 / 2 = i width`."""
-    root = np.sqrt(complex(d * d, 2.0 * s * width))
-    return complex(0.0, 2.0 * width) / (d + root if root.real * d >= 0.0 else d - root)
-
-
-@njit(cache=True)
-def _note(row, tau, depth, slope, bend, miss, law):
+def _note(row, tau, depth, slope, bend, miss, piece):
     row[0] = tau
     row[1] = depth
     row[2] = slope
     row[3] = bend
     row[4] = miss
-    row[5] = law
+    row[5] = piece
 
 
 @njit(cache=True)
-def _events(c, laws, zr, zi, reach):
-    """What happens along the motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, law).
+def _events(c, pieces, owner, points, widths, singular, zr, zi, reach):
+    """What happens along the motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
 
-    A crossing of the gap of a piecewise-linear law (width 0) has infinite depth; an extremum that falls short of it is
-    kept with the distance `miss`. A passage of a sharp law has the depth of its complex singularity.
+    A crossing of the gap of a piece has infinite depth; an extremum that falls short of it is kept with the distance
+    `miss`. A passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece.
     """
     n = zr.shape[0]
     h = 2.0 * math.pi / n
-    capacity = 64
-    found = np.empty((capacity, 6))
+    found = np.empty((4 * n + 16, 6))
     count = 0
     last = -1
-    values = np.empty((2, n))
     size = 0.0
-    for law in range(laws.shape[0]):
-        g = int(laws[law, 0])
+    values = np.empty((2, 0))
+    for q in range(pieces.shape[0]):
+        g = owner[q]
+        gap = pieces[q, 1]
         if g != last:
             values = motion(c[g], zr, zi)
             size = values[0].max() - values[0].min()
             last = g
-        level = laws[law, 1]
-        width = laws[law, 2]
+        at, _above = crossings_of(c[g], gap, values)
+        while count + at.shape[0] + n > found.shape[0]:
+            found = np.concatenate((found, np.empty_like(found)))
+        for i in range(at.shape[0]):
+            _x, d, s = _jet(c[g], math.cos(at[i]), math.sin(at[i]))
+            _note(found[count], at[i], np.inf, d, s, 0.0, q)
+            count += 1
         for j in range(n):
-            if count + 2 > capacity:
-                found = np.concatenate((found, np.empty((capacity, 6))))
-                capacity *= 2
             follow = j + 1 if j + 1 < n else 0
-            f0 = values[0, j] - level
-            f1 = values[0, follow] - level
+            f0 = values[0, j] - gap
+            f1 = values[0, follow] - gap
             d0 = values[1, j]
             d1 = values[1, follow]
-            lo = j * h
-            if (f0 > 0.0) != (f1 > 0.0):
-                tau, d, s = _crossing(c[g], level, lo, lo + h, f0, f1)
-                depth = np.inf
-                if width > 0.0:
-                    z = _singular(d, s, width)
-                    tau += z.real
-                    depth = abs(z.imag)
-                if depth == np.inf or depth < reach:
-                    _note(found[count], tau, depth, d, s, 0.0, law)
-                    count += 1
-                continue
-            # an extremum towards the level: does it reach across, or nearly so?
-            if d0 * d1 >= 0.0 or (f0 > 0.0) != (d0 < 0.0):
+            # an extremum towards the gap that falls short of it
+            if d0 * d1 >= 0.0 or (f0 > 0.0) != (d0 < 0.0) or (f0 > 0.0) != (f1 > 0.0):
                 continue
             if min(abs(f0), abs(f1)) > h * (abs(d0) + abs(d1)) + _MISS * size:
                 continue
-            tau, x, s = _turning(c[g], lo, lo + h, d0, d1)
-            across = (x - level > 0.0) != (f0 > 0.0)
-            if s == 0.0:
-                continue
-            if width > 0.0:
-                z = np.sqrt(complex(-2.0 * (x - level), 2.0 * width) / s)
-                depth = abs(z.imag)
-                if depth < reach:
-                    offset = abs(z.real) if abs(z.real) > depth else 0.0
-                    _note(found[count], tau - offset, depth, 0.0, s, 0.0, law)
-                    count += 1
-                    if offset > 0.0:
-                        _note(found[count], tau + offset, depth, 0.0, s, 0.0, law)
-                        count += 1
-            elif across:
-                at, d, bend = _crossing(c[g], level, lo, tau, f0, x - level)
-                _note(found[count], at, np.inf, d, bend, 0.0, law)
-                at, d, bend = _crossing(c[g], level, tau, lo + h, x - level, f1)
-                _note(found[count + 1], at, np.inf, d, bend, 0.0, law)
-                count += 2
-            elif abs(x - level) < _MISS * size:
-                _note(found[count], tau, np.inf, 0.0, s, x - level, law)
+            tau = j * h + h * d0 / (d0 - d1)
+            x, d, s = _jet(c[g], math.cos(tau), math.sin(tau))
+            for _ in range(3):
+                if s != 0.0 and abs(d / s) < h:
+                    tau -= d / s
+                    x, d, s = _jet(c[g], math.cos(tau), math.sin(tau))
+            if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
+                _note(found[count], tau, np.inf, 0.0, s, x - gap, q)
                 count += 1
-    return found[:count][np.argsort(found[:count, 0])]
+    for g in range(c.shape[0]):
+        own = singular == g
+        if own.any():
+            passed = singular_instants(c[g], points[own], widths[own], reach, zr, zi)
+            while count + passed.shape[1] > found.shape[0]:
+                found = np.concatenate((found, np.empty_like(found)))
+            for i in range(passed.shape[1]):
+                _note(found[count], passed[0, i], passed[1, i], 0.0, 0.0, 0.0, -1)
+                count += 1
+    return found[np.argsort(found[:count, 0])]
 
 
 @njit(cache=True)
@@ -217,11 +134,11 @@ def _depths(events):
     n = events.shape[0]
     out = np.empty(n)
     for i in range(n):
-        least = np.inf
+        least = events[i, 1]
         for j in range(n):
-            apart = abs(events[i, 0] - events[j, 0])
-            apart = min(apart, 2.0 * math.pi - apart)
-            least = min(least, math.hypot(apart, events[j, 1]))
+            if events[j, 1] < np.inf:
+                apart = abs(events[i, 0] - events[j, 0])
+                least = min(least, math.hypot(min(apart, 2.0 * math.pi - apart), events[j, 1]))
         out[i] = least
     return out
 
@@ -235,71 +152,75 @@ def _panels(events, longest):
     n = events.shape[0]
     depth = _depths(events)
     start = np.zeros(n, dtype=np.int64)
-    capacity = 64
-    out = np.empty((capacity, 4))
+    out = np.empty((64, 4))
     count = 0
     for i in range(max(n, 1)):
         low = events[i, 0] if n > 0 else 0.0
         high = low + 2.0 * math.pi
-        left = right = 0.0
+        reach = np.zeros(2)
+        deep = np.zeros(2)
         if n > 0:
             start[i] = count
             follow = i + 1 if i + 1 < n else 0
             high = events[follow, 0] + (0.0 if follow > i else 2.0 * math.pi)
-            # how far graded panels reach from either end: to where they are as long as the others
+            deep[0] = depth[i]
+            deep[1] = depth[follow]
+            # graded panels reach from either end to where the others may begin
             for side in range(2):
-                d = depth[i] if side == 0 else depth[follow]
-                reach = 0.0
-                if d * _STEP < longest:
-                    reach = d * math.sinh(math.acosh(longest / (d * _STEP)))
-                if side == 0:
-                    left = reach
-                else:
-                    right = reach
+                if deep[side] < longest:
+                    reach[side] = _CLEAR * longest
         gap = high - low
         if gap <= 1e-14:
             continue
-        if left + right > gap:
-            if left < 0.5 * gap:
-                right = gap - left
-            elif right < 0.5 * gap:
-                left = gap - right
+        if reach[0] + reach[1] > gap:
+            if reach[0] < 0.5 * gap:
+                reach[1] = gap - reach[0]
+            elif reach[1] < 0.5 * gap:
+                reach[0] = gap - reach[1]
             else:
-                left = right = 0.5 * gap
-        rest = gap - left - right
-        if rest < 0.05 * longest and left + right > 0.0:
+                reach[:] = 0.5 * gap
+        rest = gap - reach[0] - reach[1]
+        if rest < 0.05 * longest and rest < gap:
             # not worth a panel of its own
-            if left > 0.0:
-                left += rest
-            else:
-                right += rest
+            reach[0 if reach[0] > reach[1] else 1] += rest
             rest = 0.0
+        v = 0.0
         for part in range(3):
+            # graded from the left, plain, graded to the right
             if part == 1:
                 length = rest
                 centre = d = 0.0
-                first = low + left
-                last = high - right
+                first = low + reach[0]
+                last = high - reach[1]
                 pieces = math.ceil(length / longest - 1e-9)
             else:
-                length = left if part == 0 else right
-                if length <= 0.0:
-                    continue
+                side = 0 if part == 0 else 1
+                length = reach[side]
                 centre = low if part == 0 else high
-                d = depth[i] if part == 0 else depth[i + 1 if i + 1 < n else 0]
-                v = math.asinh(length / d)
+                d = deep[side]
+                v = math.asinh(length / d) if length > 0.0 else 0.0
+                pieces = 1 + math.ceil((v - _NEAR) / _FAR - 1e-9)
                 first = 0.0 if part == 0 else -v
-                last = v if part == 0 else 0.0
-                pieces = math.ceil(v / _STEP - 1e-9)
+                last = -first
             if length <= 0.0:
                 continue
             pieces = max(1, pieces)
-            while count + pieces > capacity:
-                out = np.concatenate((out, np.empty((capacity, 4))))
-                capacity *= 2
+            while count + pieces > out.shape[0]:
+                out = np.concatenate((out, np.empty_like(out)))
             for p in range(pieces):
-                out[count, 0] = first + (last - first) * p / pieces
-                out[count, 1] = first + (last - first) * (p + 1) / pieces
+                # from the left end of what is covered, or from the singularity outwards
+                begin, end = p / pieces, (p + 1) / pieces
+                if part == 0:
+                    whole = _NEAR + (pieces - 1) * _FAR
+                    begin = (_NEAR + (p - 1) * _FAR) / whole if p > 0 else 0.0
+                    end = (_NEAR + p * _FAR) / whole
+                elif part == 2:
+                    whole = _NEAR + (pieces - 1) * _FAR
+                    begin = p * _FAR / whole
+                    end = (p + 1) * _FAR / whole if p < pieces - 1 else 1.0
+                span = last - first if part == 1 else v
+                out[count, 0] = first + span * begin
+                out[count, 1] = first + span * end
                 out[count, 2] = centre
                 out[count, 3] = d
                 count += 1
@@ -307,38 +228,38 @@ def _panels(events, longest):
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _series(c, f, zr, zi, out):
-    """`Re sum c_k z^k`, its derivative by tau and `Re sum f_k z^k` at the points z into out (3, N)."""
+def _series(c, f, zr, zi, scale, u, v, r):
+    """`u = Re sum c_k z^k`, `v = scale du/dtau` and `r = -Re(f_0 + 2 sum f_k z^k)` at the points z; (N,) each."""
     n = zr.shape[0]
     top = c.shape[0] - 1
-    work = np.empty((6, n))
-    pr, pi, dr, di, fr, fi = work[0], work[1], work[2], work[3], work[4], work[5]
+    work = np.empty((4, n))
+    ui, vr, vi, ri = work[0], work[1], work[2], work[3]
     for j in range(n):
-        pr[j] = c[top].real
-        pi[j] = c[top].imag
-        dr[j] = top * c[top].real
-        di[j] = top * c[top].imag
-        fr[j] = f[top].real
-        fi[j] = f[top].imag
+        u[j] = c[top].real
+        ui[j] = c[top].imag
+        vr[j] = top * c[top].real
+        vi[j] = top * c[top].imag
+        r[j] = f[top].real
+        ri[j] = f[top].imag
     for k in range(top - 1, -1, -1):
         a = c[k].real
         b = c[k].imag
-        e = f[k].real
-        g = f[k].imag
+        share = 1.0 if k > 0 else 0.5
+        e = share * f[k].real
+        g = share * f[k].imag
         for j in range(n):
-            t = pr[j] * zr[j] - pi[j] * zi[j] + a
-            pi[j] = pr[j] * zi[j] + pi[j] * zr[j] + b
-            pr[j] = t
-            t = dr[j] * zr[j] - di[j] * zi[j] + k * a
-            di[j] = dr[j] * zi[j] + di[j] * zr[j] + k * b
-            dr[j] = t
-            t = fr[j] * zr[j] - fi[j] * zi[j] + e
-            fi[j] = fr[j] * zi[j] + fi[j] * zr[j] + g
-            fr[j] = t
+            t = u[j] * zr[j] - ui[j] * zi[j] + a
+            ui[j] = u[j] * zi[j] + ui[j] * zr[j] + b
+            u[j] = t
+            t = vr[j] * zr[j] - vi[j] * zi[j] + k * a
+            vi[j] = vr[j] * zi[j] + vi[j] * zr[j] + k * b
+            vr[j] = t
+            t = r[j] * zr[j] - ri[j] * zi[j] + e
+            ri[j] = r[j] * zi[j] + ri[j] * zr[j] + g
+            r[j] = t
     for j in range(n):
-        out[0, j] = pr[j]
-        out[1, j] = -di[j]
-        out[2, j] = fr[j]
+        v[j] = -scale * vi[j]
+        r[j] *= -2.0
 
 
 @njit(cache=True)
@@ -353,28 +274,62 @@ def _longest(c, degree):
             if abs(c[g, k]) > _RELEVANT * largest:
                 top = k
                 break
-    return min(_CONTENT / max(1, degree * top), _HARMONICS / (c.shape[1] - 1), 2.0)
+    # quarters of a period at most: the least that a polynomial of degree six follows
+    return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
 
 
 @njit(cache=True)
-def lay_out(c, f, degree, finest, laws, zr, zi, nodes):
-    """Panels along a motion, and the motion at their nodes.
+def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, finest, zr, zi, nodes):
+    """Panels along a motion, the motion at their nodes, and the laws that are known in closed form.
 
-    c, f: amplitudes (G, H + 1) of displacement and harmonics of force along the G directions; degree: that of the
-    tangent as a polynomial in the motion (0: constant between events); finest: an upper bound of the panels' lengths;
-    laws: rows (direction, gap or point, width or 0 where piecewise linear, ...), in the order of directions; z: a
-    uniform grid to search on. Returns
+    Parameters
+    ----------
+    c, f
+        Displacement along the G directions: amplitudes (G, H + 1); Fourier coefficients of the force (G, > H).
+    rate
+        Base frequency.
+    pieces
+        Stiffness, gap, side of the pieces of piecewise-linear laws (Q, 3), direction by direction.
+    polynomial
+        Coefficients of u^0, u^1, ... along every direction (G, D).
+    points, widths
+        Where the sharp laws are singular, `u = points +- i widths` (S,), direction by direction.
+    counts
+        How many pieces and points every direction has, (G, 2).
+    degree
+        Of the tangents as polynomials in the motion, 0 if they are constant between events.
+    finest
+        Upper bound of the panels' lengths.
+    zr, zi
+        Uniform grid on the circle, for searches.
+    nodes
+        `NODES`.
 
-    - stretch (P, m): dtau/ds on every panel, s in [-1, 1]; node i of panel p is node p (m - 1) + i of the period,
-    - values (G, 3, P (m - 1) + 1): u, du/dtau, force within the basis at the nodes,
-    - events: rows (tau, depth, du/dtau, d2u/dtau2, miss, law), and the panel that begins at each.
+    Returns
+    -------
+    stretch
+        dtau/ds on every panel, s in [-1, 1]; (P, m). Node i of panel p is node `p (m - 1) + i` of the period.
+    path
+        u, du/dt at the nodes, (G, 2, N), N = P (m - 1) + 1.
+    law
+        Force less its harmonics within the basis, stiffness, damping at the nodes (G, 3, N), the stiffness without that
+        of the pieces.
+    base
+        Stiffness of the pieces on every panel, (G, P).
+    events, start
+        See `_events`; the panel that begins at each.
     """
+    groups = c.shape[0]
+    owner = np.repeat(np.arange(groups), counts[:, 0])
+    singular = np.repeat(np.arange(groups), counts[:, 1])
     longest = min(_longest(c, degree), finest)
-    events = _events(c, laws, zr, zi, longest)
+    # singularities further away than this do not disturb a panel
+    events = _events(c, pieces, owner, points, widths, singular, zr, zi, longest)
     panels, start = _panels(events, longest)
     count = panels.shape[0]
     m = nodes.shape[0]
-    tau = np.empty(count * (m - 1) + 1)
+    total = count * (m - 1) + 1
+    tau = np.empty(total)
     stretch = np.empty((count, m))
     for p in range(count):
         middle = 0.5 * (panels[p, 0] + panels[p, 1])
@@ -390,9 +345,85 @@ def lay_out(c, f, degree, finest, laws, zr, zi, nodes):
                 e = math.exp(v)
                 tau[at + j] = panels[p, 2] + 0.5 * depth * (e - 1.0 / e)
                 stretch[p, j] = 0.5 * depth * (e + 1.0 / e) * half
-    values = np.empty((c.shape[0], 3, tau.shape[0]))
+    path = np.empty((groups, 2, total))
+    law = np.zeros((groups, 3, total))
+    base = np.zeros((groups, count))
     cos = np.cos(tau)
     sin = np.sin(tau)
-    for g in range(c.shape[0]):
-        _series(c[g], f[g], cos, sin, values[g])
-    return stretch, values, events, start
+    for g in range(groups):
+        _series(c[g], f[g], cos, sin, rate, path[g, 0], path[g, 1], law[g, 0])
+        add_polynomial(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
+    for q in range(pieces.shape[0]):
+        g = owner[q]
+        k, gap, right = pieces[q, 0], pieces[q, 1], pieces[q, 2] > 0.0
+        u = path[g, 0]
+        for p in range(count):
+            if (u[p * (m - 1) + m // 2] > gap) == right:
+                base[g, p] += k
+        for j in range(total):
+            if (u[j] > gap) == right:
+                law[g, 0, j] += k * (u[j] - gap)
+    return stretch, path, law, base, events, start
+
+
+@njit(cache=True)
+def add_polynomial(coefficients, u, force, stiffness):
+    """Add `sum c_p u^p` and its derivative to force and stiffness (N,), in place."""
+    degree = coefficients.shape[0] - 1
+    if degree < 0:
+        return
+    for j in range(u.shape[0]):
+        f = slope = 0.0
+        for p in range(degree, -1, -1):
+            slope = slope * u[j] + f
+            f = f * u[j] + coefficients[p]
+        force[j] += f
+        stiffness[j] += slope
+
+
+@njit(cache=True)
+def closed_changes(path, change, rate, pieces, counts, polynomial, events, start, panels):
+    """The laws known in closed form along the motion changed by `change` (G, 2, N).
+
+    Returns stiffness and damping of the polynomials at the old nodes (G, 2, N), and the impulses `-kick y` at the
+    beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing moves by `t = -d / u'` (a
+    root of the parabola where the motion grazes), and a slice of stiffness k that is as thin is an impulse k t.
+    """
+    groups, _, total = path.shape
+    owner = np.repeat(np.arange(groups), counts[:, 0])
+    law = np.zeros((groups, 2, total))
+    kick = np.zeros((groups, panels))
+    idle = np.empty(total)
+    for g in range(groups):
+        if polynomial.shape[1] > 2:
+            add_polynomial(polynomial[g], path[g, 0] + change[g, 0], idle, law[g, 0])
+        elif polynomial.shape[1] == 2:
+            law[g, 0] += polynomial[g, 1]
+    m = (total - 1) // panels
+    for i in range(events.shape[0]):
+        q = int(events[i, 5])
+        if q < 0:
+            continue
+        g = owner[q]
+        k, right = pieces[q, 0], pieces[q, 2] > 0.0
+        p = start[i]
+        d = change[g, 0, p * m]
+        bend = rate * rate * events[i, 3]
+        if events[i, 2] == 0.0:
+            # an extremum that missed the gap: carried across, it is in contact (or out of it) for a while
+            reached = events[i, 4] + d
+            square = -2.0 * reached / bend
+            if square > 0.0 and (reached > 0.0) != (events[i, 4] > 0.0):
+                time = 2.0 * math.sqrt(square)
+                kick[g, p] += k * time if (reached > 0.0) == right else -k * time
+            continue
+        slope = rate * events[i, 2] + change[g, 1, p * m]
+        square = slope * slope - 2.0 * bend * d
+        if square > 0.0:
+            shift = -2.0 * d / (slope + math.copysign(math.sqrt(square), slope))
+        else:
+            # contact lost, or never: up to the extremum
+            shift = -slope / bend
+        # a contact that begins later is missing for a while
+        kick[g, p] += -k * shift if (events[i, 2] > 0.0) == right else k * shift
+    return law, kick
