@@ -1,0 +1,153 @@
+"""The elements along a motion, on panels: what stiffness and damping they add, and what force they leave unbalanced.
+
+Piecewise-linear laws and polynomials in u are evaluated in compiled code. All other elements are asked for their
+tangents at all nodes at once, along the motion as it stands and, where it is corrected by `d(tau)`, again; but for
+sharp laws `f_u + f_uu d + f_uv d'` is taken at the old nodes. Panels are graded towards the old passages, and where d
+exceeds the law's width the new ones lie between the nodes; the linear form has the right integral all the same.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.group_force import GroupLaw
+from suboctave.harmonic.quadrature import FEWEST, search_grid
+from suboctave.harmonic.state import BalanceState
+from suboctave.model.sampling import AdaptiveSampling
+from suboctave.stability.panels import NODES, closed_changes, lay_out
+
+#: a law that tells nothing of itself and needs this many samples per period is smooth over one radian
+_BLIND = 48.0
+_NONE = np.zeros(0)
+
+
+class Linearisation:
+    """Stiffness, damping and unbalanced force of the elements along a motion.
+
+    Attributes
+    ----------
+    directions
+        (G, size), in the unknown DOFs.
+    stretch, path, law, base
+        See `panels.lay_out`; `law` with the elements that are not known in closed form.
+    moving
+        Whether any element has damping.
+    varying
+        Whether any stiffness or damping varies within panels.
+    blind
+        Whether an element tells nothing of how smooth it is.
+    """
+
+    def __init__(self, state: BalanceState) -> None:
+        balance = state.balance
+        self.state = state
+        _, kinds, laws = balance.coefficients(state.values)
+        self.directions = [group.direction for group in balance.groups]
+        self.moving = True in balance.moving
+        self._laws = _gathered(laws)
+        degree, finest = max(0, self._laws.polynomial.shape[1] - 2), math.inf
+        self.blind = False
+        for law in laws:
+            if law.sharp:
+                degree = max(degree, 1)
+            for i, _ in law.uniform:
+                degree = max(degree, law.degree - 1, 1)
+                if isinstance(kinds[i], AdaptiveSampling):
+                    self.blind = True
+                    finest = min(finest, _BLIND / (balance.samples[i] or FEWEST))
+        self.varying = degree > 0
+        motions = state.motions
+        high = state.basis.harmonics
+        grid = search_grid(high)
+        self.stretch, self.path, self.law, self.base, self._events, self._start = lay_out(
+            motions[0][None] if len(motions) == 1 else np.array(motions, dtype=complex).reshape(-1, high + 1),
+            state.spectra_table[0],
+            state.rate,
+            *self._laws,
+            degree,
+            finest,
+            grid.zr,
+            grid.zi,
+            NODES,
+        )
+        #: (group, element, its coefficients, whether sharp, f_u, f_v) of the elements not known in closed form
+        self._asked = []
+        for g, law in enumerate(laws):
+            for members, sharp in ((law.sharp, True), (law.uniform, False)):
+                for i, a in members:
+                    element = balance.elements[i]
+                    force, f_u, f_v = element.tangent(self.path[g, 0], self.path[g, 1], a)
+                    self.law[g, 0] += force
+                    self.law[g, 1] += f_u
+                    if f_v is not None:
+                        self.law[g, 2] += f_v
+                    self._asked.append((g, element, a, sharp, f_u, f_v))
+
+    def changed(self, change: Array) -> tuple[Array, Array]:
+        """Along the motion changed by (G, 2, N): stiffness and damping (G, 2, N), kicks at the beginnings of panels
+        (G, P).
+        """
+        laws = self._laws
+        law: Array
+        kick: Array
+        law, kick = closed_changes(
+            self.path,
+            change,
+            self.state.rate,
+            laws.pieces,
+            laws.counts,
+            laws.polynomial,
+            self._events,
+            self._start,
+            len(self.stretch),
+        )
+        for g, element, a, sharp, f_u, f_v in self._asked:
+            u, v = self.path[g]
+            d_u, d_v = change[g]
+            if sharp:
+                f_uu, f_uv, f_vv = element.curvature(u, v, a)
+                f_u = f_u + f_uu * d_u
+                if f_v is not None and f_uv is not None and f_vv is not None:
+                    f_u = f_u + f_uv * d_v
+                    f_v = f_v + f_uv * d_u + f_vv * d_v
+            else:
+                _, f_u, f_v = element.tangent(u + d_u, v + d_v, a)
+            law[g, 0] += f_u
+            if f_v is not None:
+                law[g, 1] += f_v
+        return law, kick
+
+
+class _Laws(NamedTuple):
+    """The laws of all directions as arrays: what `panels.lay_out` is told of them."""
+
+    pieces: Array
+    polynomial: Array
+    points: Array
+    widths: Array
+    counts: NDArray[np.int64]
+
+
+def _gathered(laws: list[GroupLaw]) -> _Laws:
+    counts = np.array([[len(law.pieces), len(law.points)] for law in laws], dtype=np.int64).reshape(-1, 2)
+    if len(laws) == 1:
+        law = laws[0]
+        return _Laws(law.pieces, law.polynomial[None], law.points, law.widths, counts)
+    polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
+    for g, law in enumerate(laws):
+        polynomial[g, : len(law.polynomial)] = law.polynomial
+    pieces = [law.pieces for law in laws if len(law.pieces)]
+    points = [law.points for law in laws if len(law.points)]
+    widths = [law.widths for law in laws if len(law.points)]
+    return _Laws(
+        np.concatenate(pieces) if pieces else np.zeros((0, 3)),
+        polynomial,
+        np.concatenate(points) if points else _NONE,
+        np.concatenate(widths) if widths else _NONE,
+        counts,
+    )

@@ -1,0 +1,429 @@
+"""Where the linearised motion is looked at: panels of Lobatto nodes that follow the laws along a motion.
+
+A period is cut into panels on which everything is smooth: at the instants where the motion crosses the gap of a
+piecewise-linear law (there the stiffness jumps), and towards the passages of a sharp law. A law with singularities at
+`u = point +- i width` has, along the motion, singularities at complex instants `s +- i d`; near them panels are equal
+in v, with `tau = s + d sinh(v)`, in which they lie at `+- i pi / 2` whatever the sharpness is (as in
+`harmonic.sharp_nodes`). Elsewhere panels are equal in tau and as long as the motion's harmonics allow.
+
+Every element is asked once for all nodes; what needs more is interpolated by the polynomials through a panel's nodes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from suboctave.harmonic.instants import _jet, crossings_of
+from suboctave.harmonic.kernels import motion
+from suboctave.harmonic.sharp_nodes import singular_instants
+
+#: nodes per panel, both ends among them: quadrature of order 12
+ORDER = 7
+#: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
+#: period that it covers
+_NEAR, _FAR = 3.0, 4.5
+#: how close to a singularity panels are as long as elsewhere, in units of their length
+_CLEAR = 0.25
+#: longest panel in tau: phase of the highest harmonic of the tangent, and of the highest harmonic of the motion
+_TANGENT, _MOTION = 7.0, 9.0
+#: harmonics of less than this share of the largest do not count for the former
+_RELEVANT = 1e-3
+#: extrema that miss a gap by less than this share of the motion are kept in sight: the true motion may touch it
+_MISS = 1e-3
+
+
+def lobatto(order: int) -> np.ndarray:
+    """Nodes on [-1, 1]: the ends and the extrema of the Legendre polynomial of degree order - 1; shape (order,)."""
+    slope = np.polynomial.Legendre.basis(order - 1).deriv()
+    inner = np.sort(slope.roots().real)
+    for _ in range(3):
+        inner -= slope(inner) / slope.deriv()(inner)
+    return np.concatenate(([-1.0], inner, [1.0]))
+
+
+NODES = lobatto(ORDER)
+
+
+def moments(low: float, high: float, count: int) -> np.ndarray:
+    """Integrals over (low, high) of the polynomials that are one at a node and zero at the others, times powers of
+    `(s - middle) / (high - low)`, 0 .. count - 1; shape (count, ORDER).
+    """
+    points, weights = np.polynomial.legendre.leggauss(ORDER + 2)
+    s = 0.5 * (low + high) + 0.5 * (high - low) * points
+    others = [np.delete(NODES, j) for j in range(ORDER)]
+    basis = np.array([np.prod((s[:, None] - o) / (NODES[j] - o), axis=1) for j, o in enumerate(others)])
+    return np.array([basis @ (0.5 * (high - low) * weights * (0.5 * points) ** i) for i in range(count)])
+
+
+@njit(cache=True)
+def _note(row, tau, depth, slope, bend, miss, piece):
+    row[0] = tau
+    row[1] = depth
+    row[2] = slope
+    row[3] = bend
+    row[4] = miss
+    row[5] = piece
+
+
+@njit(cache=True)
+def _events(c, pieces, owner, points, widths, singular, zr, zi, reach):
+    """What happens along the motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
+
+    A crossing of the gap of a piece has infinite depth; an extremum that falls short of it is kept with the distance
+    `miss`. A passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece.
+    """
+    n = zr.shape[0]
+    h = 2.0 * math.pi / n
+    found = np.empty((4 * n + 16, 6))
+    count = 0
+    last = -1
+    size = 0.0
+    values = np.empty((2, 0))
+    for q in range(pieces.shape[0]):
+        g = owner[q]
+        gap = pieces[q, 1]
+        if g != last:
+            values = motion(c[g], zr, zi)
+            size = values[0].max() - values[0].min()
+            last = g
+        at, _above = crossings_of(c[g], gap, values)
+        while count + at.shape[0] + n > found.shape[0]:
+            found = np.concatenate((found, np.empty_like(found)))
+        for i in range(at.shape[0]):
+            _x, d, s = _jet(c[g], math.cos(at[i]), math.sin(at[i]))
+            _note(found[count], at[i], np.inf, d, s, 0.0, q)
+            count += 1
+        for j in range(n):
+            follow = j + 1 if j + 1 < n else 0
+            f0 = values[0, j] - gap
+            f1 = values[0, follow] - gap
+            d0 = values[1, j]
+            d1 = values[1, follow]
+            # an extremum towards the gap that falls short of it
+            if d0 * d1 >= 0.0 or (f0 > 0.0) != (d0 < 0.0) or (f0 > 0.0) != (f1 > 0.0):
+                continue
+            if min(abs(f0), abs(f1)) > h * (abs(d0) + abs(d1)) + _MISS * size:
+                continue
+            tau = j * h + h * d0 / (d0 - d1)
+            x, d, s = _jet(c[g], math.cos(tau), math.sin(tau))
+            for _ in range(3):
+                if s != 0.0 and abs(d / s) < h:
+                    tau -= d / s
+                    x, d, s = _jet(c[g], math.cos(tau), math.sin(tau))
+            if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
+                _note(found[count], tau, np.inf, 0.0, s, x - gap, q)
+                count += 1
+    for g in range(c.shape[0]):
+        own = singular == g
+        if own.any():
+            passed = singular_instants(c[g], points[own], widths[own], reach, zr, zi)
+            while count + passed.shape[1] > found.shape[0]:
+                found = np.concatenate((found, np.empty_like(found)))
+            for i in range(passed.shape[1]):
+                _note(found[count], passed[0, i], passed[1, i], 0.0, 0.0, 0.0, -1)
+                count += 1
+    return found[np.argsort(found[:count, 0])]
+
+
+@njit(cache=True)
+def _depths(events):
+    """Distance from every event to the nearest complex singularity, its own or another's."""
+    n = events.shape[0]
+    out = np.empty(n)
+    for i in range(n):
+        least = events[i, 1]
+        for j in range(n):
+            if events[j, 1] < np.inf:
+                apart = abs(events[i, 0] - events[j, 0])
+                least = min(least, math.hypot(min(apart, 2.0 * math.pi - apart), events[j, 1]))
+        out[i] = least
+    return out
+
+
+@njit(cache=True)
+def _panels(events, longest):
+    """Panels from the first event over one period, rows (from, to, centre, depth), and where each event's begin.
+
+    With depth 0, from and to are instants, else values of v.
+    """
+    n = events.shape[0]
+    depth = _depths(events)
+    start = np.zeros(n, dtype=np.int64)
+    out = np.empty((64, 4))
+    count = 0
+    for i in range(max(n, 1)):
+        low = events[i, 0] if n > 0 else 0.0
+        high = low + 2.0 * math.pi
+        reach = np.zeros(2)
+        deep = np.zeros(2)
+        if n > 0:
+            start[i] = count
+            follow = i + 1 if i + 1 < n else 0
+            high = events[follow, 0] + (0.0 if follow > i else 2.0 * math.pi)
+            deep[0] = depth[i]
+            deep[1] = depth[follow]
+            # graded panels reach from either end to where the others may begin
+            for side in range(2):
+                if deep[side] < longest:
+                    reach[side] = _CLEAR * longest
+        gap = high - low
+        if gap <= 1e-14:
+            continue
+        if reach[0] + reach[1] > gap:
+            if reach[0] < 0.5 * gap:
+                reach[1] = gap - reach[0]
+            elif reach[1] < 0.5 * gap:
+                reach[0] = gap - reach[1]
+            else:
+                reach[:] = 0.5 * gap
+        rest = gap - reach[0] - reach[1]
+        if rest < 0.05 * longest and rest < gap:
+            # not worth a panel of its own
+            reach[0 if reach[0] > reach[1] else 1] += rest
+            rest = 0.0
+        v = 0.0
+        for part in range(3):
+            # graded from the left, plain, graded to the right
+            if part == 1:
+                length = rest
+                centre = d = 0.0
+                first = low + reach[0]
+                last = high - reach[1]
+                pieces = math.ceil(length / longest - 1e-9)
+            else:
+                side = 0 if part == 0 else 1
+                length = reach[side]
+                centre = low if part == 0 else high
+                d = deep[side]
+                v = math.asinh(length / d) if length > 0.0 else 0.0
+                pieces = 1 + math.ceil((v - _NEAR) / _FAR - 1e-9)
+                first = 0.0 if part == 0 else -v
+                last = -first
+            if length <= 0.0:
+                continue
+            pieces = max(1, pieces)
+            while count + pieces > out.shape[0]:
+                out = np.concatenate((out, np.empty_like(out)))
+            for p in range(pieces):
+                # from the left end of what is covered, or from the singularity outwards
+                begin, end = p / pieces, (p + 1) / pieces
+                if part == 0:
+                    whole = _NEAR + (pieces - 1) * _FAR
+                    begin = (_NEAR + (p - 1) * _FAR) / whole if p > 0 else 0.0
+                    end = (_NEAR + p * _FAR) / whole
+                elif part == 2:
+                    whole = _NEAR + (pieces - 1) * _FAR
+                    begin = p * _FAR / whole
+                    end = (p + 1) * _FAR / whole if p < pieces - 1 else 1.0
+                span = last - first if part == 1 else v
+                out[count, 0] = first + span * begin
+                out[count, 1] = first + span * end
+                out[count, 2] = centre
+                out[count, 3] = d
+                count += 1
+    return out[:count], start % max(count, 1)
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _series(c, f, zr, zi, scale, u, v, r):
+    """`u = Re sum c_k z^k`, `v = scale du/dtau` and `r = -Re(f_0 + 2 sum f_k z^k)` at the points z; (N,) each."""
+    n = zr.shape[0]
+    top = c.shape[0] - 1
+    work = np.empty((4, n))
+    ui, vr, vi, ri = work[0], work[1], work[2], work[3]
+    for j in range(n):
+        u[j] = c[top].real
+        ui[j] = c[top].imag
+        vr[j] = top * c[top].real
+        vi[j] = top * c[top].imag
+        r[j] = f[top].real
+        ri[j] = f[top].imag
+    for k in range(top - 1, -1, -1):
+        a = c[k].real
+        b = c[k].imag
+        share = 1.0 if k > 0 else 0.5
+        e = share * f[k].real
+        g = share * f[k].imag
+        for j in range(n):
+            t = u[j] * zr[j] - ui[j] * zi[j] + a
+            ui[j] = u[j] * zi[j] + ui[j] * zr[j] + b
+            u[j] = t
+            t = vr[j] * zr[j] - vi[j] * zi[j] + k * a
+            vi[j] = vr[j] * zi[j] + vi[j] * zr[j] + k * b
+            vr[j] = t
+            t = r[j] * zr[j] - ri[j] * zi[j] + e
+            ri[j] = r[j] * zi[j] + ri[j] * zr[j] + g
+            r[j] = t
+    for j in range(n):
+        v[j] = -scale * vi[j]
+        r[j] *= -2.0
+
+
+@njit(cache=True)
+def _longest(c, degree):
+    """Longest panel in tau for a tangent that is a polynomial of this degree in the motion."""
+    top = 1
+    for g in range(c.shape[0]):
+        largest = 0.0
+        for k in range(c.shape[1]):
+            largest = max(largest, abs(c[g, k]))
+        for k in range(c.shape[1] - 1, top, -1):
+            if abs(c[g, k]) > _RELEVANT * largest:
+                top = k
+                break
+    # quarters of a period at most: the least that a polynomial of degree six follows
+    return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
+
+
+@njit(cache=True)
+def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, finest, zr, zi, nodes):
+    """Panels along a motion, the motion at their nodes, and the laws that are known in closed form.
+
+    Parameters
+    ----------
+    c, f
+        Displacement along the G directions: amplitudes (G, H + 1); Fourier coefficients of the force (G, > H).
+    rate
+        Base frequency.
+    pieces
+        Stiffness, gap, side of the pieces of piecewise-linear laws (Q, 3), direction by direction.
+    polynomial
+        Coefficients of u^0, u^1, ... along every direction (G, D).
+    points, widths
+        Where the sharp laws are singular, `u = points +- i widths` (S,), direction by direction.
+    counts
+        How many pieces and points every direction has, (G, 2).
+    degree
+        Of the tangents as polynomials in the motion, 0 if they are constant between events.
+    finest
+        Upper bound of the panels' lengths.
+    zr, zi
+        Uniform grid on the circle, for searches.
+    nodes
+        `NODES`.
+
+    Returns
+    -------
+    stretch
+        dtau/ds on every panel, s in [-1, 1]; (P, m). Node i of panel p is node `p (m - 1) + i` of the period.
+    path
+        u, du/dt at the nodes, (G, 2, N), N = P (m - 1) + 1.
+    law
+        Force less its harmonics within the basis, stiffness, damping at the nodes (G, 3, N), the stiffness without that
+        of the pieces.
+    base
+        Stiffness of the pieces on every panel, (G, P).
+    events, start
+        See `_events`; the panel that begins at each.
+    """
+    groups = c.shape[0]
+    owner = np.repeat(np.arange(groups), counts[:, 0])
+    singular = np.repeat(np.arange(groups), counts[:, 1])
+    longest = min(_longest(c, degree), finest)
+    # singularities further away than this do not disturb a panel
+    events = _events(c, pieces, owner, points, widths, singular, zr, zi, longest)
+    panels, start = _panels(events, longest)
+    count = panels.shape[0]
+    m = nodes.shape[0]
+    total = count * (m - 1) + 1
+    tau = np.empty(total)
+    stretch = np.empty((count, m))
+    for p in range(count):
+        middle = 0.5 * (panels[p, 0] + panels[p, 1])
+        half = 0.5 * (panels[p, 1] - panels[p, 0])
+        depth = panels[p, 3]
+        at = p * (m - 1)
+        for j in range(m):
+            v = middle + half * nodes[j]
+            if depth == 0.0:
+                tau[at + j] = v
+                stretch[p, j] = half
+            else:
+                e = math.exp(v)
+                tau[at + j] = panels[p, 2] + 0.5 * depth * (e - 1.0 / e)
+                stretch[p, j] = 0.5 * depth * (e + 1.0 / e) * half
+    path = np.empty((groups, 2, total))
+    law = np.zeros((groups, 3, total))
+    base = np.zeros((groups, count))
+    cos = np.cos(tau)
+    sin = np.sin(tau)
+    for g in range(groups):
+        _series(c[g], f[g], cos, sin, rate, path[g, 0], path[g, 1], law[g, 0])
+        add_polynomial(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
+    for q in range(pieces.shape[0]):
+        g = owner[q]
+        k, gap, right = pieces[q, 0], pieces[q, 1], pieces[q, 2] > 0.0
+        u = path[g, 0]
+        for p in range(count):
+            if (u[p * (m - 1) + m // 2] > gap) == right:
+                base[g, p] += k
+        for j in range(total):
+            if (u[j] > gap) == right:
+                law[g, 0, j] += k * (u[j] - gap)
+    return stretch, path, law, base, events, start
+
+
+@njit(cache=True)
+def add_polynomial(coefficients, u, force, stiffness):
+    """Add `sum c_p u^p` and its derivative to force and stiffness (N,), in place."""
+    degree = coefficients.shape[0] - 1
+    if degree < 0:
+        return
+    for j in range(u.shape[0]):
+        f = slope = 0.0
+        for p in range(degree, -1, -1):
+            slope = slope * u[j] + f
+            f = f * u[j] + coefficients[p]
+        force[j] += f
+        stiffness[j] += slope
+
+
+@njit(cache=True)
+def closed_changes(path, change, rate, pieces, counts, polynomial, events, start, panels):
+    """The laws known in closed form along the motion changed by `change` (G, 2, N).
+
+    Returns stiffness and damping of the polynomials at the old nodes (G, 2, N), and the impulses `-kick y` at the
+    beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing moves by `t = -d / u'` (a
+    root of the parabola where the motion grazes), and a slice of stiffness k that is as thin is an impulse k t.
+    """
+    groups, _, total = path.shape
+    owner = np.repeat(np.arange(groups), counts[:, 0])
+    law = np.zeros((groups, 2, total))
+    kick = np.zeros((groups, panels))
+    idle = np.empty(total)
+    for g in range(groups):
+        if polynomial.shape[1] > 2:
+            add_polynomial(polynomial[g], path[g, 0] + change[g, 0], idle, law[g, 0])
+        elif polynomial.shape[1] == 2:
+            law[g, 0] += polynomial[g, 1]
+    m = (total - 1) // panels
+    for i in range(events.shape[0]):
+        q = int(events[i, 5])
+        if q < 0:
+            continue
+        g = owner[q]
+        k, right = pieces[q, 0], pieces[q, 2] > 0.0
+        p = start[i]
+        d = change[g, 0, p * m]
+        bend = rate * rate * events[i, 3]
+        if events[i, 2] == 0.0:
+            # an extremum that missed the gap: carried across, it is in contact (or out of it) for a while
+            reached = events[i, 4] + d
+            square = -2.0 * reached / bend
+            if square > 0.0 and (reached > 0.0) != (events[i, 4] > 0.0):
+                time = 2.0 * math.sqrt(square)
+                kick[g, p] += k * time if (reached > 0.0) == right else -k * time
+            continue
+        slope = rate * events[i, 2] + change[g, 1, p * m]
+        square = slope * slope - 2.0 * bend * d
+        if square > 0.0:
+            shift = -2.0 * d / (slope + math.copysign(math.sqrt(square), slope))
+        else:
+            # contact lost, or never: up to the extremum
+            shift = -slope / bend
+        # a contact that begins later is missing for a while
+        kick[g, p] += -k * shift if (events[i, 2] > 0.0) == right else k * shift
+    return law, kick

@@ -1,0 +1,367 @@
+"""Compiled kernels for one degree of freedom: `y'' + c(t) y' + k(t) y = -r(t)` on the panels of `panels`.
+
+On a step the Magnus expansion writes the propagator as one exponential. With `A_i = h^-i int (t - t_mid)^i A dt` and
+
+    a1 = 3/4 (3 A_0 - 20 A_2),   a2 = 12 A_1,   a3 = -15 (A_0 - 12 A_2)
+    Omega = a1 + a3/12 + [-20 a1 - a3 + C1, a2 + C2] / 240,   C1 = [a1, a2],   C2 = -[a1, 2 a3 + C1] / 60
+
+it is of order six (Blanes, Casas, Oteo & Ros, Phys. Rep. 470 (2009) 151-238, section 5.3), exact where A is constant.
+The moments are those of the polynomials through a panel's nodes. Of `A = [[0, 1], [-k, -c]]` the trace commutes with
+everything: what remains is `[[a, b], [-k, -a]]` with b = 1, a = c / 2, whose exponential and commutators are closed
+forms, and the product of the multipliers is `exp(-int c dt)` to rounding (Liouville).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from suboctave.stability.panels import NODES, ORDER, moments
+
+#: most steps per panel with moments of their own; more of them share the parabola of one
+_MOST = 8
+#: error of the fine steps per panel, and of the coarse ones, in units of the Magnus expansion's leading error
+_FINE, _COARSE = 1.0e-9, 6.4e-8
+
+
+def _tables() -> np.ndarray:
+    """Matrices from values at the nodes to a1, a2, a3 on every step of a panel with n steps.
+
+    Shape (2, n, step, 3, ORDER): for the polynomials through all nodes, and for the same without their two highest
+    Legendre components, which tell how well a panel is resolved.
+    """
+    legendre = np.polynomial.legendre.legvander(NODES, ORDER - 1)
+    kept = np.diag(np.arange(ORDER) < ORDER - 2).astype(float)
+    lower = legendre @ kept @ np.linalg.inv(legendre)
+    out = np.zeros((2, _MOST + 1, _MOST, 3, ORDER))
+    for n in range(1, _MOST + 1):
+        ends = np.linspace(-1.0, 1.0, n + 1)
+        for i in range(n):
+            a = moments(ends[i], ends[i + 1], 3)
+            out[0, n, i] = 0.75 * (3.0 * a[0] - 20.0 * a[2]), 12.0 * a[1], -15.0 * (a[0] - 12.0 * a[2])
+            out[1, n, i] = out[0, n, i] @ lower
+    return out
+
+
+STEPS = _tables()
+#: the same for A_0 and A_1 between neighbouring nodes: (ORDER - 1, 2, ORDER)
+BETWEEN = np.array([moments(NODES[i], NODES[i + 1], 2) for i in range(ORDER - 1)])
+
+
+#: sums may be reordered; infinities keep their meaning
+_FAST = {"reassoc", "contract", "nsz"}
+
+
+@njit(cache=True)
+def _waves(q, decay):
+    """`cos(sqrt q)` and `sin(sqrt q) / sqrt q`, with or without a factor `exp(-decay)`, and the decay left to apply."""
+    if abs(q) < 0.25:
+        c = 1.0 - q * (
+            1.0 / 2.0
+            - q * (1.0 / 24.0 - q * (1.0 / 720.0 - q * (1.0 / 40320.0 - q * (1.0 / 3628800.0 - q / 479001600.0))))
+        )
+        s = 1.0 - q * (
+            1.0 / 6.0
+            - q * (1.0 / 120.0 - q * (1.0 / 5040.0 - q * (1.0 / 362880.0 - q * (1.0 / 39916800.0 - q / 6227020800.0))))
+        )
+        return c, s, decay
+    if q > 0.0:
+        w = math.sqrt(q)
+        return math.cos(w), math.sin(w) / w, decay
+    # both exponents on their own, so that heavy damping does not overflow
+    w = math.sqrt(-q)
+    slow = 0.5 * math.exp(w - decay)
+    fast = 0.5 * math.exp(-w - decay)
+    return slow + fast, (slow - fast) / w, 0.0
+
+
+@njit(cache=True)
+def _exponent(a1, b1, k1, a2, b2, k2, a3, b3, k3):
+    """Omega as (a, b, k), from the moments a1, a2, a3 in the same form."""
+    # [(a, b, k), (a', b', k')] = (b' k - b k', 2 (a b' - a' b), 2 (a' k - a k'))
+    u = b2 * k1 - b1 * k2
+    v = 2.0 * (a1 * b2 - a2 * b1)
+    w = 2.0 * (a2 * k1 - a1 * k2)
+    ua = 2.0 * a3 + u
+    ub = 2.0 * b3 + v
+    uk = 2.0 * k3 + w
+    ra = a2 - (ub * k1 - b1 * uk) / 60.0
+    rb = b2 - 2.0 * (a1 * ub - ua * b1) / 60.0
+    rk = k2 - 2.0 * (ua * k1 - a1 * uk) / 60.0
+    la = u - 20.0 * a1 - a3
+    lb = v - 20.0 * b1 - b3
+    lk = w - 20.0 * k1 - k3
+    return (
+        a1 + a3 / 12.0 + (rb * lk - lb * rk) / 240.0,
+        b1 + b3 / 12.0 + 2.0 * (la * rb - ra * lb) / 240.0,
+        k1 + k3 / 12.0 + 2.0 * (ra * lk - la * rk) / 240.0,
+    )
+
+
+@njit(cache=True, fastmath=_FAST)
+def _monodromy(stretch, scale, base, k, damping, c, kick, tables, fine):
+    """Trace of the monodromy matrix, and `int c dt`.
+
+    stretch: dtau/ds (P, m); scale: dt/dtau; base (P,): constant part of the stiffness on every panel, k (N,) its
+    varying part at the nodes; damping: constant part, c (N,) or (0,) the varying one; kick (P,): an impulse
+    `-kick y` at the beginning of every panel. Coarse: longer steps, polynomials of lower degree.
+    """
+    count = stretch.shape[0]
+    m = ORDER
+    varying = c.shape[0] > 0
+    tolerance = _FINE if fine else _COARSE
+    table = tables[0 if fine else 1]
+    jj = np.empty(m)
+    kk = np.empty(m)
+    cc = np.empty(m)
+    p11, p12, p21, p22 = 1.0, 0.0, 0.0, 1.0
+    total = 0.0
+    # damping not applied yet
+    late = 0.0
+    for p in range(count):
+        if kick[p] != 0.0:
+            p21 -= kick[p] * p11
+            p22 -= kick[p] * p12
+        at = p * (m - 1)
+        graded = stretch[p, 0] != stretch[p, m - 1]
+        low = high = k[at]
+        rate = length = swing = 0.0
+        for j in range(m):
+            g = scale * stretch[p, j]
+            value = k[at + j]
+            low = min(low, value)
+            high = max(high, value)
+            length += g * (table[1, 0, 0, j] + table[1, 0, 2, j] / 12.0)
+            jj[j] = g
+            kk[j] = g * (value + base[p])
+            half = 0.5 * damping
+            if varying:
+                half += 0.5 * c[at + j]
+                swing = max(swing, abs(half - 0.5 * damping))
+                cc[j] = g * half
+            rate = max(rate, abs(value + base[p] - half * half))
+        angle = rate * length * length
+        change = (high - low) * length * length + 2.0 * swing * length * (1.0 + math.sqrt(angle))
+        # the leading error of a step is rarely more than (angle + 0.3)^2 change / 400
+        want = change * (angle + 0.3) ** 2 / 400.0 / tolerance
+        steps = 1
+        while steps < 1000 and steps**6 < want:
+            steps += 1
+        parts = 1
+        if steps > _MOST:
+            parts = math.ceil(steps / _MOST)
+            steps = _MOST
+        for i in range(steps):
+            k1 = k2 = k3 = 0.0
+            for j in range(m):
+                k1 += table[steps, i, 0, j] * kk[j]
+                k2 += table[steps, i, 1, j] * kk[j]
+                k3 += table[steps, i, 2, j] * kk[j]
+            b1 = b2 = b3 = 0.0
+            if graded:
+                for j in range(m):
+                    b1 += table[steps, i, 0, j] * jj[j]
+                    b2 += table[steps, i, 1, j] * jj[j]
+                    b3 += table[steps, i, 2, j] * jj[j]
+            else:
+                b1 = length / steps
+            if varying:
+                a1 = a2 = a3 = 0.0
+                for j in range(m):
+                    a1 += table[steps, i, 0, j] * cc[j]
+                    a2 += table[steps, i, 1, j] * cc[j]
+                    a3 += table[steps, i, 2, j] * cc[j]
+            else:
+                a1 = 0.5 * damping * b1
+                a2 = 0.5 * damping * b2
+                a3 = 0.5 * damping * b3
+            for part in range(parts):
+                if parts == 1:
+                    decay = a1 + a3 / 12.0
+                    a, b, q = _exponent(a1, b1, k1, a2, b2, k2, a3, b3, k3)
+                else:
+                    # the moments of one of several equal parts of a parabola
+                    r = 1.0 / parts
+                    x = (part + 0.5) * r - 0.5
+                    first = r * (a1 + x * (a2 + x * a3))
+                    third = r * r * r * a3
+                    decay = first + third / 12.0
+                    a, b, q = _exponent(
+                        first,
+                        r * (b1 + x * (b2 + x * b3)),
+                        r * (k1 + x * (k2 + x * k3)),
+                        r * r * (a2 + 2.0 * x * a3),
+                        r * r * (b2 + 2.0 * x * b3),
+                        r * r * (k2 + 2.0 * x * k3),
+                        third,
+                        r * r * r * b3,
+                        r * r * r * k3,
+                    )
+                total += decay
+                co, si, rest = _waves(b * q - a * a, decay)
+                late += rest
+                m11 = co + a * si
+                m12 = b * si
+                m21 = -q * si
+                m22 = co - a * si
+                n11 = m11 * p11 + m12 * p21
+                n12 = m11 * p12 + m12 * p22
+                p21, p22 = m21 * p11 + m22 * p21, m21 * p12 + m22 * p22
+                p11, p12 = n11, n12
+                if late > 1.0 or late < -1.0:
+                    e = math.exp(-late)
+                    p11 *= e
+                    p12 *= e
+                    p21 *= e
+                    p22 *= e
+                    late = 0.0
+    return (p11 + p22) * math.exp(-late), 2.0 * total
+
+
+@njit(cache=True, fastmath=_FAST)
+def _respond(stretch, scale, base, k, damping, c, force, between, nodes):
+    """The periodic solution of `d'' + c d' + k d = -force` at the nodes, d and d' (2, N), and the largest |d|.
+
+    Magnus steps of order four from node to node: the force is known no better.
+    """
+    count = stretch.shape[0]
+    m = ORDER
+    intervals = count * (m - 1)
+    varying = c.shape[0] > 0
+    jj = np.empty(m)
+    kk = np.empty(m)
+    cc = np.empty(m)
+    rr = np.empty(m)
+    step = np.empty((intervals, 6))
+    p11, p12, p21, p22 = 1.0, 0.0, 0.0, 1.0
+    e1 = e2 = 0.0
+    for p in range(count):
+        at = p * (m - 1)
+        graded = stretch[p, 0] != stretch[p, m - 1]
+        for j in range(m):
+            g = scale * stretch[p, j]
+            jj[j] = g
+            kk[j] = g * (k[at + j] + base[p])
+            rr[j] = g * force[at + j]
+            if varying:
+                cc[j] = 0.5 * g * (damping + c[at + j])
+        for i in range(m - 1):
+            k0 = k1 = r0 = r1 = 0.0
+            for j in range(m):
+                k0 += between[i, 0, j] * kk[j]
+                k1 += between[i, 1, j] * kk[j]
+                r0 += between[i, 0, j] * rr[j]
+                r1 += between[i, 1, j] * rr[j]
+            b0 = b1 = 0.0
+            if graded:
+                for j in range(m):
+                    b0 += between[i, 0, j] * jj[j]
+                    b1 += between[i, 1, j] * jj[j]
+            else:
+                b0 = (nodes[i + 1] - nodes[i]) * jj[0]
+            if varying:
+                a0 = a1 = 0.0
+                for j in range(m):
+                    a0 += between[i, 0, j] * cc[j]
+                    a1 += between[i, 1, j] * cc[j]
+            else:
+                a0 = 0.5 * damping * b0
+                a1 = 0.5 * damping * b1
+            # Omega = A_0 - [A_0, A_1], acting on (y, y', 1)
+            a = a0 - (b1 * k0 - b0 * k1)
+            b = b0 - 2.0 * (a0 * b1 - a1 * b0)
+            q = k0 - 2.0 * (a1 * k0 - a0 * k1)
+            f1 = b0 * r1 - b1 * r0
+            f2 = a1 * r0 - a0 * r1 - r0
+            square = b * q - a * a
+            co, si, rest = _waves(square, a0)
+            # the force acts in the middle of the step on average
+            half = math.exp(-0.5 * rest)
+            full = half * half
+            if rest != a0:
+                half = math.exp(0.5 * a0)
+            s = step[at + i]
+            s[0] = full * (co + a * si)
+            s[1] = full * b * si
+            s[2] = -full * q * si
+            s[3] = full * (co - a * si)
+            bend = (1.0 - co) / square if abs(square) > 1e-4 else 0.5 - square / 24.0
+            if rest != a0:
+                # here co and si have the whole decay already
+                bend = (1.0 / (half * half) - co) / square
+            s[4] = half * (si * f1 + bend * (a * f1 + b * f2))
+            s[5] = half * (si * f2 - bend * (q * f1 + a * f2))
+            n11 = s[0] * p11 + s[1] * p21
+            n12 = s[0] * p12 + s[1] * p22
+            p21, p22 = s[2] * p11 + s[3] * p21, s[2] * p12 + s[3] * p22
+            p11, p12 = n11, n12
+            e1, e2 = s[0] * e1 + s[1] * e2 + s[4], s[2] * e1 + s[3] * e2 + s[5]
+    out = np.empty((2, intervals + 1))
+    det = (1.0 - p11) * (1.0 - p22) - p12 * p21
+    d = ((1.0 - p22) * e1 + p12 * e2) / det if det != 0.0 else np.inf
+    v = (p21 * e1 + (1.0 - p11) * e2) / det if det != 0.0 else np.inf
+    largest = abs(d)
+    out[0, 0] = d
+    out[1, 0] = v
+    for i in range(intervals):
+        s = step[i]
+        d, v = s[0] * d + s[1] * v + s[4], s[2] * d + s[3] * v + s[5]
+        out[0, i + 1] = d
+        out[1, i + 1] = v
+        largest = max(largest, abs(d))
+    return out, largest
+
+
+@njit(cache=True)
+def _weighted(weights, parts):
+    """`sum_g weights_g parts_g` of arrays (G, N)."""
+    out = np.zeros(parts.shape[1])
+    for g in range(parts.shape[0]):
+        for j in range(parts.shape[1]):
+            out[j] += weights[g] * parts[g, j]
+    return out
+
+
+@njit(cache=True)
+def standing(stretch, scale, path, law, base, moving, shape, matrices, tables, between, nodes, share):
+    """Along the motion as it stands: trace of the monodromy matrix, `int c dt`, and the correction that it needs.
+
+    path, law, base: see `panels.lay_out`; shape (G,): the directions; matrices: mass, damping, stiffness; share: a
+    correction larger than this share of the motion is cut down to it. Returns also the correction along the directions
+    (G, 2, N) and the factor by which it was cut.
+    """
+    mass, damping, stiffness = matrices
+    square = shape * shape / mass
+    whole = _weighted(square, base) + stiffness / mass
+    k = _weighted(square, law[:, 1])
+    c = _weighted(square, law[:, 2]) if moving else np.zeros(0)
+    none = np.zeros(whole.shape[0])
+    trace, decay = _monodromy(stretch, scale, whole, k, damping / mass, c, none, tables, False)
+    force = _weighted(shape / mass, law[:, 0])
+    change = np.zeros(path.shape)
+    factor = 1.0
+    if path.shape[0] > 0:
+        found, largest = _respond(stretch, scale, whole, k, damping / mass, c, force, between, nodes)
+        most = share * np.abs(path[0, 0]).max() / abs(shape[0])
+        if not largest <= most:
+            factor = most / largest if largest < np.inf else 0.0
+        if factor > 0.0:
+            for g in range(path.shape[0]):
+                change[g] = factor * shape[g] * found
+    return trace, decay, change, factor
+
+
+@njit(cache=True)
+def corrected(stretch, scale, law, base, kick, moving, shape, matrices, tables):
+    """Along the corrected motion: trace of the monodromy matrix and `int c dt`.
+
+    law (G, 2, N), kick (G, P): see `panels.closed_changes`; all else as in `standing`.
+    """
+    mass, damping, stiffness = matrices
+    square = shape * shape / mass
+    whole = _weighted(square, base) + stiffness / mass
+    c = _weighted(square, law[:, 1]) if moving else np.zeros(0)
+    kicks = _weighted(square, kick)
+    return _monodromy(stretch, scale, whole, _weighted(square, law[:, 0]), damping / mass, c, kicks, tables, True)
