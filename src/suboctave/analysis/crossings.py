@@ -18,12 +18,13 @@ beyond this (and any) test: that is what the length of the examined intervals is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
 #: fractions of an interval at which it is looked at
-_GRID = tuple(i / 10.0 for i in range(1, 10))
+_GRID = (0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98)
 
 
 def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float | None:
@@ -55,7 +56,7 @@ def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float
             return None
     sign = 1.0 if fp > 0.0 else -1.0
     curve = []
-    for share in _GRID:
+    for share in sorted([*_GRID, *_extrema(chord, second, third, shift - p, h)]):
         ahead, back = share * h, (1.0 - share) * h
         s = p + ahead
         value = fp + ahead * chord - ahead * back * (second + third * (s - shift))
@@ -81,6 +82,20 @@ def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float
 def _kept(share: float) -> float:
     """Not too close to the ends, so that both parts shrink."""
     return min(0.6, max(0.4, share))
+
+
+def _extrema(chord: float, second: float, third: float, shift: float, h: float) -> list[float]:
+    """Fractions of (0, h) at which `chord s + s (s - h) (second + third (s - shift))` is largest or smallest."""
+    # derivative a s^2 + b s + c
+    a = 3.0 * third
+    b = 2.0 * (second - third * (shift + h))
+    c = chord - second * h + third * shift * h
+    root = b * b - 4.0 * a * c
+    if root < 0.0:
+        return []
+    q = -0.5 * (b + math.copysign(math.sqrt(root), b))
+    places = ([q / a] if a != 0.0 else []) + ([c / q] if q != 0.0 else [])
+    return [s / h for s in places if 0.0 < s < h]
 
 
 def _second(p: float, q: float, fp: float, chord: float, x: float, fx: float) -> float:

@@ -153,10 +153,13 @@ class _Step:
             if doubt is None:
                 self.settled.append(_place(q) - _place(p))
                 continue
+            share, reason = doubt
             if _place(q) - _place(p) <= least:
                 self.settled.append(_place(q) - _place(p))
+                if not any(kind.changed(p, q) for kind in ALL_KINDS):
+                    # no event, but too close to one to tell it from two
+                    self.unsettled.append(_unsettled(p, q, reason))
                 continue
-            share, reason = doubt
             halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
             if not halves and not self.refused:
                 self.unsettled.append(_unsettled(p, q, reason))

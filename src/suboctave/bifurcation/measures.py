@@ -8,11 +8,11 @@ symmetric functions are:
     double   prod_j (1 + mu_j)                                              period doublings
     torus    prod_{i<j} (1 - mu_i mu_j)                                     Neimark-Sacker points (and neutral saddles)
 
-Each factor is divided by a positive one, sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest. Signs
-are those of the determinants and of the tangent, which are exact for the equations solved; sizes those of the
-multipliers. Values are pairs (sign, logarithm of the modulus): products of many factors leave the range of numbers.
-The signs of `fold` (up to a constant along the curve) and of `double` follow from `det J_0` and `det J_half`
-(Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 10.2, has the three products).
+(Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 10.2). Each factor is divided by a positive one,
+sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest. Values are pairs (sign, logarithm of the
+modulus): products of many factors leave the range of numbers. `turn` belongs to the equations solved, the others to
+the multipliers, whose zeros lie as far from those of `det J_0` and `det J_half` as the harmonics left out make them:
+they tell whether something may hide, not what has happened.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ Value = tuple[float, float]
 UNDAMPED = 1e-9
 
 
-def fold(mu: ComplexArray) -> float:
-    """Logarithm of prod |1 - mu| / sqrt(1 + |mu|^2)."""
-    return _log(1.0 - mu, mu)
+def fold(mu: ComplexArray) -> Value:
+    """prod (1 - mu) / sqrt(1 + |mu|^2)."""
+    return _product(1.0 - mu, mu)
 
 
-def double(mu: ComplexArray) -> float:
-    """Logarithm of prod |1 + mu| / sqrt(1 + |mu|^2)."""
-    return _log(1.0 + mu, mu)
+def double(mu: ComplexArray) -> Value:
+    """prod (1 + mu) / sqrt(1 + |mu|^2)."""
+    return _product(1.0 + mu, mu)
 
 
 def torus(mu: ComplexArray) -> Value:
@@ -49,16 +49,16 @@ def torus(mu: ComplexArray) -> Value:
     with np.errstate(divide="ignore"):
         if abs(float(np.log(np.abs(mu)).sum())) < UNDAMPED:
             return 1.0, 0.0
-    factors = 1.0 - products
-    # conjugate factors give a positive product: the sign is that of the real ones
-    real = np.abs(products.imag) <= 1e-12 * np.abs(products)
-    negative = np.count_nonzero(factors.real[real] < 0.0)
-    return (-1.0 if negative % 2 else 1.0), _log(factors, products)
+    return _product(1.0 - products, products)
 
 
-def _log(factors: ComplexArray, mu: ComplexArray) -> float:
+def _product(factors: ComplexArray, mu: ComplexArray) -> Value:
+    """Complex factors come in conjugate pairs: the sign is that of the real ones."""
     with np.errstate(divide="ignore"):
-        return float(np.log(np.abs(factors)).sum() - 0.5 * np.log1p(np.abs(mu) ** 2).sum())
+        log = float(np.log(np.abs(factors)).sum() - 0.5 * np.log1p(np.abs(mu) ** 2).sum())
+    real = np.abs(mu.imag) <= 1e-12 * np.abs(mu)
+    negative = np.count_nonzero(factors.real[real] < 0.0)
+    return (-1.0 if negative % 2 else 1.0), log
 
 
 def scaled(values: list[Value]) -> list[float]:
