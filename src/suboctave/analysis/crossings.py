@@ -18,6 +18,7 @@ beyond this (and any) test: that is what the length of the examined intervals is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -25,8 +26,8 @@ from numba import njit
 
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
-#: an interval is looked at in so many places
-_LOOKS = 9
+#: fractions of an interval at which it is looked at, beside the extrema of the cubic
+_GRID = np.array([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98])
 
 
 def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float | None:
@@ -50,6 +51,36 @@ def _rate(places, first, last, size, s):
     for i in range(first, last):
         size *= abs(s - places[i])
     return size
+
+
+@njit(cache=True)
+def _looks(chord, second, third, shift, h):
+    """The grid of fractions with those at which `chord s + s (s - h) (second + third (s - shift))` is extreme."""
+    # derivative a s^2 + b s + c
+    a = 3.0 * third
+    b = 2.0 * (second - third * (shift + h))
+    c = chord - second * h + third * shift * h
+    n = _GRID.shape[0]
+    out = np.empty(n + 2)
+    for k in range(n):
+        out[k] = _GRID[k]
+    count = n
+    inside = b * b - 4.0 * a * c
+    if inside >= 0.0:
+        q = -0.5 * (b + math.copysign(math.sqrt(inside), b))
+        for k in range(2):
+            over, under = (q, a) if k == 0 else (c, q)
+            if under != 0.0 and 0.0 < over / under < h:
+                out[count] = over / (under * h)
+                count += 1
+    # few: in order by insertion
+    for k in range(n, count):
+        here, i = out[k], k
+        while i > 0 and out[i - 1] > here:
+            out[i] = out[i - 1]
+            i -= 1
+        out[i] = here
+    return out[:count]
 
 
 @njit(cache=True)
@@ -96,11 +127,12 @@ def _doubtful(places, values, at):
         if min(abs(fp), abs(fq)) > bend + SAFETY * h * stray:
             return -1.0
     sign = 1.0 if fp > 0.0 else -1.0
-    value = np.empty(_LOOKS)
-    doubt = np.empty(_LOOKS)
-    for k in range(_LOOKS):
-        share = (k + 1) / (_LOOKS + 1)
-        ahead, back = share * h, (1.0 - share) * h
+    shares = _looks(chord, bent, third, shift - p, h)
+    looks = shares.shape[0]
+    value = np.empty(looks)
+    doubt = np.empty(looks)
+    for k in range(looks):
+        ahead, back = shares[k] * h, (1.0 - shares[k]) * h
         s = p + ahead
         value[k] = sign * (fp + ahead * chord - ahead * back * (bent + third * (s - shift)))
         doubt[k] = SAFETY * max(
@@ -110,24 +142,23 @@ def _doubtful(places, values, at):
     root = 1.0
     if not same:
         last, value_last = 0.0, sign * fp
-        for k in range(_LOOKS + 1):
-            share = (k + 1) / (_LOOKS + 1)
-            here = value[k] if k < _LOOKS else sign * fq
+        for k in range(looks + 1):
+            share = shares[k] if k < looks else 1.0
+            here = value[k] if k < looks else sign * fq
             if here <= 0.0:
                 part = value_last / (value_last - here) if value_last > here else 0.5
                 root = last + (share - last) * part
                 break
             last, value_last = share, here
     margin, where = np.inf, -1.0
-    for k in range(_LOOKS):
-        share = (k + 1) / (_LOOKS + 1)
+    for k in range(looks):
         if same:
             left_over = value[k] - doubt[k]
         else:
-            left_over = value[k] if share < root else -value[k]
-            left_over -= 0.25 * doubt[k] * min(1.0, 4.0 * abs(share - root))
+            left_over = value[k] if shares[k] < root else -value[k]
+            left_over -= 0.25 * doubt[k] * min(1.0, 4.0 * abs(shares[k] - root))
         if left_over < margin:
-            margin, where = left_over, share
+            margin, where = left_over, shares[k]
     if margin < 0.0 or (same and margin == 0.0):
         return where
     return -1.0

@@ -162,7 +162,7 @@ class _Step:
             if _place(q) - _place(p) <= least:
                 self.settled.append(_place(q) - _place(p))
                 if not any(kind.changed(p, q) for kind in ALL_KINDS):
-                    # a test comes as close to zero as it can be told
+                    # no event, but too close to one to tell it from two
                     self.unsettled.append(_unsettled(p, q, reason))
                 continue
             halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []

@@ -65,14 +65,8 @@ class Sample:
         """The smooth test functions turn, fold, double, torus of `bifurcation.measures`."""
         point, mu = self.point, self.floquet.multipliers
         turn = self.slope * float(point.weights[point.curve.parameter]) / length(point.weights * point.tangent)
-        up = 1.0 if turn > 0.0 else -1.0
-        straight = 1.0 if point.orientation > 0.0 else -1.0
-        return (
-            (up, math.log(abs(turn)) if turn else -math.inf),
-            (up * straight, measures.fold(mu)),
-            (1.0 if self.half_sign > 0.0 else -1.0, measures.double(mu)),
-            measures.torus(mu),
-        )
+        value = (1.0 if turn > 0.0 else -1.0, math.log(abs(turn)) if turn else -math.inf)
+        return (value, *measures.of_multipliers(mu))
 
 
 class BifurcationKind(ABC):

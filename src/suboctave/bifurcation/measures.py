@@ -8,11 +8,11 @@ symmetric functions are:
     double   prod_j (1 + mu_j)                                              period doublings
     torus    prod_{i<j} (1 - mu_i mu_j)                                     Neimark-Sacker points (and neutral saddles)
 
-Each factor is divided by a positive one, sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest. Signs
-are those of the determinants and of the tangent, which are exact for the equations solved; sizes those of the
-multipliers. Values are pairs (sign, logarithm of the modulus): products of many factors leave the range of numbers.
-The signs of `fold` (up to a constant along the curve) and of `double` follow from `det J_0` and `det J_half`
-(Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 10.2, has the three products).
+(Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 10.2). Each factor is divided by a positive one,
+sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest. Values are pairs (sign, logarithm of the
+modulus): products of many factors leave the range of numbers. `turn` belongs to the equations solved, the others to
+the multipliers, whose zeros lie as far from those of `det J_0` and `det J_half` as the harmonics left out make them:
+they tell whether something may hide, not what has happened.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
 from suboctave.harmonic.basis import ComplexArray
 
@@ -30,35 +31,45 @@ Value = tuple[float, float]
 UNDAMPED = 1e-9
 
 
-def fold(mu: ComplexArray) -> float:
-    """Logarithm of prod |1 - mu| / sqrt(1 + |mu|^2)."""
-    return _log(1.0 - mu, mu)
+def of_multipliers(mu: ComplexArray) -> tuple[Value, Value, Value]:
+    """fold, double and torus of multipliers (2 n,).
 
-
-def double(mu: ComplexArray) -> float:
-    """Logarithm of prod |1 + mu| / sqrt(1 + |mu|^2)."""
-    return _log(1.0 + mu, mu)
-
-
-def torus(mu: ComplexArray) -> Value:
-    """prod_{i<j} (1 - mu_i mu_j) with its sign; constant for motions without damping, whose pairs never leave the
-    circle.
+    `torus` is constant for motions without damping, whose pairs never leave the circle.
     """
-    i, j = np.triu_indices(len(mu), 1)
-    products = mu[i] * mu[j]
-    with np.errstate(divide="ignore"):
-        if abs(float(np.log(np.abs(mu)).sum())) < UNDAMPED:
-            return 1.0, 0.0
-    factors = 1.0 - products
-    # conjugate factors give a positive product: the sign is that of the real ones
-    real = np.abs(products.imag) <= 1e-12 * np.abs(products)
-    negative = np.count_nonzero(factors.real[real] < 0.0)
-    return (-1.0 if negative % 2 else 1.0), _log(factors, products)
+    signs, logs = _products(mu)
+    return (signs[0], logs[0]), (signs[1], logs[1]), (signs[2], logs[2])
 
 
-def _log(factors: ComplexArray, mu: ComplexArray) -> float:
-    with np.errstate(divide="ignore"):
-        return float(np.log(np.abs(factors)).sum() - 0.5 * np.log1p(np.abs(mu) ** 2).sum())
+@njit(cache=True)
+def _products(mu):
+    """Signs and logarithms of the three products. Complex factors come in conjugate pairs: the sign is that of the
+    real ones.
+    """
+    n = mu.shape[0]
+    signs = (np.ones(3), np.zeros(3))
+    sign, log = signs
+    total = 0.0
+    for i in range(n):
+        size = abs(mu[i])
+        total += math.log(size) if size > 0.0 else -np.inf
+        half = 0.5 * math.log1p(size * size)
+        real = abs(mu[i].imag) <= 1e-12 * size
+        for k in range(2):
+            factor = 1.0 - mu[i] if k == 0 else 1.0 + mu[i]
+            if real and factor.real < 0.0:
+                sign[k] = -sign[k]
+            log[k] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - half
+    if abs(total) < UNDAMPED:
+        return signs
+    for i in range(n):
+        for j in range(i + 1, n):
+            product = mu[i] * mu[j]
+            factor = 1.0 - product
+            size = abs(product)
+            if abs(product.imag) <= 1e-12 * size and factor.real < 0.0:
+                sign[2] = -sign[2]
+            log[2] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - 0.5 * math.log1p(size * size)
+    return signs
 
 
 def scaled(values: list[Value]) -> list[float]:
