@@ -45,7 +45,7 @@ def locate_branch_point(guess: Guess) -> Singular:
         last[:] = [b]
         gx, rates, _ = b.gradient((guess.name,))
         size = state.omega**2
-        extras = [Extra(b.g.real, gx.real, rates[guess.name].real, (0.0,), size)]
+        extras = [Extra.of(b.g.real, gx.real, rates[guess.name].real, (0.0,), size)]
         # w with J w + b (.) = R_name, c . w = 0, in weighted variables
         slope = state.residual_by(guess.name)
         rhs = np.append(slope * b.scale, 0.0)
@@ -55,7 +55,7 @@ def locate_branch_point(guess: Guess) -> Singular:
         value = float(b.left @ slope)
         size = force / guess.span
         by = float((first.rates[guess.name] - second.rates[guess.name]).real)
-        extras.append(Extra(value, (first.x - second.x).real.ravel(), by, (0.0,), size))
+        extras.append(Extra.of(value, (first.x - second.x).real.ravel(), by, (0.0,), size))
         return extras, extra[0] * column, [column]
 
     state, extra, residual, iterations = newton(guess, np.zeros(1), np.ones(1), augmentation)

@@ -127,8 +127,8 @@ class Touch(BifurcationKind):
             gradients = [np.multiply.outer(row, direction).ravel() for row in rows[:2]]
             return (
                 [
-                    Extra(value - level, gradients[0], -rate, (slope,), size),
-                    Extra(slope, gradients[1], 0.0, (curve,), size),
+                    Extra.of(value - level, gradients[0], -rate, (slope,), size),
+                    Extra.of(slope, gradients[1], 0.0, (curve,), size),
                 ],
                 None,
                 [column],

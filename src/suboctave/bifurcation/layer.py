@@ -237,7 +237,7 @@ def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: G
 
     def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
         ahead = float(row @ (_vector(state, guess) - start))
-        return [Extra(ahead, row[:-1], float(row[-1]), (), 1.0)], None, []
+        return [Extra.of(ahead, row[:-1], float(row[-1]), (), 1.0)], None, []
 
     state = found.state
     omega, values = at_values(state.values, guess.name, float(start[-1]), state.omega)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -61,15 +62,24 @@ class Singular:
     iterations: int
 
 
+#: derivatives of a scalar equation by X, by the free parameter and by the extra unknowns
+Slopes = tuple[Array, float, tuple[float, ...]]
+
+
 @dataclass(frozen=True)
 class Extra:
-    """One scalar equation beside R = 0 with its derivatives by X, by the free parameter and by the extra unknowns."""
+    """One scalar equation beside R = 0, its natural size, and its derivatives, which the last iteration does not ask
+    for.
+    """
 
     value: float
-    x: Array
-    parameter: float
-    unknowns: tuple[float, ...]
     size: float
+    slopes: Callable[[], Slopes]
+
+    @classmethod
+    def of(cls, value: float, x: Array, parameter: float, unknowns: tuple[float, ...], size: float) -> Extra:
+        """An equation whose derivatives are known."""
+        return cls(value, size, lambda: (x, parameter, unknowns))
 
 
 #: An augmentation evaluates at a state with extra unknowns and gives the equations, what to add to R, and its columns.
@@ -130,9 +140,10 @@ def newton(
         rhs = np.empty(n + 1 + q)
         rhs[:n] = residual * (rows / force)
         for i, e in enumerate(equations):
-            matrix[n + i, :n] = e.x * scale_x / e.size
-            matrix[n + i, n] = e.parameter * guess.span / e.size
-            for j, value in enumerate(e.unknowns):
+            by_x, by_parameter, by_unknowns = e.slopes()
+            matrix[n + i, :n] = by_x * scale_x / e.size
+            matrix[n + i, n] = by_parameter * guess.span / e.size
+            for j, value in enumerate(by_unknowns):
                 matrix[n + i, n + 1 + j] = value * spans[j] / e.size
             rhs[n + i] = e.value / e.size
         factor = Factor.of(matrix, overwrite=True)
@@ -171,19 +182,21 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
         b = bordered(state, kind, borders, kappa)
         borders = b.vectors
         last[:] = [b]
-        gx, rates, g_kappa = b.gradient((guess.name,))
         size = state.omega**2
-        by = rates[guess.name]
+        gradient = cache(lambda: b.gradient((guess.name,)))
+
+        def real() -> Slopes:
+            gx, rates, g_kappa = gradient()
+            return gx.real, rates[guess.name].real, (g_kappa.real,) if kind is Kind.FREE else ()
+
+        def imaginary() -> Slopes:
+            gx, rates, g_kappa = gradient()
+            return gx.imag, rates[guess.name].imag, (g_kappa.imag,)
+
         if kind is not Kind.FREE:
-            return [Extra(b.g.real, gx.real, by.real, (), size)], None, []
-        return (
-            [
-                Extra(b.g.real, gx.real, by.real, (g_kappa.real,), size),
-                Extra(b.g.imag, gx.imag, by.imag, (g_kappa.imag,), size),
-            ],
-            None,
-            [np.zeros(guess.balance.dimension)],
-        )
+            return [Extra(b.g.real, size, real)], None, []
+        equations = [Extra(b.g.real, size, real), Extra(b.g.imag, size, imaginary)]
+        return equations, None, [np.zeros(guess.balance.dimension)]
 
     start = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(0)
     spans = np.full(len(start), guess.omega / guess.balance.basis.nu)
