@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 
 import suboctave as so
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.model import Element, PolynomialSampling
 from suboctave.stability import FloquetResult, floquet_multipliers
-from suboctave.stability.kernels import propagate, propagate_single
 from suboctave.timedomain import shoot
 
 
@@ -101,65 +99,38 @@ def test_mathieu_through_duffing(delta, epsilon):
     """
     alpha, a, c = 1.0, np.sqrt(epsilon / 1.5), 0.02
     system = so.System(1.0, c, delta - epsilon, elements=[so.CubicSpring(0, alpha)], loads=[so.HarmonicLoad(0, 1.0)])
-    # a motion is given here, not solved for: harmonics that it neglects would be completed
-    balance = HarmonicBalance(system, HarmonicBasis(1))
-    result = floquet_multipliers(exactly(balance, np.array([[0.0], [a], [0.0]]), 1.0))
+    # a motion is given here, not solved for; with nine harmonics its force leaves nothing beyond the basis
+    x = np.zeros((19, 1))
+    x[1] = a
+    result = floquet_multipliers(HarmonicBalance(system, HarmonicBasis(9)).at(x, 1.0))
     difference = paired(result.multipliers, mathieu(delta, epsilon, c) ** 2)
     assert difference.max() < 1e-6 * max(1.0, np.abs(result.multipliers).max())
     assert np.all(difference <= 3 * result.errors + 1e-11)
 
 
-def exactly(balance, x, omega):
-    """The state of a motion that is to be taken as it stands."""
-    state = balance.at(x, omega)
-    state.__dict__["neglected"] = np.zeros_like(state.neglected)
-    return state
-
-
 # ------------------------------------------------------------------------------------------------- kernels
-def test_kernels_agree_on_uncoupled_oscillators():
-    """Two oscillators side by side in the kernel of several DOFs, each also in the closed-form kernel of one DOF."""
-    rng = np.random.default_rng(1)
-    steps = rng.uniform(0.02, 0.3, size=40)
-    k = rng.uniform(-1.0, 400.0, size=(2, 40, 2))
-    c = rng.uniform(0.0, 3.0, size=(2, 40, 2))
-    shapes = np.array([[[1.0, 0.0], [1.0, 0.0]], [[0.0, 1.0], [0.0, 1.0]]])
-    base_k, base_c = np.diag([1.0, 5.0]), np.diag([0.1, 0.2])
-    together = propagate(base_k, base_c, shapes, k, c, steps)
+@pytest.mark.parametrize("regularization", [None, 300.0])
+def test_kernels_agree_on_uncoupled_oscillators(regularization):
+    """Two oscillators side by side have the multipliers of each alone, which another kernel computes."""
+
+    def oscillator(i, dofs):
+        stop = so.ElasticStop(dof=dofs - 1, stiffness=4.0, gap=0.3 * (i + 1), regularization=regularization)
+        spring = so.CubicSpring(dof=dofs - 1, coefficient=0.2 + 0.3 * i)
+        return [stop, spring], so.HarmonicLoad(dof=dofs - 1, amplitude=0.4)
+
+    elements, loads = zip(*(oscillator(i, i + 1) for i in range(2)), strict=True)
+    both = so.System(
+        np.eye(2), np.diag([0.1, 0.2]), np.diag([1.0, 2.0]), [e for pair in elements for e in pair], list(loads)
+    )
+    together = so.frequency_response(both, (2.2, 1.9), 11).orbits[-1]
+    expected = []
     for i in range(2):
-        alone = propagate_single(base_k[i, i] + k[i], base_c[i, i] + c[i], steps)
-        np.testing.assert_allclose(together[i::2, i::2], alone, rtol=1e-11, atol=1e-12 * np.abs(alone).max())
-    assert not together[0::2, 1::2].any()
-
-
-def test_constant_coefficients_are_propagated_exactly():
-    """Steps of any length: the matrix exponential of the whole."""
-    steps = np.array([0.3, 2.0, 0.01])
-    k, c = np.array([[4.0, -1.0], [-0.5, 3.0]]), np.array([[0.2, 0.05], [0.0, 0.1]])
-    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-k, -c]])
-    nothing = np.zeros((0, 3, 2))
-    found = propagate(k, c, np.zeros((0, 2, 2)), nothing, nothing, steps)
-    np.testing.assert_allclose(found, expm(a * steps.sum()), atol=1e-13)
-
-
-@pytest.mark.parametrize("several", [False, True])
-def test_steps_are_of_fourth_order(several):
-    """Halving the steps on a smooth Mathieu equation divides the error by sixteen."""
-    exact = np.sort_complex(mathieu(2.0, 1.0, 0.1))
-
-    def error(count):
-        edges = np.linspace(0.0, np.pi, count + 1)
-        middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-        t = middle[:, None] + half[:, None] * np.array([-1.0, 1.0]) / np.sqrt(3.0)
-        k = 2.0 + np.cos(2 * t)
-        if several:
-            one = np.ones((1, 2, 1))
-            phi = propagate(np.zeros((1, 1)), np.array([[0.1]]), one, k[None], np.zeros((1, count, 2)), 2 * half)
-        else:
-            phi = propagate_single(k, np.full_like(k, 0.1), 2 * half)
-        return np.abs(np.sort_complex(np.linalg.eigvals(phi)) - exact).max()
-
-    assert 12 < error(16) / error(32) < 20
+        parts, load = oscillator(i, 1)
+        alone = so.System(1.0, 0.1 * (i + 1), 1.0 + i, parts, [load])
+        orbit = so.frequency_response(alone, (2.2, 1.9), 11).orbits[-1]
+        np.testing.assert_allclose(orbit.coefficients[:, 0], together.coefficients[:, i], atol=1e-9)
+        expected += list(so.stability(orbit).multipliers)
+    assert paired(np.array(expected), so.stability(together).multipliers).max() < 1e-7
 
 
 # --------------------------------------------------------------------------------------------- identities

@@ -23,7 +23,7 @@ from suboctave.stability.panels import NODES, closed_changes, lay_out
 
 #: a law that tells nothing of itself and needs this many samples per period is smooth over one radian
 _BLIND = 48.0
-_NONE = np.zeros(0)
+_NO_PIECES, _NO_POINTS = np.zeros((0, 3)), np.zeros((0, 2))
 
 
 class Linearisation:
@@ -53,7 +53,7 @@ class Linearisation:
         degree, finest = max(0, self._laws.polynomial.shape[1] - 2), math.inf
         self.blind = False
         for law in laws:
-            if law.sharp:
+            if law.sharp or len(law.smooth_steps):
                 degree = max(degree, 1)
             for i, _ in law.uniform:
                 degree = max(degree, law.degree - 1, 1)
@@ -97,11 +97,13 @@ class Linearisation:
         kick: Array
         law, kick = closed_changes(
             self.path,
+            self.law,
             change,
             self.state.rate,
             laws.pieces,
-            laws.counts,
             laws.polynomial,
+            laws.steps,
+            laws.counts,
             self._events,
             self._start,
             len(self.stretch),
@@ -128,26 +130,32 @@ class _Laws(NamedTuple):
 
     pieces: Array
     polynomial: Array
-    points: Array
-    widths: Array
+    steps: Array
+    line: Array
+    singular: Array
     counts: NDArray[np.int64]
 
 
 def _gathered(laws: list[GroupLaw]) -> _Laws:
-    counts = np.array([[len(law.pieces), len(law.points)] for law in laws], dtype=np.int64).reshape(-1, 2)
+    counts = np.array([[len(law.pieces), len(law.smooth_steps), len(law.points)] for law in laws], dtype=np.int64)
+    counts = counts.reshape(-1, 3)
+    singular = [np.stack((law.points, law.widths), axis=1) for law in laws if len(law.points)]
+    where = np.concatenate(singular) if singular else _NO_POINTS
     if len(laws) == 1:
         law = laws[0]
-        return _Laws(law.pieces, law.polynomial[None], law.points, law.widths, counts)
+        return _Laws(law.pieces, law.polynomial[None], law.smooth_steps, law.line[None], where, counts)
     polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
+    line = np.zeros((len(laws), 2))
     for g, law in enumerate(laws):
         polynomial[g, : len(law.polynomial)] = law.polynomial
+        line[g] = law.line
     pieces = [law.pieces for law in laws if len(law.pieces)]
-    points = [law.points for law in laws if len(law.points)]
-    widths = [law.widths for law in laws if len(law.points)]
+    steps = [law.smooth_steps for law in laws if len(law.smooth_steps)]
     return _Laws(
-        np.concatenate(pieces) if pieces else np.zeros((0, 3)),
+        np.concatenate(pieces) if pieces else _NO_PIECES,
         polynomial,
-        np.concatenate(points) if points else _NONE,
-        np.concatenate(widths) if widths else _NONE,
+        np.concatenate(steps) if steps else _NO_PIECES,
+        line,
+        where,
         counts,
     )

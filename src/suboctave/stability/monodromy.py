@@ -4,15 +4,19 @@ The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 
 panels that follow the laws (`panels`), by kernels for one (`single`) and for several DOFs (`several`).
 
 A motion of H harmonics is not quite the true one: it leaves the force `r = sum d (f - P_H f)` unbalanced, P_H f the
-part of the element forces within the basis. One step of Newton's method in the space of periodic functions
-(Kantorovich),
+part of the element forces within the basis. One step of Newton's method among periodic functions (Kantorovich),
 
-    M d'' + (C + sum f_v d d^T) d' + (K + sum f_u d d^T) d = -r,   d periodic,
+    M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = -r,   y periodic,
 
 whose propagator is at hand, gives what the motion lacks: harmonics beyond H without end, and the shift that they cause
-in those within. The multipliers are those of the motion so corrected; the distance between theirs and those of the
-motion as it stands, propagated with coarser steps, is their error estimate. It bounds what remains: an error of the
-second order.
+in those within. The multipliers are those of the motion so corrected, with an error of second order. How far they are
+from those of the motion as it stands, propagated with fewer digits, is their error estimate: it covers what is left
+many times over, and it also covers how far other discretisations of the motion, such as Hill's determinant, may differ.
+
+At a limit point there is no such step: a motion of the same frequency is far away, or there is none. What the step
+moves along the direction of the multiplier near +1 is then left out, and belongs to the error: with the gap
+`g = 1 - mu` and the shift D of the multiplier to first order, the motions near a fold leave `g^2 - 2 g D` for the
+square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 """
 
 from __future__ import annotations
@@ -22,78 +26,129 @@ import math
 import numpy as np
 from scipy.linalg import lapack
 
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState
 from suboctave.stability.linearisation import Linearisation
 from suboctave.stability.panels import NODES
 from suboctave.stability.result import FloquetResult
-from suboctave.stability.several import POWERS, corrected_several, perturbed, standing_several, weighted
-from suboctave.stability.single import BETWEEN, STEPS, corrected, standing
+from suboctave.stability.several import (
+    POWERS,
+    corrected_several,
+    perturbed,
+    projector,
+    standing_several,
+    weighted,
+)
+from suboctave.stability.single import BETWEEN, STEPS, corrected_single, standing_single
 
 #: a correction larger than this share of the motion is cut down to it
 _LARGEST = 0.1
-#: a correction is taken as it is where its effect stays below this share of what it may be
-_MODEST = 0.1
+#: least error where stiffness or damping varies: what the panels are made for
+_PANELS = 1e-8
+#: shift of a multiplier in units of its distance to +1 that leaves doubt whether the first order tells it
+_DOUBTFUL = 0.1
 
 __all__ = ["FloquetResult", "floquet_multipliers"]
 
 
-def floquet_multipliers(state: BalanceState) -> FloquetResult:
-    """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
+def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetResult:
+    """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods).
+
+    corrected
+        False: along the motion as it stands, as if it were exact; errors are then those of the propagation alone.
+    """
     along = Linearisation(state)
+    if not corrected:
+        along.law[:, 0] = 0.0
     mass, damping, stiffness = state.linear.equation_of_motion()
-    if len(mass) == 1:
-        return _single(along, mass[0, 0], damping[0, 0], stiffness[0, 0])
-    return _several(along, mass, damping, stiffness)
+    parts = (mass, damping, stiffness)
+    motion = _Single(along, *parts) if len(mass) == 1 else _Several(along, *parts)
+    mu, shift, share = motion.multipliers(1.0)
+    largest = max(1.0, abs(mu[0]))
+    nearest = min(range(len(mu)), key=lambda i: abs(1.0 - mu[i]))
+    moved = shift[nearest] / share if share > 0.0 else math.inf
+    if moved > _DOUBTFUL * abs(1.0 - mu[nearest]):
+        mu, shift, share = _beside_fold(motion, moved, shift)
+    # where the correction had to be cut, the motion is not near enough to a true one to say much
+    cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
+    least = (_PANELS if along.varying else 0.0) + cut
+    return FloquetResult(mu, shift * (1.0 + cut) + least * largest)
 
 
-def _single(along: Linearisation, mass: float, damping: float, stiffness: float) -> FloquetResult:
+def _beside_fold(motion: _Single | _Several, moved: float, shift: Array) -> tuple[ComplexArray, Array, float]:
+    """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
+
+    moved: shift of the multiplier nearest to +1 by the whole correction.
+    """
+    gap = motion.gap()
+    ratio = 2.0 * moved / gap if gap > 0.0 else math.inf
+    mu, kept, share = motion.multipliers(1.0 / (1.0 + min(ratio, 1e6) ** 4))
+    left_out = moved * min(1.0, 2.0 / math.sqrt(ratio)) if math.isfinite(moved) else math.inf
+    return mu, kept + 2.0 * left_out, share
+
+
+class _Single:
     """One degree of freedom: the multipliers are the roots of `mu^2 - trace mu + exp(-int c dt)`."""
-    linear, scale = along.state.linear, 1.0 / along.state.rate
-    shape = np.array([linear.expand(direction)[0] for direction in along.directions])
-    matrices = (mass, damping, stiffness)
-    trace, decay, change, _ = standing(
-        along.stretch,
-        scale,
-        along.path,
-        along.law,
-        along.base,
-        along.moving,
-        shape,
-        matrices,
-        STEPS,
-        BETWEEN,
-        NODES,
-        _LARGEST,
-    )
-    before = _roots(trace, decay)
-    law, kick = along.changed(change)
-    after = _roots(*corrected(along.stretch, scale, law, along.base, kick, along.moving, shape, matrices, STEPS))
-    shift = [abs(a - b) for a, b in zip(after, before, strict=True)]
-    return FloquetResult(np.array(after, dtype=complex), np.array(shift))
+
+    def __init__(self, along: Linearisation, mass: Array, damping: Array, stiffness: Array) -> None:
+        self.along = along
+        linear = along.state.linear
+        self.shape = np.array([linear.expand(direction)[0] for direction in along.directions], dtype=float)
+        self.scale = 1.0 / along.state.rate
+        self.matrices = (mass[0, 0], damping[0, 0], stiffness[0, 0])
+        self.before: np.ndarray = np.zeros(0)
+
+    def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
+        """Multipliers, how far the correction has moved them, and the share of it that was taken.
+
+        weight: share of its part along the direction of the real multiplier nearest to +1.
+        """
+        along = self.along
+        about = (along.moving, self.shape, self.matrices, STEPS)
+        before, change, share = standing_single(
+            along.stretch, self.scale, along.path, along.law, along.base, *about, BETWEEN, NODES, _LARGEST, weight
+        )
+        self.before = before
+        law, kick = along.changed(change)
+        mu, shift = corrected_single(along.stretch, self.scale, law, along.base, kick, *about, before)
+        return mu, shift, share
+
+    def gap(self) -> float:
+        """Distance to +1 of the nearest multiplier of the motion as it stands."""
+        return float(np.abs(1.0 - self.before).min())
 
 
-def _roots(trace: float, decay: float) -> tuple[complex, complex]:
-    """Roots of `mu^2 - trace mu + exp(-decay)`, the larger one first."""
-    product = math.exp(-decay)
-    square = 0.25 * trace * trace - product
-    if square < 0.0:
-        part = math.sqrt(-square)
-        return complex(0.5 * trace, part), complex(0.5 * trace, -part)
-    larger = 0.5 * trace + math.copysign(math.sqrt(square), trace)
-    return larger, product / larger if larger != 0.0 else 0.0
-
-
-def _several(along: Linearisation, mass: Array, damping: Array, stiffness: Array) -> FloquetResult:
+class _Several:
     """Several degrees of freedom."""
-    n, linear, scale = len(mass), along.state.linear, 1.0 / along.state.rate
-    shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
-    matrices = weighted(mass, damping, stiffness, shapes)
-    about = (along.moving, along.varying, matrices, POWERS, NODES)
-    before, change, _, alone = standing_several(
-        along.stretch, scale, along.path, along.law, along.base, *about, _LARGEST
-    )
-    law, kick = along.changed(change)
-    after = corrected_several(along.stretch, scale, law, along.base, kick, *about, alone)
-    real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
-    return FloquetResult(*perturbed(real, imaginary, left, right, after, after - before))
+
+    def __init__(self, along: Linearisation, mass: Array, damping: Array, stiffness: Array) -> None:
+        self.along = along
+        n, linear = len(mass), along.state.linear
+        shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
+        self.about = (along.moving, along.varying, weighted(mass, damping, stiffness, shapes), POWERS, NODES)
+        self.scale = 1.0 / along.state.rate
+        self.before: Array = np.zeros((0, 0))
+
+    def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
+        """See `_Single.multipliers`."""
+        along, about = self.along, self.about
+        without = np.zeros((0, 0)) if weight == 1.0 else (1.0 - weight) * projector(*_vectors(self.before))
+        before, change, share, alone = standing_several(
+            along.stretch, self.scale, along.path, along.law, along.base, *about, _LARGEST, without
+        )
+        self.before = before
+        law, kick = along.changed(change)
+        after = corrected_several(along.stretch, self.scale, law, along.base, kick, *about, alone)
+        mu, shift = perturbed(*_vectors(after), after, after - before)
+        return mu, shift, share
+
+    def gap(self) -> float:
+        """Distance to +1 of the nearest multiplier of the motion as it stands."""
+        real, imaginary, *_ = _vectors(self.before)
+        return float(np.hypot(1.0 - real, imaginary).min())
+
+
+def _vectors(matrix: Array) -> tuple[Array, Array, Array, Array]:
+    """Eigenvalues (real and imaginary parts) and left and right vectors as LAPACK returns them."""
+    real, imaginary, left, right, _ = lapack.dgeev(matrix, 1, 1)
+    return real, imaginary, left, right

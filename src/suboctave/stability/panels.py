@@ -28,7 +28,7 @@ _NEAR, _FAR = 3.0, 4.5
 #: how close to a singularity panels are as long as elsewhere, in units of their length
 _CLEAR = 0.25
 #: longest panel in tau: phase of the highest harmonic of the tangent, and of the highest harmonic of the motion
-_TANGENT, _MOTION = 7.0, 9.0
+_TANGENT, _MOTION = 7.0, 5.5
 #: harmonics of less than this share of the largest do not count for the former
 _RELEVANT = 1e-3
 #: extrema that miss a gap by less than this share of the motion are kept in sight: the true motion may touch it
@@ -69,7 +69,7 @@ def _note(row, tau, depth, slope, bend, miss, piece):
 
 
 @njit(cache=True)
-def _events(c, pieces, owner, points, widths, singular, zr, zi, reach):
+def _events(c, pieces, owner, where, where_owner, zr, zi, reach):
     """What happens along the motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
 
     A crossing of the gap of a piece has infinite depth; an extremum that falls short of it is kept with the distance
@@ -117,9 +117,9 @@ def _events(c, pieces, owner, points, widths, singular, zr, zi, reach):
                 _note(found[count], tau, np.inf, 0.0, s, x - gap, q)
                 count += 1
     for g in range(c.shape[0]):
-        own = singular == g
+        own = where_owner == g
         if own.any():
-            passed = singular_instants(c[g], points[own], widths[own], reach, zr, zi)
+            passed = singular_instants(c[g], where[own, 0], where[own, 1], reach, zr, zi)
             while count + passed.shape[1] > found.shape[0]:
                 found = np.concatenate((found, np.empty_like(found)))
             for i in range(passed.shape[1]):
@@ -279,7 +279,7 @@ def _longest(c, degree):
 
 
 @njit(cache=True)
-def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, finest, zr, zi, nodes):
+def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degree, finest, zr, zi, nodes):
     """Panels along a motion, the motion at their nodes, and the laws that are known in closed form.
 
     Parameters
@@ -292,10 +292,13 @@ def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, fine
         Stiffness, gap, side of the pieces of piecewise-linear laws (Q, 3), direction by direction.
     polynomial
         Coefficients of u^0, u^1, ... along every direction (G, D).
-    points, widths
-        Where the sharp laws are singular, `u = points +- i widths` (S,), direction by direction.
+    steps, line
+        Gap, width, stiffness of arctan steps (S, 3), direction by direction; constant and slope of the laws that they
+        belong to (G, 2).
+    singular
+        Where other sharp laws are singular: point, width (R, 2), direction by direction.
     counts
-        How many pieces and points every direction has, (G, 2).
+        How many pieces, steps, singularities every direction has, (G, 3).
     degree
         Of the tangents as polynomials in the motion, 0 if they are constant between events.
     finest
@@ -312,8 +315,8 @@ def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, fine
     path
         u, du/dt at the nodes, (G, 2, N), N = P (m - 1) + 1.
     law
-        Force less its harmonics within the basis, stiffness, damping at the nodes (G, 3, N), the stiffness without that
-        of the pieces.
+        Force less its harmonics within the basis, stiffness, damping at the nodes, and the part of the stiffness due to
+        steps, (G, 4, N); the stiffness without that of the pieces.
     base
         Stiffness of the pieces on every panel, (G, P).
     events, start
@@ -321,10 +324,12 @@ def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, fine
     """
     groups = c.shape[0]
     owner = np.repeat(np.arange(groups), counts[:, 0])
-    singular = np.repeat(np.arange(groups), counts[:, 1])
+    step_owner = np.repeat(np.arange(groups), counts[:, 1])
+    where = np.concatenate((steps[:, :2], singular))
+    where_owner = np.concatenate((step_owner, np.repeat(np.arange(groups), counts[:, 2])))
     longest = min(_longest(c, degree), finest)
     # singularities further away than this do not disturb a panel
-    events = _events(c, pieces, owner, points, widths, singular, zr, zi, longest)
+    events = _events(c, pieces, owner, where, where_owner, zr, zi, longest)
     panels, start = _panels(events, longest)
     count = panels.shape[0]
     m = nodes.shape[0]
@@ -346,13 +351,28 @@ def lay_out(c, f, rate, pieces, polynomial, points, widths, counts, degree, fine
                 tau[at + j] = panels[p, 2] + 0.5 * depth * (e - 1.0 / e)
                 stretch[p, j] = 0.5 * depth * (e + 1.0 / e) * half
     path = np.empty((groups, 2, total))
-    law = np.zeros((groups, 3, total))
+    law = np.zeros((groups, 4, total))
     base = np.zeros((groups, count))
     cos = np.cos(tau)
     sin = np.sin(tau)
     for g in range(groups):
         _series(c[g], f[g], cos, sin, rate, path[g, 0], path[g, 1], law[g, 0])
         add_polynomial(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
+        for j in range(total):
+            law[g, 0, j] += line[g, 0] + line[g, 1] * path[g, 0, j]
+            law[g, 3, j] = line[g, 1]
+    for s in range(steps.shape[0]):
+        g = step_owner[s]
+        point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
+        for j in range(total):
+            y = path[g, 0, j] - point
+            ratio = y / width
+            angle = math.atan(ratio)
+            law[g, 0, j] += k * (y * angle - 0.5 * width * math.log1p(ratio * ratio))
+            law[g, 3, j] += k * angle
+    for g in range(groups):
+        for j in range(total):
+            law[g, 1, j] += law[g, 3, j]
     for q in range(pieces.shape[0]):
         g = owner[q]
         k, gap, right = pieces[q, 0], pieces[q, 1], pieces[q, 2] > 0.0
@@ -382,23 +402,33 @@ def add_polynomial(coefficients, u, force, stiffness):
 
 
 @njit(cache=True)
-def closed_changes(path, change, rate, pieces, counts, polynomial, events, start, panels):
+def closed_changes(path, law, change, rate, pieces, polynomial, steps, counts, events, start, panels):
     """The laws known in closed form along the motion changed by `change` (G, 2, N).
 
-    Returns stiffness and damping of the polynomials at the old nodes (G, 2, N), and the impulses `-kick y` at the
-    beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing moves by `t = -d / u'` (a
-    root of the parabola where the motion grazes), and a slice of stiffness k that is as thin is an impulse k t.
+    path, law: see `lay_out`. Returns stiffness and damping at the old nodes (G, 2, N), polynomials as they are there,
+    steps to first order (panels are graded towards the old passages; where the change exceeds a step's width, the new
+    ones lie between the nodes, and the linear form has the right integral all the same), and the impulses `-kick y` at
+    the beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing moves by `t = -d / u'`
+    (a root of the parabola where the motion grazes), and a slice of stiffness k that is as thin is an impulse k t.
     """
     groups, _, total = path.shape
     owner = np.repeat(np.arange(groups), counts[:, 0])
-    law = np.zeros((groups, 2, total))
+    out = np.zeros((groups, 2, total))
     kick = np.zeros((groups, panels))
     idle = np.empty(total)
     for g in range(groups):
         if polynomial.shape[1] > 2:
-            add_polynomial(polynomial[g], path[g, 0] + change[g, 0], idle, law[g, 0])
+            add_polynomial(polynomial[g], path[g, 0] + change[g, 0], idle, out[g, 0])
         elif polynomial.shape[1] == 2:
-            law[g, 0] += polynomial[g, 1]
+            out[g, 0] += polynomial[g, 1]
+        out[g, 0] += law[g, 3]
+    step_owner = np.repeat(np.arange(groups), counts[:, 1])
+    for s in range(steps.shape[0]):
+        g = step_owner[s]
+        point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
+        for j in range(total):
+            ratio = (path[g, 0, j] - point) / width
+            out[g, 0, j] += k / (width * (1.0 + ratio * ratio)) * change[g, 0, j]
     m = (total - 1) // panels
     for i in range(events.shape[0]):
         q = int(events[i, 5])
@@ -426,4 +456,4 @@ def closed_changes(path, change, rate, pieces, counts, polynomial, events, start
             shift = -slope / bend
         # a contact that begins later is missing for a while
         kick[g, p] += -k * shift if (events[i, 2] > 0.0) == right else k * shift
-    return law, kick
+    return out, kick

@@ -461,11 +461,12 @@ def weighted(mass, damping, stiffness, shapes):
 
 
 @njit(cache=True)
-def standing_several(stretch, scale, path, law, base, moving, varying, matrices, powers, nodes, share):
+def standing_several(stretch, scale, path, law, base, moving, varying, matrices, powers, nodes, share, without):
     """Along the motion as it stands: monodromy matrix (2 n, 2 n) and the correction that the motion needs.
 
     path, law, base: see `panels.lay_out`; matrices: `weighted`; share: a correction larger than this share of the
-    motion is cut down to it. Polynomials are of lower degree than in `corrected_several`. Returns also the correction
+    motion is cut down to it; without (2 n, 2 n) or (0, 0): a part of the state that it begins with is left out.
+    Polynomials are of lower degree than in `corrected_several`. Returns also the correction
     along the directions (G, 2, N), the factor by which it was cut, and the propagators of all panels (P, 2 n, ...).
     """
     stiffness, damping, left, right = matrices
@@ -482,7 +483,10 @@ def standing_several(stretch, scale, path, law, base, moving, varying, matrices,
     factor = 1.0
     change = np.zeros(path.shape)
     if groups > 0:
-        found = _respond(_solved(np.eye(size) - phi, total[:, size].copy()), alone, rows)
+        start = _solved(np.eye(size) - phi, total[:, size].copy())
+        if without.shape[0] > 0:
+            start -= without @ start
+        found = _respond(start, alone, rows)
         for g in range(groups):
             most = share * np.abs(path[g, 0]).max()
             largest = np.abs(found[g, 0]).max()
@@ -556,3 +560,23 @@ def perturbed(real, imaginary, left, right, phi, change):
         shift[j] = min(shift[j], math.sqrt(norm * most)) + 1e-14
     order = np.argsort(-np.abs(mu), kind="mergesort")
     return mu[order], shift[order]
+
+
+@njit(cache=True)
+def projector(real, imaginary, left, right):
+    """On the direction of the real multiplier nearest to +1, (N, N); zero if there is none or it is a double one."""
+    n = real.shape[0]
+    out = np.zeros((n, n))
+    found = -1
+    for j in range(n):
+        if imaginary[j] == 0.0 and (found < 0 or abs(1.0 - real[j]) < abs(1.0 - real[found])):
+            found = j
+    if found >= 0:
+        scale = 0.0
+        for i in range(n):
+            scale += left[i, found] * right[i, found]
+        if abs(scale) > 1e-10:
+            for i in range(n):
+                for j in range(n):
+                    out[i, j] = right[i, found] * left[j, found] / scale
+    return out

@@ -221,10 +221,11 @@ def _monodromy(stretch, scale, base, k, damping, c, kick, tables, fine):
 
 
 @njit(cache=True, fastmath=_FAST)
-def _respond(stretch, scale, base, k, damping, c, force, between, nodes):
+def _respond(stretch, scale, base, k, damping, c, force, between, nodes, weight):
     """The periodic solution of `d'' + c d' + k d = -force` at the nodes, d and d' (2, N), and the largest |d|.
 
-    Magnus steps of order four from node to node: the force is known no better.
+    Of its part along the direction of the real multiplier nearest to +1 only the share `weight` is kept. Magnus steps
+    of order four from node to node: the force is known no better.
     """
     count = stretch.shape[0]
     m = ORDER
@@ -302,6 +303,15 @@ def _respond(stretch, scale, base, k, damping, c, force, between, nodes):
     det = (1.0 - p11) * (1.0 - p22) - p12 * p21
     d = ((1.0 - p22) * e1 + p12 * e2) / det if det != 0.0 else np.inf
     v = (p21 * e1 + (1.0 - p11) * e2) / det if det != 0.0 else np.inf
+    square = 0.25 * (p11 - p22) ** 2 + p12 * p21
+    if weight < 1.0 and square > 0.0:
+        # (Phi - other) / (near - other) projects on the direction of the real multiplier nearest to +1
+        part = math.copysign(math.sqrt(square), 1.0 - 0.5 * (p11 + p22))
+        other = 0.5 * (p11 + p22) - part
+        a = (p11 - other) * d + p12 * v
+        b = p21 * d + (p22 - other) * v
+        d -= (1.0 - weight) * a / (2.0 * part)
+        v -= (1.0 - weight) * b / (2.0 * part)
     largest = abs(d)
     out[0, 0] = d
     out[1, 0] = v
@@ -325,12 +335,29 @@ def _weighted(weights, parts):
 
 
 @njit(cache=True)
-def standing(stretch, scale, path, law, base, moving, shape, matrices, tables, between, nodes, share):
-    """Along the motion as it stands: trace of the monodromy matrix, `int c dt`, and the correction that it needs.
+def roots(trace, decay):
+    """Roots of `mu^2 - trace mu + exp(-decay)`, the larger one first."""
+    out = np.empty(2, dtype=np.complex128)
+    product = math.exp(-decay)
+    square = 0.25 * trace * trace - product
+    if square < 0.0:
+        out[0] = complex(0.5 * trace, math.sqrt(-square))
+        out[1] = out[0].conjugate()
+    else:
+        # the smaller one from the product, with all its digits
+        larger = 0.5 * trace + math.copysign(math.sqrt(square), trace)
+        out[0] = larger
+        out[1] = product / larger if larger != 0.0 else 0.0
+    return out
 
-    path, law, base: see `panels.lay_out`; shape (G,): the directions; matrices: mass, damping, stiffness; share: a
-    correction larger than this share of the motion is cut down to it. Returns also the correction along the directions
-    (G, 2, N) and the factor by which it was cut.
+
+@njit(cache=True)
+def standing_single(stretch, scale, path, law, base, moving, shape, matrices, tables, between, nodes, largest, weight):
+    """Along the motion as it stands: multipliers (2,), and the correction that it needs.
+
+    path, law, base: see `panels.lay_out`; shape (G,): the directions; matrices: mass, damping, stiffness; largest: a
+    correction larger than this share of the motion is cut down to it; weight: see `_respond`. Returns also the
+    correction along the directions (G, 2, N) and the factor by which it was cut. Few digits.
     """
     mass, damping, stiffness = matrices
     square = shape * shape / mass
@@ -343,25 +370,36 @@ def standing(stretch, scale, path, law, base, moving, shape, matrices, tables, b
     change = np.zeros(path.shape)
     factor = 1.0
     if path.shape[0] > 0:
-        found, largest = _respond(stretch, scale, whole, k, damping / mass, c, force, between, nodes)
-        most = share * np.abs(path[0, 0]).max() / abs(shape[0])
-        if not largest <= most:
-            factor = most / largest if largest < np.inf else 0.0
+        found, size = _respond(stretch, scale, whole, k, damping / mass, c, force, between, nodes, weight)
+        most = largest * np.abs(path[0, 0]).max() / abs(shape[0])
+        if not size <= most:
+            factor = most / size if size < np.inf else 0.0
         if factor > 0.0:
             for g in range(path.shape[0]):
                 change[g] = factor * shape[g] * found
-    return trace, decay, change, factor
+    return roots(trace, decay), change, factor
 
 
 @njit(cache=True)
-def corrected(stretch, scale, law, base, kick, moving, shape, matrices, tables):
-    """Along the corrected motion: trace of the monodromy matrix and `int c dt`.
+def corrected_single(stretch, scale, law, base, kick, moving, shape, matrices, tables, before):
+    """Along the corrected motion: multipliers (2,), and their distances from those of the motion as it stands.
 
-    law (G, 2, N), kick (G, P): see `panels.closed_changes`; all else as in `standing`.
+    law (G, 2, N), kick (G, P): see `panels.closed_changes`; before: the multipliers of `standing_single`.
     """
     mass, damping, stiffness = matrices
     square = shape * shape / mass
     whole = _weighted(square, base) + stiffness / mass
     c = _weighted(square, law[:, 1]) if moving else np.zeros(0)
     kicks = _weighted(square, kick)
-    return _monodromy(stretch, scale, whole, _weighted(square, law[:, 0]), damping / mass, c, kicks, tables, True)
+    trace, decay = _monodromy(
+        stretch, scale, whole, _weighted(square, law[:, 0]), damping / mass, c, kicks, tables, True
+    )
+    mu = roots(trace, decay)
+    shift = np.abs(mu - before)
+    # rounding: of the trace, and of a double multiplier like its root
+    error = 1e-14 * (1.0 + abs(trace))
+    apart = abs(mu[0] - mu[1])
+    for i in range(2):
+        first = error * abs(mu[i]) / apart if apart > 0.0 else np.inf
+        shift[i] += min(math.sqrt(error), first) + 1e-15
+    return mu, shift
