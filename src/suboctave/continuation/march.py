@@ -323,10 +323,10 @@ class March:
         """The start point again, if the step from `point` to `new` passes it in the same direction."""
         w = new.weights
         step = kernels.distance(new.u, point.u, w)
-        # all that stand for the same solution share the parameter
-        if abs(new.parameter - first.parameter) * w[new.curve.parameter] > 1.5 * step:
-            return None
+        index = new.curve.parameter
         images = new.curve.images(new.curve.transfer(first.u, first.curve))
+        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
+            return None
         heading = new.curve.transfer(first.tangent, first.curve)
         for image, leaving in zip(images, new.curve.images(heading), strict=True):
             from_point, to_new = w * (image - point.u), w * (new.u - image)
