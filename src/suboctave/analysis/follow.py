@@ -33,7 +33,7 @@ from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
 from suboctave.harmonic.state import BalanceState
-from suboctave.stability import floquet_multipliers
+from suboctave.stability import StabilityMethod, floquet_multipliers
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
@@ -53,6 +53,7 @@ class Settings:
 
     newton: NewtonOptions
     stepping: SteppingOptions
+    stability: StabilityMethod
     events: Sequence[Event] = ()
     observe: int = 0
     report: Callable[[float, str], None] | None = None
@@ -136,7 +137,7 @@ class _Follower:
         if candidate is not None and candidate.point is point:
             return candidate
         assert isinstance(point.evaluation, ResponseEvaluation)
-        return Sample(point, point.evaluation.state)
+        return Sample(point, point.evaluation.state, self.settings.stability)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at."""

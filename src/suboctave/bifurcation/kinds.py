@@ -30,7 +30,9 @@ from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
-from suboctave.stability import FloquetResult, floquet_multipliers
+from suboctave.stability import FloquetResult, Monodromy, StabilityMethod
+
+_MONODROMY = Monodromy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +41,12 @@ class Sample:
 
     point: CurvePoint
     state: BalanceState
+    method: StabilityMethod = _MONODROMY
 
     @cached_property
     def floquet(self) -> FloquetResult:
         """Multipliers and their errors."""
-        return floquet_multipliers(self.state)
+        return self.method.along(self.state)
 
     @cached_property
     def half_sign(self) -> float:
