@@ -103,13 +103,15 @@ def newton(
     Raises
     ------
     ConvergenceError
-        If the iteration leaves the neighbourhood of the guess or does not converge.
+        If the iteration leaves the neighbourhood of the guess or does not converge. An iteration that stands still with
+        a residual that rounding of its unknowns explains has converged.
     """
     balance, n = guess.balance, guess.balance.dimension
     x, parameter, extra = guess.x.ravel().copy(), guess.parameter, unknowns.astype(float).copy()
     weight = np.tile(balance.scales()[0], balance.basis.size)
     rows = residual_scale(guess.state())
     previous = np.inf
+    nearest: tuple[BalanceState, Array, float, int] | None = None
     for iteration in range(iterations + 1):
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
@@ -146,6 +148,11 @@ def newton(
             for j, value in enumerate(by_unknowns):
                 matrix[n + i, n + 1 + j] = value * spans[j] / e.size
             rhs[n + i] = e.value / e.size
+        if previous <= _STEP and (nearest is None or error < nearest[2]):
+            # right behind a grazing the equations are so steep that the last digit of an unknown is more than tolerated
+            unavoidable = np.finfo(float).eps * float(np.abs(matrix).sum(axis=1).max())
+            if error <= unavoidable:
+                nearest = state, extra.copy(), error, iteration
         factor = Factor.of(matrix, overwrite=True)
         if factor.singular:
             raise ConvergenceError("the bordered system is singular")
@@ -162,6 +169,8 @@ def newton(
         if length <= 1e-12 and error <= _TOLERANCE:
             return state, extra, error, iteration
         previous = length
+    if nearest is not None:
+        return nearest
     raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
 
 

@@ -19,7 +19,8 @@ from suboctave.harmonic.group_force import GroupLaw
 from suboctave.harmonic.quadrature import FEWEST, search_grid
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.sampling import AdaptiveSampling
-from suboctave.stability.panels import NODES, closed_changes, lay_out
+from suboctave.stability.nodes import NODES
+from suboctave.stability.panels import closed_changes, lay_out
 
 #: a law that tells nothing of itself and needs this many samples per period is smooth over one radian
 _BLIND = 48.0

@@ -11,9 +11,9 @@ Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, 
 `multiplier_errors`, `stability_method`, `parameters` (point x parameter). A free parameter other than omega is a
 coordinate under its own name as well, unless the layout already uses that name. Variables on `event` carry the prefix
 `event_`; `event_after` is the index of the point after which the event lies, so that the curve with its events is one
-line: point `i`, the events with `event_after == i` in their order, point `i + 1`. `event_contact` names the contact that
-grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which it
-does.
+line: point `i`, the events with `event_after == i` in their order, point `i + 1`. `event_contact` names the contact
+that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which
+it does.
 """
 
 from __future__ import annotations
