@@ -58,9 +58,12 @@ BRANCH_POINT = next(kind for kind in ALL_KINDS if kind.name == "BP")
 
 @dataclass
 class Passage:
-    """An examined step: the samples that separate its events, its end included, and what stayed in doubt."""
+    """An examined step: the samples that separate its events, its end included, all that were looked at, both ends
+    included, and what stayed in doubt.
+    """
 
     samples: list[Sample]
+    inside: list[Sample]
     unsettled: list[Unsettled] = field(default_factory=list)
 
 
@@ -108,7 +111,7 @@ class StepGuard:
         for interval in step.settled:
             self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
         self._behind = step.samples[-4:]
-        return Passage(_separating(step.inside), step.unsettled)
+        return Passage(_separating(step.inside), step.inside, step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""

@@ -39,6 +39,11 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     events = [_at_event(item, method) for item in trace.events]
     open_ones = [i for i, p in enumerate(points) if not p.floquet.decided and not _expected(i, points, bifurcations)]
     unsettled, notes = _stretches(points, open_ones, name)
+    for probe in trace.open:
+        stretch = _between(probe, points, bifurcations, name)
+        if stretch is not None and not any(_within(stretch, known) for known in (*trace.audit.unsettled, *unsettled)):
+            unsettled.append(stretch)
+            notes.append(f"{stretch}; more harmonics may settle it")
     notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]
     notes += _replaced(points, method, name)
     in_order = sorted((*trace.audit.unsettled, *unsettled), key=lambda stretch: stretch.arclength)
@@ -119,8 +124,13 @@ _CRITICAL = {"LP": 1, "BP": 1, "PD": 1, "NS": 2}
 
 def _expected(i: int, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]) -> bool:
     """Whether bifurcations located beside a point are why its verdict is open."""
-    result = points[i].floquet
-    first, last = points[max(i - 1, 0)].arclength, points[min(i + 1, len(points) - 1)].arclength
+    reach = points[max(i - 1, 0)].arclength, points[min(i + 1, len(points) - 1)].arclength
+    return _explained(points[i].floquet, reach, bifurcations)
+
+
+def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: Sequence[Bifurcation]) -> bool:
+    """Whether a bifurcation within a range of arclength is why a multiplier lies within its error of the circle."""
+    first, last = reach
     near = {item.kind for item in bifurcations if first <= item.arclength <= last}
     within = _open(result)
     mu, errors = result.multipliers[within], result.errors[within]
@@ -175,6 +185,34 @@ def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str)
         f"{', '.join(ranges)}: multipliers of the monodromy matrix there. The first time: "
         f"{points[places[0]].floquet.note}"
     ]
+
+
+def _between(
+    probe: BranchPoint, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation], name: str
+) -> Unsettled | None:
+    """The step in which a multiplier comes within its error of the circle, unless a located bifurcation is why."""
+    result = probe.floquet
+    if result.undamped:
+        return None
+    at = int(np.searchsorted([p.arclength for p in points], probe.arclength))
+    low, high = max(at - 1, 0), min(at, len(points) - 1)
+    reach = points[max(low - 1, 0)].arclength, points[min(high + 1, len(points) - 1)].arclength
+    if _explained(result, reach, bifurcations):
+        return None
+    i = int(np.argmax(_open(result)))
+    return Unsettled(
+        name,
+        _value(points[low], name),
+        _value(points[high], name),
+        (points[low].arclength, points[high].arclength),
+        f"a multiplier, {written(result.multipliers[i], result.errors[i])} at {name} = {_value(probe, name):.9g}, comes within "
+        "its error of the unit circle and may pass it",
+    )
+
+
+def _within(stretch: Unsettled, known: Unsettled) -> bool:
+    """Whether a stretch has something of another."""
+    return stretch.arclength[0] <= known.arclength[1] and known.arclength[0] <= stretch.arclength[1]
 
 
 def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:
