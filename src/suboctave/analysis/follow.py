@@ -10,13 +10,14 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
-from suboctave.analysis.guard import BRANCH_POINT, CountCheck, Passage, StepGuard
+from suboctave.analysis.guard import CountCheck, Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
+from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings, touches
+from suboctave.bifurcation.kinds import BRANCH_POINT, changes
 from suboctave.bifurcation.layer import behind_their_grazings
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
@@ -216,8 +217,7 @@ class _Follower:
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""
-        kinds: list[BifurcationKind] = [kind for kind in ALL_KINDS if kind.changed(old, again)]
-        kinds += touches(old, again)[0]
+        kinds = [*changes(old, again), *touches(old, again)[0]]
         if not kinds:
             return
         points = self.trace.points
@@ -236,9 +236,8 @@ class _Follower:
         found: list[tuple[float, Bifurcation]] = []
         branch_point: Located | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
-        for kind in () if _at_rest(a) or _at_rest(b) else ALL_KINDS:
-            if not kind.changed(a, b):
-                continue
+        resting = _at_rest(a) or _at_rest(b)
+        for kind in () if resting else changes(a, b):
             located = self._located(kind, a, b)
             if kind is BRANCH_POINT:
                 branch_point = located
@@ -253,7 +252,7 @@ class _Follower:
                 continue
             found.append((located.fraction, self._bifurcation(located, a, b)))
         complaint = self._count.complaint(b, [item for _, item in found])
-        if not (_at_rest(a) or _at_rest(b)):
+        if not resting and self._guard.grazes(a, b):
             for touched in locate_grazings(a, b, self.settings.newton, self._sample, guess_at):
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:

@@ -57,13 +57,13 @@ class HiddenDoublings:
             if len(self._since) > 1:
                 before, *between = self._since
                 if all(s.half_sign == before.half_sign for s in (*between, sample)):
-                    found.append(Stretch(before, max(between, key=lambda s: s.measures[2][1]), sample))
+                    found.append(Stretch(before, max(between, key=lambda s: s.measures[1, 2]), sample))
             self._since = [sample]
         return found
 
 
 def _agree(sample: Sample) -> bool:
-    return (sample.half_sign > 0.0) == (sample.measures[2][0] > 0.0)
+    return (sample.half_sign > 0.0) == (sample.measures[0, 2] > 0.0)
 
 
 def pair_in(

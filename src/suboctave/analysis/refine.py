@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
@@ -22,7 +24,6 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
 from suboctave.harmonic.state import BalanceState
-from suboctave.stability import floquet_multipliers
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
@@ -61,21 +62,21 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
             arclength=arclength,
             contact=beside,
         )
-    solution = _refined(located, solution, curve, warnings)
+    solution, coarser = _refined(located, solution, curve, warnings)
+    guess = _guess_from(solution, curve)
     state = solution.state
-    guess = Guess(state.balance, state.x, state.omega, state.values, curve.name, curve.span, solution.kappa)
     layer = layer_of(located.kind, solution, guess)
     orbit = as_orbit(state, solution.residual, truncation(state), curve)
     return Bifurcation(
         located.kind.name,
         orbit,
-        floquet_multipliers(state),
+        solution.floquet,
         solution.residual,
         orbit.amplitude(observe),
         curve.name,
         solution.vectors,
         solution.kappa,
-        0.0 if layer is None else unresolved(located.kind, guess, layer),
+        0.0 if layer is None else unresolved(located.kind, guess, layer, coarser),
         arclength=arclength,
         contact=layer or located.kind.contact(solution, curve.name),
     )
@@ -109,18 +110,21 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     return None
 
 
-def _refined(located: Located, solution: Singular, curve: ResponseCurve, warnings: list[str]) -> Singular:
-    """Solved again with the harmonics that the tolerance for events asks for."""
+def _refined(
+    located: Located, solution: Singular, curve: ResponseCurve, warnings: list[str]
+) -> tuple[Singular, tuple[int, float] | None]:
+    """Solved again with the harmonics that the tolerance for events asks for; how many it had before, and where it lay."""
     adaptive = curve.adaptive
+    coarser = None
     if adaptive is None:
-        return solution
+        return solution, coarser
     for _ in range(8):
         state = solution.state
         basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
         if basis.harmonics <= state.basis.harmonics:
             # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
             critical = located.kind.critical(solution)
-            if critical is None or np.abs(floquet_multipliers(state).multipliers - critical).min() <= _CRITICAL:
+            if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
                 break
             basis = next_harmonics(state, adaptive)
         if basis.harmonics <= state.basis.harmonics:
@@ -128,7 +132,7 @@ def _refined(located: Located, solution: Singular, curve: ResponseCurve, warning
         x = state.completed.basis.resized(state.completed.x, basis)
         # more harmonics need more samples of a law that tells nothing of itself
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-        guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)
+        guess = replace(_guess_from(solution, curve), balance=balance, x=x)
         try:
             better = solve_or_behind(located.kind, guess)
         except ConvergenceError as failure:
@@ -144,8 +148,9 @@ def _refined(located: Located, solution: Singular, curve: ResponseCurve, warning
                 f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
             )
             break
+        coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
         solution = better
-    return solution
+    return solution, coarser
 
 
 def orbit_of(sample: Sample) -> PeriodicOrbit:
@@ -169,6 +174,12 @@ def guess_at(u: Array, point: CurvePoint, kappa: float) -> Guess:
     assert isinstance(curve, ResponseCurve)
     x, omega, values = curve.split(u)
     return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
+
+
+def _guess_from(solution: Singular, curve: ResponseCurve) -> Guess:
+    state = solution.state
+    at = (state.balance, state.x, state.omega, state.values)
+    return Guess(*at, curve.name, curve.span, solution.kappa, solution.vectors)
 
 
 def _kappa(located: Located) -> float:

@@ -200,13 +200,14 @@ def _between(
     if _explained(result, reach, bifurcations):
         return None
     i = int(np.argmax(_open(result)))
+    worst = written(result.multipliers[i], result.errors[i])
     return Unsettled(
         name,
         _value(points[low], name),
         _value(points[high], name),
         (points[low].arclength, points[high].arclength),
-        f"a multiplier, {written(result.multipliers[i], result.errors[i])} at {name} = {_value(probe, name):.9g}, comes within "
-        "its error of the unit circle and may pass it",
+        f"a multiplier, {worst} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle "
+        "and may pass it",
     )
 
 

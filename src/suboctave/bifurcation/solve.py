@@ -20,6 +20,8 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, floquet_multipliers
 
 _TOLERANCE = 1e-10
 _STEP = 1e-9
@@ -28,7 +30,7 @@ _STEP = 1e-9
 @dataclass(frozen=True)
 class Guess:
     """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter,
-    kappa.
+    kappa; null vectors of the operator nearby, where they are known (with any number of harmonics).
     """
 
     balance: HarmonicBalance
@@ -38,6 +40,7 @@ class Guess:
     name: str
     span: float
     kappa: float = 0.0
+    vectors: NullVectors | None = None
 
     def state(self) -> BalanceState:
         """The equations at the guess."""
@@ -60,6 +63,11 @@ class Singular:
     kappa: float
     residual: float
     iterations: int
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Its multipliers."""
+        return floquet_multipliers(self.state)
 
 
 #: derivatives of a scalar equation by X, by the free parameter and by the extra unknowns
@@ -87,7 +95,12 @@ Augmentation = Callable[[BalanceState, Array], tuple[list[Extra], Array | None, 
 
 
 def newton(
-    guess: Guess, unknowns: Array, spans: Array, augmentation: Augmentation, iterations: int = 15
+    guess: Guess,
+    unknowns: Array,
+    spans: Array,
+    augmentation: Augmentation,
+    iterations: int = 15,
+    start: BalanceState | None = None,
 ) -> tuple[BalanceState, Array, float, int]:
     """Solve `[R + columns . unknowns; extras] = 0` in (X, parameter, unknowns).
 
@@ -95,6 +108,8 @@ def newton(
     ----------
     unknowns, spans
         Start and natural size of the extra unknowns, shape (q,); one more equation than unknowns is needed.
+    start
+        The equations at the guess, where they have been evaluated.
 
     Returns
     -------
@@ -109,14 +124,16 @@ def newton(
     balance, n = guess.balance, guess.balance.dimension
     x, parameter, extra = guess.x.ravel().copy(), guess.parameter, unknowns.astype(float).copy()
     weight = np.tile(balance.scales()[0], balance.basis.size)
-    rows = residual_scale(guess.state())
+    state = guess.state() if start is None else start
+    rows = residual_scale(state)
     previous = np.inf
     nearest: tuple[BalanceState, Array, float, int] | None = None
     for iteration in range(iterations + 1):
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
             raise ConvergenceError("omega left the positive axis")
-        state = balance.at(x, omega, values)
+        if iteration > 0:
+            state = balance.at(x, omega, values)
         equations, addition, columns = augmentation(state, extra)
         if not all(e.size > 0.0 for e in equations):
             raise ConvergenceError("nothing moves here")
@@ -182,7 +199,11 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
-    borders = null_vectors(guess.state(), kind, guess.kappa)
+    begin = guess.state()
+    if guess.vectors is None:
+        borders = null_vectors(begin, kind, guess.kappa)
+    else:
+        borders = guess.vectors.resized(guess.balance.basis, guess.balance.size, kind)
     last: list[Bordered] = []
 
     def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
@@ -209,6 +230,6 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
 
     start = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(0)
     spans = np.full(len(start), guess.omega / guess.balance.basis.nu)
-    state, extra, residual, iterations = newton(guess, start, spans, augmentation)
+    state, extra, residual, iterations = newton(guess, start, spans, augmentation, start=begin)
     kappa = float(extra[0]) if kind is Kind.FREE else 0.0
     return Singular(state, last[0].vectors, kappa, residual, iterations)

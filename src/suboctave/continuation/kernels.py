@@ -82,12 +82,43 @@ def cosine(a, b, weights):
 
 
 @njit(cache=True)
-def predicted(u, tangent, bend, step):
-    """`u + step tangent + step^2 / 2 bend`."""
-    out = np.empty(u.shape[0])
-    for i in range(u.shape[0]):
-        out[i] = u[i] + step * (tangent[i] + 0.5 * step * bend[i])
-    return out
+def predict(points, tangents, weights, step, out):
+    """The Hermite polynomial through points and tangents (m, n) taken `step` further in scaled arclength, into `out`.
+
+    The latest point comes first; one point gives a straight line, two a cubic, three a quintic.
+    """
+    m, n = points.shape
+    size = np.empty(m)
+    where = np.zeros(m)
+    for j in range(m):
+        total = 0.0
+        for i in range(n):
+            d = weights[i] * tangents[j, i]
+            total += d * d
+        size[j] = math.sqrt(total)
+        if j > 0:
+            chord = turn = 0.0
+            for i in range(n):
+                d = weights[i] * (points[j - 1, i] - points[j, i])
+                chord += d * d
+                d = weights[i] * (tangents[j - 1, i] / size[j - 1] - tangents[j, i] / size[j])
+                turn += d * d
+            # the arc is longer than its chord
+            where[j] = where[j - 1] - math.sqrt(chord) * (1.0 + turn / 24.0)
+    for i in range(n):
+        out[i] = 0.0
+    for j in range(m):
+        product, total = 1.0, 0.0
+        for k in range(m):
+            if k != j:
+                product *= (step - where[k]) / (where[j] - where[k])
+                total += 1.0 / (where[j] - where[k])
+        square = product * product
+        ahead = step - where[j]
+        value = square * (1.0 - 2.0 * ahead * total)
+        slope = square * ahead / size[j]
+        for i in range(n):
+            out[i] += value * points[j, i] + slope * tangents[j, i]
 
 
 @njit(cache=True)

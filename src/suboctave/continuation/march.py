@@ -1,8 +1,8 @@
 """Predictor-corrector continuation with scaled arclength.
 
-Predictor: tangent and curvature from the last two tangents. Corrector: Newton's method in the hyperplane orthogonal
-to the tangent. Step length: from the distance between prediction and solution, the angle between tangents and the
-rate at which Newton's method contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The
+Predictor: the quintic through the last three points and their tangents. Corrector: Newton's method in the hyperplane
+orthogonal to the tangent. Step length: from the distance between prediction and solution, the angle between tangents
+and the rate at which Newton's method contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The
 engine hands out the points one by one; what is looked for along the curve is the caller's business.
 """
 
@@ -19,6 +19,9 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
+
+#: points behind the last one that a prediction takes into account
+_BEHIND = 2
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,7 @@ class March:
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
-        bend = np.zeros_like(point.u)
+        behind: list[CurvePoint] = []
         count = 1
         while True:
             if count >= options.max_points:
@@ -174,7 +177,7 @@ class March:
                 return
             point = self._rescaled(point, largest)
             try:
-                new, step, deviation = self._advance(point, step, bend)
+                new, step, deviation = self._advance(point, step, behind)
             except ConvergenceError as failure:
                 self.ended = (
                     f"step size fell below {options.min_step:.0e} at {point.curve.where(point.u)}: {failure}. "
@@ -198,16 +201,14 @@ class March:
                         f"left the range after {point.curve.where(point.u)}; no solution was found exactly on its end"
                     )
                 return
-            taken = new.arclength - point.arclength
             yield new
             count += 1
-            old = point.tangent if new.curve is point.curve else new.curve.transfer(point.tangent, point.curve)
-            bend = (new.tangent - old) / taken
-            step = self._next_step(point, new, taken, deviation)
+            step = self._next_step(point, new, new.arclength - point.arclength, deviation)
+            # beyond a corner nothing leads on from what lies behind
+            behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             adapted = new.curve.adapted(new.u, new.evaluation)
             if adapted is not new.curve:
                 u, t = adapted.transfer(new.u, new.curve), adapted.transfer(new.tangent, new.curve)
-                bend = adapted.transfer(bend, new.curve)
                 weights = adapted.weights(u, largest)
                 point = replace(new, curve=adapted, u=u, tangent=t, weights=weights)
             else:
@@ -226,11 +227,16 @@ class March:
         weights = point.curve.weights(point.u, largest)
         return replace(point, weights=weights, tangent=kernels.normalised(weights * point.tangent, weights))
 
-    def _advance(self, point: CurvePoint, step: float, bend: Array) -> tuple[CurvePoint, float, float]:
+    def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, step length used, distance between prediction and solution."""
+        known = [point, *behind]
+        points = np.array([point.curve.transfer(p.u, p.curve) for p in known])
+        tangents = np.array([point.curve.transfer(p.tangent, p.curve) for p in known])
+        order = len(known)
         while True:
             try:
-                guess = kernels.predicted(point.u, point.tangent, bend, step)
+                guess = np.empty(len(point.u))
+                kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
                 solved = correct(point.curve, guess, point.weights * point.tangent, point.weights, self.newton)
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
@@ -244,6 +250,8 @@ class March:
                 failure = error
             if step <= self.stepping.min_step:
                 return self._around_corner(point, failure)
+            # what lies behind may not tell what comes
+            order = max(1, order - 1)
             step = max(0.5 * step, self.stepping.min_step)
 
     def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float]:
