@@ -37,7 +37,8 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     points = _settled(trace.points, method)
     bifurcations = [_at_event(item, method) for item in trace.bifurcations]
     events = [_at_event(item, method) for item in trace.events]
-    open_ones = [i for i, p in enumerate(points) if not p.floquet.decided and not _expected(i, points, bifurcations)]
+    in_doubt = [i for i, p in enumerate(points) if not p.floquet.decided]
+    open_ones = [i for run in _runs(in_doubt) for i in _unexpected(run, points, bifurcations)]
     unsettled, notes = _stretches(points, open_ones, name)
     for probe in trace.open:
         stretch = _between(probe, points, bifurcations, name)
@@ -122,10 +123,13 @@ def _doubt_beside(item: Bifurcation) -> str | None:
 _CRITICAL = {"LP": 1, "BP": 1, "PD": 1, "NS": 2}
 
 
-def _expected(i: int, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]) -> bool:
-    """Whether bifurcations located beside a point are why its verdict is open."""
-    reach = points[max(i - 1, 0)].arclength, points[min(i + 1, len(points) - 1)].arclength
-    return _explained(points[i].floquet, reach, bifurcations)
+def _unexpected(
+    run: tuple[int, int], points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]
+) -> Iterator[int]:
+    """Those of a run of points with open verdicts that no bifurcation located in it or at its ends is the reason of."""
+    first, last = run
+    reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
+    return (i for i in range(first, last + 1) if not _explained(points[i].floquet, reach, bifurcations))
 
 
 def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: Sequence[Bifurcation]) -> bool:
@@ -196,7 +200,12 @@ def _between(
         return None
     at = int(np.searchsorted([p.arclength for p in points], probe.arclength))
     low, high = max(at - 1, 0), min(at, len(points) - 1)
-    reach = points[max(low - 1, 0)].arclength, points[min(high + 1, len(points) - 1)].arclength
+    first, last = low, high
+    while first > 0 and not points[first].floquet.decided:
+        first -= 1
+    while last < len(points) - 1 and not points[last].floquet.decided:
+        last += 1
+    reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
     if _explained(result, reach, bifurcations):
         return None
     i = int(np.argmax(_open(result)))
