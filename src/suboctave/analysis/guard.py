@@ -175,8 +175,8 @@ class _Step:
             share, reason = doubt
             if _place(q) - _place(p) <= least:
                 self.settled.append(_place(q) - _place(p))
-                if not changes(p, q):
-                    # no event, but too close to one to tell it from two
+                if not changes(p, q) and not (reason in _REASONS[1:] and _open(p, q)):
+                    # no event, but too close to one to tell it from two; open verdicts are stated as such
                     self.unsettled.append(_unsettled(p, q, reason))
                 continue
             halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
@@ -281,6 +281,11 @@ _REASONS = (
 )
 
 
+def _open(p: Sample, q: Sample) -> bool:
+    """Whether a multiplier lies within its error of the unit circle at either of two samples."""
+    return not (p.floquet.decided and q.floquet.decided)
+
+
 def _place(sample: Sample) -> float:
     return sample.point.arclength
 
@@ -334,7 +339,7 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
     change = abs(p.floquet.unstable - q.floquet.unstable)
-    if not (p.floquet.decided and q.floquet.decided):
+    if _open(p, q):
         return True
     changed = {kind.name for kind in changes(p, q)}
     if {"LP", "BP"} <= changed:
