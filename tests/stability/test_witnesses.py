@@ -58,7 +58,7 @@ def test_truncations_cancel_in_hills_method(fifty, distances):
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 @pytest.mark.parametrize("harmonics", [15, 31])
 def test_coverage_on_the_reference_curves(draw, distances, method, harmonics):
-    """Ninety-five percent of all motions, half of them unstable, lie within their error estimates; no verdict is wrong."""
+    """Ninety-five percent of all motions, half of them unstable, lie within their error estimates; verdicts agree."""
     covered, whole, motions = [], [], draw(harmonics, 12, seed=harmonics)
     assert sum(not item.stable for item in motions) == len(motions) // 2
     for item in motions:
