@@ -318,9 +318,9 @@ class _Follower:
 
 
 def _at_rest(sample: Sample) -> bool:
-    curve = sample.point.curve
-    assert isinstance(curve, ResponseCurve)
-    return curve.at_rest(sample.point.u)
+    evaluation = sample.point.evaluation
+    assert isinstance(evaluation, ResponseEvaluation)
+    return evaluation.at_rest
 
 
 def _same_event(a: Bifurcation, b: Bifurcation) -> bool:

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import first_doubtful
@@ -30,10 +31,10 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Bifurcation, Sample
 from suboctave.bifurcation.grazing import touches
 from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
+from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import ComplexArray
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
 FINEST = 1e-5
@@ -330,13 +331,8 @@ def _separating(samples: list[Sample]) -> list[Sample]:
 
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
     """Distance between the chord and the mean tangent of a step, in units of its length."""
-    chord = b.u - b.curve.transfer(a.u, a.curve)
-    size = length(b.weights * chord)
-    if size == 0.0:
-        return 0.0
-    tangents = b.weights * (b.curve.transfer(a.tangent, a.curve)), b.weights * b.tangent
-    mean = sum(t / length(t) for t in tangents) / 2.0
-    return length(b.weights * chord / size - mean)
+    u, heading = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
+    return float(kernels.disagreement(u, heading, b.u, b.tangent, b.weights))
 
 
 def _explained(p: Sample, q: Sample) -> bool:
@@ -402,10 +398,16 @@ class CountCheck:
         )
 
 
-def _movement(old: ComplexArray, new: ComplexArray) -> float:
+@njit(cache=True)
+def _movement(old, new):
     """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    relevant = new[np.abs(new) > 0.5]
-    if not relevant.size:
-        return 0.0
-    nearest = np.abs(relevant[:, None] - old[None, :]).min(axis=1)
-    return float(np.max(nearest / np.maximum(1.0, np.abs(relevant))))
+    largest = 0.0
+    for i in range(new.shape[0]):
+        size = abs(new[i])
+        if size <= 0.5:
+            continue
+        nearest = np.inf
+        for j in range(old.shape[0]):
+            nearest = min(nearest, abs(new[i] - old[j]))
+        largest = max(largest, nearest / max(1.0, size))
+    return largest

@@ -113,7 +113,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
 def _refined(
     located: Located, solution: Singular, curve: ResponseCurve, warnings: list[str]
 ) -> tuple[Singular, tuple[int, float] | None]:
-    """Solved again with the harmonics that the tolerance for events asks for; how many it had before, and where it lay."""
+    """Solved again with the harmonics that events ask for; with how many it was found before that, and where."""
     adaptive = curve.adaptive
     coarser = None
     if adaptive is None:

@@ -25,6 +25,8 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 
 _TOLERANCE = 1e-10
 _STEP = 1e-9
+#: step below which the matrix is not computed anew
+_SHORT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def newton(
     unknowns: Array,
     spans: Array,
     augmentation: Augmentation,
-    iterations: int = 15,
+    iterations: int = 10,
     start: BalanceState | None = None,
 ) -> tuple[BalanceState, Array, float, int]:
     """Solve `[R + columns . unknowns; extras] = 0` in (X, parameter, unknowns).
@@ -126,8 +128,9 @@ def newton(
     weight = np.tile(balance.scales()[0], balance.basis.size)
     state = guess.state() if start is None else start
     rows = residual_scale(state)
-    previous = np.inf
+    previous, contraction = np.inf, 0.0
     nearest: tuple[BalanceState, Array, float, int] | None = None
+    linear: tuple[Factor, Array, Array, list[float], float] | None = None
     for iteration in range(iterations + 1):
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
@@ -148,33 +151,19 @@ def newton(
             return state, extra, error, iteration
         if iteration == iterations:
             break
-        q = len(extra)
-        matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
-        size = max(motion_size(state), np.finfo(float).tiny)
-        scale_x = size / weight
-        matrix[:n, :n] = state.jacobian * (rows / force)[:, None] * scale_x
-        matrix[:n, n] = state.residual_by(guess.name) * (rows / force) * guess.span
-        for j, column in enumerate(columns):
-            matrix[:n, n + 1 + j] = column * (rows / force) * spans[j]
-        rhs = np.empty(n + 1 + q)
-        rhs[:n] = residual * (rows / force)
-        for i, e in enumerate(equations):
-            by_x, by_parameter, by_unknowns = e.slopes()
-            matrix[n + i, :n] = by_x * scale_x / e.size
-            matrix[n + i, n] = by_parameter * guess.span / e.size
-            for j, value in enumerate(by_unknowns):
-                matrix[n + i, n + 1 + j] = value * spans[j] / e.size
-            rhs[n + i] = e.value / e.size
-        if previous <= _STEP and (nearest is None or error < nearest[2]):
-            # right behind a grazing the equations are so steep that the last digit of an unknown is more than tolerated
-            unavoidable = np.finfo(float).eps * float(np.abs(matrix).sum(axis=1).max())
-            if error <= unavoidable:
-                nearest = state, extra.copy(), error, iteration
-        factor = Factor.of(matrix, overwrite=True)
-        if factor.singular:
-            raise ConvergenceError("the bordered system is singular")
+        # after a short step that contracts, the old factors take the next one as far
+        if linear is None or previous > _SHORT or contraction > 0.1:
+            linear = _linearised(state, guess, equations, columns, spans, weight, rows, force)
+        factor, scale_x, scale_rows, sizes, steepest = linear
+        # right behind a grazing the equations are so steep that the last digit of an unknown is more than tolerated
+        if previous <= _STEP and error <= np.finfo(float).eps * steepest and (nearest is None or error < nearest[2]):
+            nearest = state, extra.copy(), error, iteration
+        rhs = np.empty(n + 1 + len(extra))
+        rhs[:n] = residual * scale_rows
+        rhs[n:] = [e.value / e_size for e, e_size in zip(equations, sizes, strict=True)]
         step = factor.solve(rhs)
         length = float(np.linalg.norm(step))
+        contraction = length / previous
         if not np.isfinite(length):
             raise ConvergenceError("the bordered system is singular")
         if iteration > 3 and length > 0.5 * previous and previous > 1e-6:
@@ -189,6 +178,41 @@ def newton(
     if nearest is not None:
         return nearest
     raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
+
+
+def _linearised(
+    state: BalanceState,
+    guess: Guess,
+    equations: list[Extra],
+    columns: list[Array],
+    spans: Array,
+    weight: Array,
+    rows: Array,
+    force: float,
+) -> tuple[Factor, Array, Array, list[float], float]:
+    """The factorised matrix of the augmented system in dimensionless unknowns and equations, the units of the
+    coefficients, the factors of the residual's entries, the sizes of the other equations, and by how much the
+    steepest equation changes at most with its unknowns.
+    """
+    n, q = len(rows), len(spans)
+    matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
+    scale_x = max(motion_size(state), np.finfo(float).tiny) / weight
+    scale_rows = rows / force
+    matrix[:n, :n] = state.jacobian * scale_rows[:, None] * scale_x
+    matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span
+    for j, column in enumerate(columns):
+        matrix[:n, n + 1 + j] = column * scale_rows * spans[j]
+    for i, e in enumerate(equations):
+        by_x, by_parameter, by_unknowns = e.slopes()
+        matrix[n + i, :n] = by_x * scale_x / e.size
+        matrix[n + i, n] = by_parameter * guess.span / e.size
+        for j, value in enumerate(by_unknowns):
+            matrix[n + i, n + 1 + j] = value * spans[j] / e.size
+    steepest = float(np.abs(matrix).sum(axis=1).max())
+    factor = Factor.of(matrix, overwrite=True)
+    if factor.singular:
+        raise ConvergenceError("the bordered system is singular")
+    return factor, scale_x, scale_rows, [e.size for e in equations], steepest
 
 
 def locate_singular(guess: Guess, kind: Kind) -> Singular:

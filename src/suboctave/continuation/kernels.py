@@ -122,6 +122,48 @@ def predict(points, tangents, weights, step, out):
 
 
 @njit(cache=True)
+def between(u, tangent, v, heading, weights, s):
+    """Cubic Hermite interpolation at the share s of the way from u to v, with tangents of any length."""
+    n = u.shape[0]
+    chord = first = last = 0.0
+    for i in range(n):
+        w = weights[i] * weights[i]
+        d = v[i] - u[i]
+        chord += w * d * d
+        first += w * tangent[i] * tangent[i]
+        last += w * heading[i] * heading[i]
+    a = (1.0 + 2.0 * s) * (1.0 - s) ** 2
+    b = s * (1.0 - s) ** 2 * math.sqrt(chord / first)
+    c = s * s * (3.0 - 2.0 * s)
+    d = s * s * (s - 1.0) * math.sqrt(chord / last)
+    out = np.empty(n)
+    for i in range(n):
+        out[i] = a * u[i] + b * tangent[i] + c * v[i] + d * heading[i]
+    return out
+
+
+@njit(cache=True)
+def disagreement(u, tangent, v, heading, weights):
+    """Distance between the unit chord from u to v and the mean of the unit tangents there; 0 without a chord."""
+    n = u.shape[0]
+    chord = first = last = 0.0
+    for i in range(n):
+        w = weights[i] * weights[i]
+        d = v[i] - u[i]
+        chord += w * d * d
+        first += w * tangent[i] * tangent[i]
+        last += w * heading[i] * heading[i]
+    if chord == 0.0:
+        return 0.0
+    chord, first, last = 1.0 / math.sqrt(chord), 0.5 / math.sqrt(first), 0.5 / math.sqrt(last)
+    total = 0.0
+    for i in range(n):
+        d = weights[i] * (chord * (v[i] - u[i]) - first * tangent[i] - last * heading[i])
+        total += d * d
+    return math.sqrt(total)
+
+
+@njit(cache=True)
 def determinant_sign(lu, pivots):
     """Sign of the determinant of a factorised matrix (`lapack.dgetrf`, pivots counted from 0)."""
     sign = 1.0

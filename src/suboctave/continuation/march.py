@@ -99,15 +99,8 @@ def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
     ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    h = length(b.weights * (b.u - ua))
-    s = fraction
-    # unit tangents in the scaling of this step: a comes with that of the step before
-    return (
-        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * ua
-        + s * (1.0 - s) ** 2 * h / length(b.weights * ta) * ta
-        + s**2 * (3.0 - 2.0 * s) * b.u
-        + s**2 * (s - 1.0) * h / length(b.weights * b.tangent) * b.tangent
-    )
+    result: Array = kernels.between(ua, ta, b.u, b.tangent, b.weights, fraction)
+    return result
 
 
 def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonOptions) -> CurvePoint:
@@ -225,7 +218,9 @@ class March:
     def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
         """The same point with scaling and tangent length of the present amplitude."""
         weights = point.curve.weights(point.u, largest)
-        return replace(point, weights=weights, tangent=kernels.normalised(weights * point.tangent, weights))
+        t = kernels.normalised(weights * point.tangent, weights)
+        p = point
+        return CurvePoint(p.curve, p.u, t, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
     def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, step length used, distance between prediction and solution."""
