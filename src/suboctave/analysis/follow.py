@@ -207,7 +207,7 @@ class _Follower:
                 if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
                     insort(self.trace.bifurcations, item, key=lambda known: known.arclength)
                     self._count.noted(item)
-            if not found:
+            if len(found) < 2:
                 self._guard.doubt(stretch.before, stretch.behind, REASON)
         self.trace.open += [
             BranchPoint(orbit_of(s), s.floquet, s.point.arclength, s.point.iterations)
