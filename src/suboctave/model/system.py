@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, suggest
-from suboctave.model.element import Array, Element
+from suboctave.model.coupled import CoupledElement
+from suboctave.model.element import Array, BaseElement
 from suboctave.model.expression import RESERVED, Coefficient
-from suboctave.model.loads import HarmonicLoad, LoadComponent
+from suboctave.model.loads import Load, LoadComponent
 from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
 
@@ -29,7 +30,8 @@ class System:
     `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
     numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite
     at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the
-    left-hand side. `loads`: a sequence of `HarmonicLoad`, on the right-hand side. `parameters`: `{name: number}`, every
+    left-hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad` and
+    other loads, on the right-hand side. `parameters`: `{name: number}`, every
     one of them used somewhere. Units are the user's own, if they are consistent; frequencies are circular.
 
     Raises `InputError` for anything that does not fit, before any work.
@@ -38,8 +40,8 @@ class System:
     mass: MatrixCoefficient
     damping: MatrixCoefficient
     stiffness: MatrixCoefficient
-    elements: tuple[Element, ...]
-    loads: tuple[HarmonicLoad, ...]
+    elements: tuple[BaseElement, ...]
+    loads: tuple[Load, ...]
     parameters: Mapping[str, float]
     name: str
     n: int
@@ -50,8 +52,8 @@ class System:
         mass: Any,
         damping: Any,
         stiffness: Any,
-        elements: Iterable[Element] = (),
-        loads: Iterable[HarmonicLoad] = (),
+        elements: Iterable[BaseElement] = (),
+        loads: Iterable[Load] = (),
         parameters: Mapping[str, float] | None = None,
         name: str = "",
     ) -> None:
@@ -60,8 +62,8 @@ class System:
             read,
             matrix_coefficient(damping, read.n, "damping"),
             matrix_coefficient(stiffness, read.n, "stiffness"),
-            _several(elements, Element, "elements"),
-            _several(loads, HarmonicLoad, "loads"),
+            tuple(sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes)),
+            _several(loads, Load, "HarmonicLoad", "loads"),
             _read_parameters(parameters),
             str(name),
         )
@@ -73,15 +75,20 @@ class System:
         mass: MatrixCoefficient,
         damping: MatrixCoefficient,
         stiffness: MatrixCoefficient,
-        elements: tuple[Element, ...],
-        loads: tuple[HarmonicLoad, ...],
+        elements: tuple[BaseElement, ...],
+        loads: tuple[Load, ...],
         parameters: Mapping[str, float],
         name: str,
     ) -> None:
         n = mass.n
         for element in elements:
             element.direction(n)
-        components = tuple(component for load in loads for component in load.components(n))
+            if isinstance(element, CoupledElement):
+                element.inputs(n)
+        for load in loads:
+            load.check_elements(n, elements)
+        matrices = (mass, damping, stiffness)
+        components = tuple(component for load in loads for component in load.components(n, matrices))
         fields = {
             "mass": mass,
             "damping": damping,
@@ -201,10 +208,18 @@ class System:
         return force
 
     @property
+    def excited_by_elements(self) -> bool:
+        """Whether an element depends on time (parametric excitation)."""
+        return any(element.depends_on_time for element in self.elements)
+
+    @property
     def observed_dof(self) -> int:
         """The degree of freedom watched by default: where the first load acts most (a non-static one if any)."""
         for component in (*(c for c in self._components if c.harmonic > 0), *self._components):
             return int(np.argmax(np.abs(component.direction)))
+        for element in self.elements:  # without loads: what time acts on
+            if element.depends_on_time:
+                return int(np.argmax(np.abs(element.direction(self.n))))
         return 0
 
     # ------------------------------------------------------------------------------------------------------ object
@@ -234,8 +249,8 @@ def _assemble(
     mass: MatrixCoefficient,
     damping: MatrixCoefficient,
     stiffness: MatrixCoefficient,
-    elements: tuple[Element, ...],
-    loads: tuple[HarmonicLoad, ...],
+    elements: tuple[BaseElement, ...],
+    loads: tuple[Load, ...],
     parameters: Mapping[str, float],
     name: str,
 ) -> System:
@@ -245,16 +260,16 @@ def _assemble(
     return result
 
 
-def _several(items: Any, kind: type, what: str) -> tuple[Any, ...]:
+def _several(items: Any, kind: type, name: str, what: str) -> tuple[Any, ...]:
     if isinstance(items, kind):
         return (items,)
     try:
         listed = tuple(items)
     except TypeError:
-        raise InputError(f"{what} must be a sequence of {kind.__name__}, not {items!r}") from None
+        raise InputError(f"{what} must be a sequence of {name}, not {items!r}") from None
     for item in listed:
         if not isinstance(item, kind):
-            raise InputError(f"{what} must hold objects of the kind {kind.__name__}, not {item!r}")
+            raise InputError(f"{what} must hold objects of the kind {name}, not {item!r}")
     return listed
 
 
