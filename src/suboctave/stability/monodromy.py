@@ -126,7 +126,11 @@ class _Several:
         self.along = along
         n, linear = len(mass), along.state.linear
         shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
-        self.about = (along.moving, along.varying, weighted(mass, damping, stiffness, shapes), POWERS, NODES)
+        matrices = weighted(mass, damping, stiffness, shapes)
+        if along.state.nodal:
+            acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float)
+            matrices = (*matrices[:2], weighted(mass, damping, stiffness, acting)[2], matrices[3])
+        self.about = (along.moving, along.varying, matrices, POWERS, NODES)
         self.scale = 1.0 / along.state.rate
         self.before: Array = np.zeros((0, 0))
 
