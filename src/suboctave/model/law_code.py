@@ -21,7 +21,7 @@ from suboctave.model.law_syntax import PRIME, corner_functions, read, symbol
 from suboctave.model.law_text import as_code, as_text
 from suboctave.model.sampling import AdaptiveSampling, CornerSampling, PolynomialSampling, Sampling
 
-__all__ = ["Law", "law_of"]
+__all__ = ["Law", "expanded_size", "harmonic_of", "law_of"]
 
 #: symbol of the phase omega t of the load
 _THETA = "theta_"
@@ -135,7 +135,7 @@ class Law:
             harmonics.append(abs(int(wave.args[0].coeff(symbol(_THETA)))))
         if symbol(_THETA) in swapped.free_symbols or not swapped.is_polynomial(*generators):
             return None
-        if _expanded_size(swapped) > 1000:
+        if expanded_size(swapped) > 1000:
             return None
         polynomial = sympy.Poly(swapped, *generators)
         degree = 0
@@ -285,15 +285,15 @@ def harmonic_of(argument: Any) -> int | None:
     return int(value) if value.is_integer() and value != 0.0 else None
 
 
-def _expanded_size(expression: Any) -> float:
+def expanded_size(expression: Any) -> float:
     """Upper bound of the number of terms after expansion."""
     if expression.is_Add:
-        return sum(_expanded_size(part) for part in expression.args)
+        return sum(expanded_size(part) for part in expression.args)
     if expression.is_Mul:
         size = 1.0
         for part in expression.args:
-            size *= _expanded_size(part)
+            size *= expanded_size(part)
         return size
     if expression.is_Pow and expression.exp.is_Integer and expression.exp > 0:
-        return float(_expanded_size(expression.base)) ** min(int(expression.exp), 60)
+        return float(expanded_size(expression.base)) ** min(int(expression.exp), 60)
     return 1.0

@@ -28,7 +28,7 @@ _ELSEWHERE = {
     "ln": "log", "arctan": "atan", "arcsin": "asin", "arccos": "acos", "fabs": "abs", "Abs": "abs", "Max": "max",
     "Min": "min", "sgn": "sign", "Heaviside": "heaviside", "step": "heaviside", "pow": "x**y instead",
 }  # fmt: skip
-_LONGEST, _DEEPEST, _LARGEST_POWER, _LARGEST_INTEGER = 10_000, 100, 1000, 10**12
+_LONGEST, _DEEPEST, _LARGEST_POWER, _LARGEST_INTEGER = 10_000, 300, 1000, 10**12
 _MOST_OPERATIONS = 500
 
 

@@ -6,7 +6,7 @@ import keyword
 import math
 import numbers
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -32,7 +32,7 @@ class System:
     at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the
     left-hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad` and
     other loads, on the right-hand side. `parameters`: `{name: number}`, every
-    one of them used somewhere. Units are the user's own, if they are consistent; frequencies are circular.
+    one of them used somewhere. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are circular.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -44,6 +44,7 @@ class System:
     loads: tuple[Load, ...]
     parameters: Mapping[str, float]
     name: str
+    dof_names: tuple[str, ...]
     n: int
     _components: tuple[LoadComponent, ...]
 
@@ -56,6 +57,7 @@ class System:
         loads: Iterable[Load] = (),
         parameters: Mapping[str, float] | None = None,
         name: str = "",
+        dof_names: Iterable[str] = (),
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
         self._fill(
@@ -66,9 +68,29 @@ class System:
             _several(loads, Load, "HarmonicLoad", "loads"),
             _read_parameters(parameters),
             str(name),
+            _read_dof_names(dof_names, read.n),
         )
         self._check_names()
         self._check_values(self.parameters)
+
+    @classmethod
+    def from_equations(
+        cls, equations: str | Sequence[str], parameters: Mapping[str, float] | None = None, name: str = ""
+    ) -> System:
+        """A system from equations of motion as text, such as `"x'' + 2*zeta*x' + x + a*x**3 = p*cos(omega*t)"`.
+
+        What has a second derivative is a degree of freedom, in the order of appearance; accelerations enter with
+        constant factors. Linear terms go to mass, damping and stiffness, `cos(k*omega*t + phase)` and `sin` (k an
+        integer) to loads, constants to static loads, all others to elements: `Expression`, or `CubicSpring`,
+        `PolynomialSpring`, `ElasticStop` where they are such. State times cosine is parametric excitation. Functions:
+        those of coefficients, `sign`, `heaviside`, and `max` and `min` of two arguments.
+
+        Raises `InputError` with the place in the text.
+        """
+        from suboctave.model.equations import parts_of
+
+        read = _read_parameters(parameters)
+        return cls(**parts_of(equations, read), parameters=read, name=name)
 
     def _fill(
         self,
@@ -79,6 +101,7 @@ class System:
         loads: tuple[Load, ...],
         parameters: Mapping[str, float],
         name: str,
+        dof_names: tuple[str, ...],
     ) -> None:
         n = mass.n
         for element in elements:
@@ -97,6 +120,7 @@ class System:
             "loads": loads,
             "parameters": MappingProxyType(dict(parameters)),
             "name": name,
+            "dof_names": dof_names,
             "n": n,
             "_components": components,
         }
@@ -111,7 +135,7 @@ class System:
             self.check_parameter(name)
             changed[name] = _number(name, value)
         parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        result = _assemble(*parts, {**self.parameters, **changed}, self.name)
+        result = _assemble(*parts, {**self.parameters, **changed}, self.name, self.dof_names)
         result._check_values(changed)
         return result
 
@@ -231,7 +255,7 @@ class System:
 
     def __reduce__(self) -> tuple[Any, ...]:
         parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        return _assemble, (*parts, dict(self.parameters), self.name)
+        return _assemble, (*parts, dict(self.parameters), self.name, self.dof_names)
 
     def __repr__(self) -> str:
         title = f"System {self.name!r}" if self.name else "System"
@@ -253,10 +277,11 @@ def _assemble(
     loads: tuple[Load, ...],
     parameters: Mapping[str, float],
     name: str,
+    dof_names: tuple[str, ...] = (),
 ) -> System:
     """A system from parts that a system has already accepted."""
     result = object.__new__(System)
-    result._fill(mass, damping, stiffness, elements, loads, parameters, name)
+    result._fill(mass, damping, stiffness, elements, loads, parameters, name, dof_names)
     return result
 
 
@@ -271,6 +296,13 @@ def _several(items: Any, kind: type, name: str, what: str) -> tuple[Any, ...]:
         if not isinstance(item, kind):
             raise InputError(f"{what} must hold objects of the kind {name}, not {item!r}")
     return listed
+
+
+def _read_dof_names(names: Iterable[str], n: int) -> tuple[str, ...]:
+    read = tuple(str(name) for name in names)
+    if len(set(read)) < len(read) or len(read) not in (0, n):
+        raise InputError(f"dof_names must be {n} different names, or none, not {read!r}")
+    return read
 
 
 def _read_parameters(parameters: Mapping[str, float] | None) -> dict[str, float]:
