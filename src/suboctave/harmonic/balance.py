@@ -155,8 +155,9 @@ class HarmonicBalance:
 
     @cached_property
     def highest_load(self) -> int:
-        """Highest harmonic of omega that is loaded, 0 without loads."""
-        return max((c.harmonic for c in self.system.load_components()), default=0)
+        """Highest harmonic of omega that is loaded, or that an element depends on; 0 without."""
+        times = [own.harmonic for own in self.own]
+        return max([c.harmonic for c in self.system.load_components()] + times, default=0)
 
     def load(self, values: Mapping[str, float], omega: float) -> Array:
         """Load coefficients P, shape (2 H + 1, size)."""

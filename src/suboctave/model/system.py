@@ -20,6 +20,7 @@ from suboctave.model.expression import RESERVED, Coefficient
 from suboctave.model.loads import Load, LoadComponent
 from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
+from suboctave.model.sampling import CornerSampling, SharpVelocitySampling
 
 __all__ = ["System"]
 
@@ -183,6 +184,9 @@ class System:
                     raise InputError(f"{where}: {error}") from None
         first = changed is self.parameters
         for element in self.elements:
+            kind = element.sampling(element.coefficient_values(self.parameters))
+            if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
+                raise InputError(f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class")
             element.check(self.parameters, first)
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
