@@ -123,8 +123,11 @@ class ResponseCurve:
         return length(self._weight * u[:-1])
 
     def at_rest(self, u: Array) -> bool:
-        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve."""
-        return self.size(u) <= _REST * self.reference
+        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve.
+
+        Without loads (parametric excitation alone) rest is a motion like any other, which may lose its stability.
+        """
+        return self.reference > 0.0 and self.size(u) <= _REST * self.reference
 
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""

@@ -23,6 +23,8 @@ from suboctave.harmonic.state import BalanceState
 
 _TOLERANCE = 1e-10
 _STEP = 1e-9
+#: size of motion and forces at rest: products of it with others neither overflow nor vanish
+_NOTHING = 1e-100
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def newton(
         if not all(e.size > 0.0 for e in equations):
             raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
-        force = max(state.force_scale(), np.finfo(float).tiny)
+        force = max(state.force_scale(), _NOTHING)
         error = float(np.linalg.norm(residual * rows)) / force
         error = max([error] + [abs(e.value) / e.size for e in equations])
         if not np.isfinite(error):
@@ -131,7 +133,7 @@ def newton(
             break
         q = len(extra)
         matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
-        size = max(motion_size(state), np.finfo(float).tiny)
+        size = max(motion_size(state), _NOTHING)
         scale_x = size / weight
         matrix[:n, :n] = state.jacobian * (rows / force)[:, None] * scale_x
         matrix[:n, n] = state.residual_by(guess.name) * (rows / force) * guess.span
