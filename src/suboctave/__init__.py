@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from suboctave.model import (
         BaseAcceleration,
         BaseDisplacement,
+        Callable,
         Clearance,
         CoupledElement,
         CubicSpring,
@@ -60,6 +61,7 @@ _HOME = {
     "HarmonicLoad": "suboctave.model",
     "BaseAcceleration": "suboctave.model",
     "BaseDisplacement": "suboctave.model",
+    "Callable": "suboctave.model",
     "Clearance": "suboctave.model",
     "CoupledElement": "suboctave.model",
     "Expression": "suboctave.model",
@@ -100,6 +102,7 @@ __all__ = [
     "BaseDisplacement",
     "Bifurcation",
     "Branch",
+    "Callable",
     "Clearance",
     "ConvergenceError",
     "CoupledElement",

@@ -79,6 +79,17 @@ class Bend:
     weights: Array
 
 
+@dataclass(frozen=True)
+class Comb:
+    """Dirac functions at a corner: its number, its row of q, the instants and the weights `[f_q] / |dq/dtau|`."""
+
+    number: int
+    row: int
+    zr: Array
+    zi: Array
+    weights: Array
+
+
 class NodalForce:
     """One of these elements along a motion; each part is computed when first asked for.
 
@@ -210,10 +221,56 @@ class NodalForce:
     def by_coefficients(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Fourier coefficients of f_c (nc, top + 1), f_qc (nc, Q, top + 1), f_cc (nc, nc, top + 1)."""
         q, theta = self.path
-        f_c, f_qc = self.own.law.coefficient_tangent(q, theta, self.c)
-        return self.project(f_c), self.project(f_qc), self.project(
-            self.own.law.coefficient_curvature(q, theta, self.c)
-        )
+        law = self.own.law
+        f_c, f_qc = law.coefficient_tangent(q, theta, self.c)
+        parts = self.project(f_c), self.project(f_qc), self.project(law.coefficient_curvature(q, theta, self.c))
+        for comb in self._combs:
+            # a corner that moves with a coefficient takes its Dirac function along
+            spectrum = kernels.spectra(comb.weights[None], comb.zr, comb.zi, self.top)[0]
+            rates = self._corner_rates[comb.number]
+            parts[1][:, comb.row] -= np.multiply.outer(rates, spectrum)
+            parts[2][:] += np.multiply.outer(np.multiply.outer(rates, rates), spectrum)
+        return parts
+
+    @lazy
+    def _corner_rates(self) -> Array:
+        """Derivatives of the corners' places by the coefficients, (corners, nc); differences, exact for linear ones."""
+        rates = np.zeros((len(self._corner_rows), len(self.c)))
+        for i, value in enumerate(self.c):
+            h = 1e-3 * (abs(float(value)) or 1.0)
+            places = []
+            for share in (1.0, -1.0, 2.0, -2.0):
+                c = self.c.copy()
+                c[i] += share * h
+                kind = self.own.element.sampling(c)
+                assert isinstance(kind, CornerSampling)
+                places.append(np.array(kind.points + kind.velocities))
+            if len({len(place) for place in places}) == 1:
+                rates[:, i] = (8.0 * (places[0] - places[1]) - (places[2] - places[3])) / (12.0 * h)
+        return rates
+
+    @lazy
+    def _combs(self) -> list[Comb]:
+        """The jumps of the force's slope at every corner, as Dirac functions along the motion."""
+        found = []
+        for number, (row, level, at) in enumerate(self._corner_rows):
+            if not len(at):
+                continue
+            zr, zi = np.cos(at), np.sin(at)
+            there, phase = self.state_at(zr, zi)
+            motion = self.motions[0]
+            if row:
+                motion = 1j * self.rate * np.arange(len(motion)) * motion
+            rates = kernels.motion(motion, zr, zi)[1]
+            scale = float(np.abs(self.path[0][row]).max()) or 1.0
+            sides = []
+            for sign in (1.0, -1.0):
+                there[row] = level + sign * _BESIDE * scale
+                sides.append(self.own.law.tangent(there, phase, self.c)[1][row])
+            # the rate is kept from zero where the motion only touches the corner
+            weights = (sides[0] - sides[1]) / np.maximum(np.abs(rates), 1e-12 * scale)
+            found.append(Comb(number, row, zr, zi, weights))
+        return found
 
     @lazy
     def bend(self) -> Bend:
@@ -221,25 +278,10 @@ class NodalForce:
         nodes = self.nodes
         q, theta = self.path
         parts = [(nodes.zr, nodes.zi, nodes.weights * self.own.law.curvature(q, theta, self.c))]
-        size = len(q)
-        for row, level, at in self._corner_rows:
-            if not len(at):
-                continue
-            zr, zi = np.cos(at), np.sin(at)
-            there, phase = self.state_at(zr, zi)
-            # the rate of what reaches the corner, kept from zero where the motion only touches it
-            motion = self.motions[0]
-            rates = kernels.motion(motion, zr, zi)[1]
-            if row:
-                rates = kernels.motion(1j * self.rate * np.arange(len(motion)) * motion, zr, zi)[1]
-            scale = float(np.abs(self.path[0][row]).max()) or 1.0
-            sides = []
-            for sign in (1.0, -1.0):
-                there[row] = level + sign * _BESIDE * scale
-                sides.append(self.own.law.tangent(there, phase, self.c)[1][row])
-            weights = np.zeros((size, size, len(at)))
-            weights[row, row] = (sides[0] - sides[1]) / np.maximum(np.abs(rates), 1e-12 * scale)
-            parts.append((zr, zi, weights))
+        for comb in self._combs:
+            weights = np.zeros((len(q), len(q), len(comb.zr)))
+            weights[comb.row, comb.row] = comb.weights
+            parts.append((comb.zr, comb.zi, weights))
         zr, zi, weights = (np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True))
         return Bend(zr, zi, weights)
 
@@ -270,16 +312,22 @@ class NodalForce:
 
 
 def _between(corners: Array, longest: float) -> Nodes:
-    """Gauss-Legendre panels of at most `longest` between neighbouring corners."""
+    """Gauss-Legendre panels of at most `longest` between neighbouring corners.
+
+    Next to a corner instants run like the square of the variable, in which powers of one half are analytic too.
+    """
     ends = np.append(corners, corners[0] + 2.0 * math.pi)
-    begin, length = [], []
+    begin, length, side = [], [], []
     for low, gap in zip(ends[:-1], np.diff(ends), strict=True):
-        pieces = max(1, math.ceil(gap / longest))
+        pieces = max(2, math.ceil(gap / longest))
         begin.append(low + gap / pieces * np.arange(pieces))
         length.append(np.full(pieces, gap / pieces))
-    low, half = np.concatenate(begin), 0.5 * np.concatenate(length)
-    tau = (low + half)[:, None] + half[:, None] * _GAUSS[0]
-    weights = half[:, None] * _GAUSS[1]
+        side.append([1] + [0] * (pieces - 2) + [-1])
+    low, whole, sides = np.concatenate(begin)[:, None], np.concatenate(length)[:, None], np.concatenate(side)[:, None]
+    y, share = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
+    at = np.where(sides == 1, y * y, np.where(sides == -1, 1.0 - (1.0 - y) ** 2, y))
+    weights = whole * share * np.where(sides == 1, 2.0 * y, np.where(sides == -1, 2.0 * (1.0 - y), 1.0))
+    tau = low + whole * at
     return Nodes(np.cos(tau).ravel(), np.sin(tau).ravel(), weights.ravel())
 
 

@@ -5,6 +5,7 @@ A room without any method: nothing here knows of harmonics of the response, of s
 
 from __future__ import annotations
 
+from suboctave.model.callable_element import Callable
 from suboctave.model.clearance import Clearance, Freeplay
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.dampers import QuadraticDamper, TanhFriction
@@ -32,6 +33,7 @@ __all__ = [
     "AdaptiveSampling",
     "BaseAcceleration",
     "BaseDisplacement",
+    "Callable",
     "Clearance",
     "Coefficient",
     "CornerSampling",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable as Function
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -96,7 +97,8 @@ class Callable(Element):
         u, v = self._draws()
         c = np.where(np.isnan(self._constant), 0.7, self._constant)
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
                 real = np.asarray(self.function(u, v, *c))
                 for arguments in ((u + 1j * _COMPLEX, v), (u, v + 1j * _COMPLEX)):
                     got = np.asarray(self.function(*arguments, *c))

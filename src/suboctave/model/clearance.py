@@ -30,6 +30,7 @@ class _Play(Element):
     """Two stops of one stiffness: coefficients stiffness, left, right, and the sharpness of a regularised law."""
 
     coefficient_names: tuple[str, ...] = ("stiffness", "left", "right")
+    _given: dict[str, Coefficient]
 
     def __init__(
         self,
@@ -56,6 +57,13 @@ class _Play(Element):
     def _of(self, gap: int) -> list[int]:
         """Which of the coefficients are those of one stop."""
         return [0, gap, 3] if self.regularised else [0, gap]
+
+    def __repr__(self) -> str:
+        shown = [str(self.place), f"stiffness={self.coefficients[0].text}"]
+        shown += [f"{name}={read.text}" for name, read in self._given.items()]
+        if self.regularised:
+            shown.append(f"regularization={self.coefficients[3].text}")
+        return f"{type(self).__name__}({', '.join(shown)})"
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
         """Refuse sides that have changed places, and a sharpness that is not positive."""
@@ -127,6 +135,7 @@ class Freeplay(_Play):
     ) -> None:
         required("Freeplay", stiffness=stiffness, gap=gap)
         read = _read("Freeplay", "gap", gap)
+        self._given = {"gap": read}
         super().__init__(dof, stiffness, f"-({read.text})", read, regularization, direction)
         _not_negative(self.label, "gap", read)
 
@@ -151,6 +160,7 @@ class Clearance(_Play):
     ) -> None:
         required("Clearance", stiffness=stiffness, clearance=clearance)
         width, centre = _read("Clearance", "clearance", clearance), _read("Clearance", "offset", offset)
+        self._given = {"clearance": width, "offset": centre}
         left, right = (f"({centre.text}) {sign} ({width.text})/2" for sign in "-+")
         super().__init__(dof, stiffness, left, right, regularization, direction)
         _not_negative(self.label, "clearance", width)

@@ -128,7 +128,7 @@ class _Equations:
         """Equations in the order of the DOFs whose masses they hold, with positive masses."""
         values = {symbol(name): value for name, value in self.parameters.items()}
         numbers = np.array([[float(entry.subs(values)) if entry != 0 else 0.0 for entry in row] for row in mass])
-        if np.all(np.diag(numbers)):
+        if np.all(np.diag(numbers)) and np.allclose(np.abs(numbers), np.abs(numbers.T), rtol=1e-9, atol=0.0):
             order = list(range(self.n))
         else:
             from scipy.optimize import linear_sum_assignment

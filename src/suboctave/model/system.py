@@ -184,10 +184,10 @@ class System:
                     raise InputError(f"{where}: {error}") from None
         first = changed is self.parameters
         for element in self.elements:
+            element.check(self.parameters, first)
             kind = element.sampling(element.coefficient_values(self.parameters))
             if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
                 raise InputError(f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class")
-            element.check(self.parameters, first)
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
             check_mass(mass)
