@@ -16,10 +16,13 @@ from suboctave.harmonic.group_force import GroupLaw
 from suboctave.harmonic.nodal import NodalForce
 from suboctave.harmonic.quadrature import FEWEST
 from suboctave.harmonic.state import BalanceState
+from suboctave.stability.nodes import NODES, ORDER
 from suboctave.model.sampling import AdaptiveSampling, CornerSampling, PolynomialSampling, SharpVelocitySampling
 
 #: nodes per period of a law that tells nothing, in units of panels of one radian; phase of a tangent over a panel
 _BLIND, _TANGENT = 48.0, 7.0
+#: width of the slices that are cut out around corners, in units of the motion
+_SLICE = 1e-9
 _NONE, _NO_PIECES = np.zeros(0), np.zeros((0, 3))
 
 
@@ -50,6 +53,9 @@ class Channels:
         self.degree, self.finest, self.blind = 0, math.inf, False
         self._elements: list[tuple[NodalForce, int, Array]] = []
         self._tangents: list[Array] = []
+        #: channels with marks of corners, by the first channel of their element; panels between marks, by channel
+        self._sliced: dict[int, list[tuple[int, int]]] = {}
+        self._slices: dict[int, list[int]] = {}
         for nodal in state.nodal:
             self._add(nodal)
         self._clock = -1
@@ -80,12 +86,15 @@ class Channels:
             if len(d) == 1:
                 # one unknown DOF: channels have one direction there
                 scale[i], left = own.out[0] / d[0], d
-            self._channel(motion, left, d, _marks(corners.points if i == 0 else ()))
+            self._channel(motion, left, d, _marks(corners.points if i == 0 else (), motion))
+            if i == 0 and corners.points:
+                self._sliced.setdefault(self.first + begin, []).append((self.first + begin, 0))
         self.forces[begin] = scale[0] * nodal.force
         self._elements.append((nodal, self.first + begin, scale))
         velocity = 1j * nodal.rate * np.arange(len(nodal.motions[0])) * nodal.motions[0]
         if corners.velocities and velocity.any():
-            self._channel(velocity, None, None, _marks(corners.velocities))
+            probe = self._channel(velocity, None, None, _marks(corners.velocities, velocity))
+            self._sliced.setdefault(self.first + begin, []).append((probe, 1))
         if isinstance(kind, SharpVelocitySampling) and velocity.any():
             self._channel(velocity, None, None, singular=(np.array(kind.velocities), np.array(kind.widths)))
         degree = max(1, kind.degree - 1) if isinstance(kind, PolynomialSampling) else 1
@@ -124,19 +133,55 @@ class Channels:
             if nodal.own.moving:
                 law[begin + i, 1] += scale[i] * f_q[count + i]
 
-    def changed(self, path: Array, change: Array, law: Array) -> None:
-        """Add stiffness and damping along the path changed by `change` to `law` (G, 2, N)."""
+    def changed(self, path: Array, change: Array, law: Array, stretch: Array) -> None:
+        """Add stiffness and damping along the path changed by `change` to `law` (G, 2, N).
+
+        Laws with corners are continued to first order from where they were, and for the time by which the motion
+        reaches a corner later the law before it stays: an impulse, put into the slice that was cut out there.
+        """
         for (nodal, begin, scale), f_q in zip(self._elements, self._tangents, strict=True):
             q, theta = self._state(nodal, begin, path)
             rows = change[begin : begin + nodal.own.count]
             d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.own.moving else rows[:, 0]
-            if isinstance(nodal.kind, SharpVelocitySampling):
-                f_q = f_q + np.einsum("rsn,sn->rn", nodal.own.law.curvature(q, theta, nodal.c), d)
+            if isinstance(nodal.kind, SharpVelocitySampling | CornerSampling):
+                new = f_q + np.einsum("rsn,sn->rn", nodal.own.law.curvature(q, theta, nodal.c), d)
             else:
-                f_q = nodal.own.law.tangent(q + d, theta, nodal.c)[1]
-            self._put(nodal, begin, scale, f_q, law)
+                new = nodal.own.law.tangent(q + d, theta, nodal.c)[1]
+            self._put(nodal, begin, scale, new, law)
+            for channel, order in self._sliced.get(begin, ()):
+                row = order * nodal.own.count
+                for p in self._slices.get(channel, ()):
+                    i = p * (ORDER - 1)
+                    j = i + ORDER - 1
+                    # of the displacement, or of the velocity
+                    slope = path[channel, 1, i] + (change[begin, 1, i] if order == 0 else 0.0)
+                    jump = f_q[row, j] - f_q[row, i]
+                    if slope == 0.0 or jump == 0.0:
+                        continue
+                    later = -change[begin, order, i] / slope
+                    length = 2.0 * stretch[p, 0] / nodal.rate
+                    law[begin, order, i : j + 1] -= scale[0] * 1.5 * jump * later / length * (1.0 - NODES**2)
+
+    def locate(self, events: Array, start: np.ndarray, counts: np.ndarray) -> None:
+        """Find the slices around corners: panels between the two marks of one corner.
+
+        events, start: see `panels.lay_out`; counts: how many pieces every channel has.
+        """
+        owner = np.repeat(np.arange(len(counts)), counts)
+        first = np.concatenate(([0], np.cumsum(counts)))
+        pieces = events[:, 5].astype(int)
+        for i, piece in enumerate(pieces):
+            follow = (i + 1) % len(pieces)
+            if piece < 0 or owner[piece] < self.first or pieces[follow] < 0 or follow == i:
+                continue
+            channel = int(owner[piece])
+            own, other = piece - first[channel], pieces[follow] - first[channel]
+            apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
+            if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
+                self._slices.setdefault(channel, []).append(int(start[i]))
 
 
-def _marks(levels: tuple[float, ...]) -> Array:
-    """Pieces without stiffness: panels end where the motion crosses them."""
-    return np.array([(0.0, level, 1.0) for level in levels]).reshape(-1, 3)
+def _marks(levels: tuple[float, ...], motion: ComplexArray) -> Array:
+    """Pieces without stiffness: panels end where the motion crosses them, just before and just after a corner."""
+    near = _SLICE * 2.0 * float(np.abs(motion).max())
+    return np.array([(0.0, level + side * near, 1.0) for level in levels for side in (-1.0, 1.0)]).reshape(-1, 3)

@@ -94,6 +94,7 @@ class Linearisation:
                     if f_v is not None:
                         self.law[g, 2] += f_v
                     self._asked.append((g, element, a, sharp, f_u, f_v))
+        own.locate(self._events, self._start, self._laws.counts[:, 0])
         own.ask(self.path, self.law)
 
     def changed(self, change: Array) -> tuple[Array, Array]:
@@ -130,7 +131,7 @@ class Linearisation:
             law[g, 0] += f_u
             if f_v is not None:
                 law[g, 1] += f_v
-        self._own.changed(self.path, change, law)
+        self._own.changed(self.path, change, law, self.stretch)
         return law, kick
 
 
