@@ -53,7 +53,9 @@ def test_the_tip_of_the_tongue():
     (tip,) = sweep.bifurcations["PD"]
     assert tip.parameters["eps"] == pytest.approx(2.0 * c, rel=5e-3)
     omega = [o for o in np.linspace(1.97, 2.03, 13) if abs(o - 2.0) > 1e-9]
-    others = [so.continue_branch(rest(c=c, eps=0.01), "eps", (0.01, 0.2), omega=o).bifurcations["PD"][0] for o in omega[::4]]
+    others = [
+        so.continue_branch(rest(c=c, eps=0.01), "eps", (0.01, 0.2), omega=o).bifurcations["PD"][0] for o in omega[::4]
+    ]
     assert all(other.parameters["eps"] > tip.parameters["eps"] - 1e-4 for other in others)
 
 
@@ -66,7 +68,9 @@ def test_a_curve_with_load_and_its_doublings_against_shooting():
     orbit = curve.orbits[len(curve) // 2]
     exact = shoot(system, orbit.start(), orbit.omega)
     np.testing.assert_allclose(orbit.start(), exact.state, atol=1e-4)
-    np.testing.assert_allclose(np.sort_complex(so.stability(orbit).multipliers), np.sort_complex(exact.multipliers), atol=1e-4)
+    np.testing.assert_allclose(
+        np.sort_complex(so.stability(orbit).multipliers), np.sort_complex(exact.multipliers), atol=1e-4
+    )
 
 
 def test_motions_of_twice_the_period_see_the_excitation_at_its_own_period():
@@ -91,7 +95,8 @@ def test_motions_of_twice_the_period_see_the_excitation_at_its_own_period():
 def test_van_der_pol_locked_to_its_load():
     """x'' - mu (1 - x^2) x' + x = p cos(omega t), from equations, against shooting."""
     system = so.System.from_equations("x'' - mu*(1 - x**2)*x' + x = p*cos(omega*t)", {"mu": 0.4, "p": 0.8})
-    curve = so.frequency_response(system, (0.98, 1.1), start=[2.0, 0.0])
+    locked = shoot(system, [2.0, 0.0], 1.0)
+    curve = so.frequency_response(system, (1.0, 1.1), start=locked.state)
     orbit = curve.orbits[len(curve) // 2]
     exact = shoot(system, orbit.start(), orbit.omega)
     np.testing.assert_allclose(orbit.start(), exact.state, atol=1e-4)

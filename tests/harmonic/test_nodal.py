@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.special import gamma
@@ -17,7 +19,12 @@ OMEGA = 1.7
 def state_of(element, x, nu=1, omega=OMEGA, **parameters):
     n = x.shape[1]
     system = so.System(
-        np.eye(n), 0.1 * np.eye(n), np.eye(n), elements=[element], loads=[so.HarmonicLoad(0, 1.0)], parameters=parameters
+        np.eye(n),
+        0.1 * np.eye(n),
+        np.eye(n),
+        elements=[element],
+        loads=[so.HarmonicLoad(0, 1.0)],
+        parameters=parameters,
     )
     balance = HarmonicBalance(system, HarmonicBasis(len(x) // 2, nu))
     return balance.settle(x, omega).at(x, omega)
@@ -85,11 +92,11 @@ def test_friction_is_integrated_whatever_its_sharpness(velocity):
     ends = np.append(zeros, zeros[0] + 2 * np.pi)
     nodes, weights = np.polynomial.legendre.leggauss(40)
     total = np.zeros(3)
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         half = 0.5 * (b - a)
         steps = np.concatenate(([0.0], half * np.geomspace(1e-9, 1.0, 60)))
         for start, sign in ((a, 1.0), (b, -1.0)):
-            for low, high in zip(steps[:-1], steps[1:], strict=True):
+            for low, high in pairwise(steps):
                 tau = start + sign * (0.5 * (low + high) + 0.5 * (high - low) * nodes)
                 f = 0.8 * np.tanh(v(tau) / velocity)
                 total += 0.5 * (high - low) * np.array([f, f * np.cos(tau), f * np.sin(3 * tau)]) @ weights

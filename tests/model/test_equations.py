@@ -67,7 +67,8 @@ def test_everything_at_once_against_the_text_in_numbers():
     """Coupled masses, an equation with its sign turned, a constant, waves, parametric, coupled and one-sided forces."""
     system = make(
         [
-            "-2*x'' - 0.3*y'' = 0.1*x' + (1 + e*cos(2*omega*t + 0.4))*x - y + y*x**2 + max(x - y - g, 0)*y - F*sin(omega*t)",
+            "-2*x'' - 0.3*y'' = 0.1*x' + (1 + e*cos(2*omega*t + 0.4))*x - y + y*x**2"
+            " + max(x - y - g, 0)*y - F*sin(omega*t)",
             "y'' + 0.3*x'' + 0.2*y' + 2*y - x + x*y*x' + (x' - 2*y')**3 + (1 + y)**2 = F*cos(omega*t)**2 + 3",
         ],
         {"e": 0.2, "g": 0.1, "F": 1.5},
@@ -89,7 +90,9 @@ def test_equations_in_any_order_and_names_in_order_of_appearance():
 
 
 def test_loads_with_amplitudes_and_phases_of_the_frequency():
-    system = make("x'' + 0.1*x' + x = m*e*omega**2*cos(omega*t - 2*p) + sin(3*omega*t + p)", {"m": 2.0, "e": 0.1, "p": 0.3})
+    system = make(
+        "x'' + 0.1*x' + x = m*e*omega**2*cos(omega*t - 2*p) + sin(3*omega*t + p)", {"m": 2.0, "e": 0.1, "p": 0.3}
+    )
     t = np.linspace(0.0, 5.0, 11)
     expected = 0.2 * 1.7**2 * np.cos(1.7 * t - 0.6) + np.sin(5.1 * t + 0.3)
     np.testing.assert_allclose(system.force_time(t, 1.7)[0], expected, atol=1e-13)

@@ -22,7 +22,11 @@ CASES = [
     ("k*max(x - j, 0)**3.5", None, CornerSampling),
     ("c*v*abs(v) + k*(x - j)*heaviside(x - j)", None, CornerSampling),
     ("k*min(x, 2*x)", None, CornerSampling),
-    ("a*tanh(v/v0) + b*sin(x) + exp(-x**2)/(1 + x**2) + sqrt(1 + x**2) + atan(x) + log(2 + x**2)", None, AdaptiveSampling),
+    (
+        "a*tanh(v/v0) + b*sin(x) + exp(-x**2)/(1 + x**2) + sqrt(1 + x**2) + atan(x) + log(2 + x**2)",
+        None,
+        AdaptiveSampling,
+    ),
     ("exp(e*cos(omega*t))*x", None, AdaptiveSampling),
     ("k*x*y**2*sin(omega*t) + c*y'*x", {"x": 0, "y": (1, 2)}, PolynomialSampling),
     ("k*abs(u)*w + b*w'**3", {"w": 1, "u": [1.0, -2.0, 0.0]}, AdaptiveSampling),
@@ -40,7 +44,9 @@ def test_all_derivatives_agree_with_differences_and_the_law_is_known_for_what_it
     assert isinstance(element.sampling(c), kind)
 
 
-@pytest.mark.parametrize("text", ["2*x**3 - x**2/3", "x*cosh(x) - tanh(x**2)", "max(x, 0.3)*x + x", "abs(x)**3", "-x**2"])
+@pytest.mark.parametrize(
+    "text", ["2*x**3 - x**2/3", "x*cosh(x) - tanh(x**2)", "max(x, 0.3)*x + x", "abs(x)**3", "-x**2"]
+)
 def test_values_are_those_of_python(text):
     from math import cosh, tanh
 
@@ -139,6 +145,8 @@ def test_other_wrong_arguments():
         so.Expression(0, "x", {"sin": 0})
     system = {"mass": 1.0, "damping": 0.1, "stiffness": 1.0, "loads": [so.HarmonicLoad(0, 1.0)]}
     with pytest.raises(InputError, match=r"unknown parameter 'alpa'.*did you mean 'alpha'"):
-        so.System(**system, elements=[so.Expression(0, "alpa*x**3"), so.CubicSpring(0, "alpha")], parameters={"alpha": 1.0})
+        so.System(
+            **system, elements=[so.Expression(0, "alpa*x**3"), so.CubicSpring(0, "alpha")], parameters={"alpha": 1.0}
+        )
     with pytest.raises(InputError, match="dof 1 does not exist"):
         so.System(**system, elements=[so.Expression(0, "x*y", {"x": 0, "y": 1})])

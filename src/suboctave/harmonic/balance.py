@@ -72,7 +72,9 @@ class HarmonicBalance:
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
         #: the elements that are evaluated direction by direction, and those with nodes of their own
-        self.elements: tuple[Element, ...] = tuple(e for e in system.elements if isinstance(e, Element) and not e.own_nodes)
+        self.elements: tuple[Element, ...] = tuple(
+            e for e in system.elements if isinstance(e, Element) and not e.own_nodes
+        )
         self.own = own_elements(system, self.linear)
         self.groups = self._grouped()
         #: the groups' directions, packed: where each begins, its DOFs, its entries there

@@ -22,7 +22,8 @@ Apply = Callable[[ComplexArray, ComplexArray], ComplexArray]
 
 
 class _Direction(Protocol):
-    x: Array
+    @property
+    def x(self) -> Array: ...
 
     @property
     def omega(self) -> float: ...

@@ -65,9 +65,7 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
         kernels.add_element(out, matrix, group.dofs, group.values, group.dofs, group.values, size)
     for nodal in state.nodal:
         own = nodal.own
-        for matrix, packed in zip(
-            nodal_second.two_sided(nodal, k, frequency, _two_sided), own.in_packed, strict=True
-        ):
+        for matrix, packed in zip(nodal_second.two_sided(nodal, k, frequency, _two_sided), own.in_packed, strict=True):
             kernels.add_element(out, matrix, *own.out_packed, *packed, size)
     compliance = state.linear.compliance(frequency)
     shaped = out.reshape(len(k), size, -1)
@@ -155,8 +153,8 @@ def bilinear_gradient(
         gx += part
         g_kappa += part_kappa
         drive += np.multiply.outer(response, nodal.own.out)
-        for name, change in changes.items():
-            rates[name] += change
+        for name, by_name in changes.items():
+            rates[name] += by_name
     for name in names:
         if name == "omega":
             continue

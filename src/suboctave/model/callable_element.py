@@ -110,7 +110,9 @@ class Callable(Element):
                 rough = self._slopes(u, v, c)
         except Exception:  # the user's function may raise anything on complex numbers
             return False
-        size = float(np.nanmax(np.abs(real), initial=0.0)) + max(float(np.nanmax(np.abs(r), initial=0.0)) for r in rough)
+        size = float(np.nanmax(np.abs(real), initial=0.0)) + max(
+            float(np.nanmax(np.abs(r), initial=0.0)) for r in rough
+        )
         # a function that drops imaginary parts has slopes of zero; corners between the points may disagree elsewhere
         return all(float(np.nanmedian(np.abs(a - b))) <= _AGREE * size for a, b in zip(exact, rough, strict=True))
 
@@ -122,7 +124,9 @@ class Callable(Element):
         if np.iscomplexobj(f) or f.shape != u.shape:
             if f.shape == () and not np.iscomplexobj(f):
                 return np.full(u.shape, float(f))
-            raise InputError(f"{self.label}: the function must return real arrays of shape {u.shape}, not {f.dtype} {f.shape}")
+            raise InputError(
+                f"{self.label}: the function must return real arrays of shape {u.shape}, not {f.dtype} {f.shape}"
+            )
         return f.astype(float)
 
     def _given(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
@@ -169,15 +173,23 @@ class Callable(Element):
         """See `Element.coefficient_tangent`; by differences."""
         out = np.zeros((3, len(c), len(u)))
         for i, value in enumerate(c):
-            for row, law in enumerate((self._value, lambda *a: self._slopes(*a)[0], lambda *a: self._slopes(*a)[1])):
-                out[row, i] = _difference(lambda h, i=i, law=law: law(u, v, self._shifted(c, i, h)), value)
+
+            def law(h: float, i: int = i) -> Array:
+                moved = self._shifted(c, i, h)
+                return np.array([self._value(u, v, moved), *self._slopes(u, v, moved)])
+
+            out[:, i] = _difference(law, value)
         return out[0], out[1], out[2]
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; by differences."""
         out = np.zeros((len(c), len(c), len(u)))
         for i, value in enumerate(c):
-            out[i] = _difference(lambda h, i=i: self.coefficient_tangent(u, v, self._shifted(c, i, h))[0], value)
+
+            def law(h: float, i: int = i) -> Array:
+                return self.coefficient_tangent(u, v, self._shifted(c, i, h))[0]
+
+            out[i] = _difference(law, value)
         return 0.5 * (out + out.transpose(1, 0, 2))
 
 

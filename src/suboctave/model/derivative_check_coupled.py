@@ -88,16 +88,21 @@ def _states(element: CoupledElement, c: Array, u: ArrayLike | None, v: ArrayLike
     kind = element.sampling(c)
     corners = kind if isinstance(kind, CornerSampling) else CornerSampling()
     reach = max([abs(p) for p in corners.points] + [0.0]) or 1.0
-    rows = [2.1 * reach * np.sin((1.3 + 0.7 * i) * steps + i) for i in range(m)] if u is None else list(np.atleast_2d(u))
+    rows = (
+        [2.1 * reach * np.sin((1.3 + 0.7 * i) * steps + i) for i in range(m)] if u is None else list(np.atleast_2d(u))
+    )
     if element.depends_on_velocity:
         fast = max([abs(p) for p in corners.velocities] + [0.0]) or 1.0
-        rows += [1.7 * fast * np.cos((1.7 + 0.6 * i) * steps) for i in range(m)] if v is None else list(np.atleast_2d(v))
+        rows += (
+            [1.7 * fast * np.cos((1.7 + 0.6 * i) * steps) for i in range(m)] if v is None else list(np.atleast_2d(v))
+        )
     if len({len(row) for row in rows}) != 1 or not np.all(np.isfinite(np.concatenate(rows))):
         raise InputError("u and v must be finite, with one row of equal length per input")
-    q = np.array(rows, dtype=float)
+    q: Array = np.array(rows, dtype=float)
     keep = np.full(q.shape[1], True)
     for row, levels in ((0, corners.points), (m, corners.velocities)):
         for level in levels:
             keep &= np.abs(q[row] - level) > 4.0 * _STEP * float(np.max(np.abs(q[row])))
-    q = np.ascontiguousarray(q[:, keep])
-    return q, 0.37 + 0.9 * np.arange(q.shape[1])
+    q = q[:, keep].copy()
+    theta: Array = 0.37 + 0.9 * np.arange(q.shape[1], dtype=float)
+    return q, theta

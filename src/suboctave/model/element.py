@@ -181,10 +181,8 @@ class Element(BaseElement):
         f_uuu = _difference(lambda h: self.curvature(u + h, v, c)[0], u)
         if not moving:
             return f_uuu, None, None, None
-        f_uuv, f_uvv, f_vvv = (
-            _difference(lambda h, part=part: self.curvature(u, v + h, c)[part], v) for part in range(3)
-        )
-        return f_uuu, f_uuv, f_uvv, f_vvv
+        by_v = _difference(lambda h: np.array(self.curvature(u, v + h, c)), v)
+        return f_uuu, by_v[0], by_v[1], by_v[2]
 
 
 def _difference(law: Callable[[float], Any], at: Array) -> Array:

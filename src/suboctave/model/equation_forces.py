@@ -75,20 +75,20 @@ class Forces:
         """Everything that was collected; `taken` are names that are in use."""
         made: list[BaseElement] = []
         smooth: dict[tuple[tuple[float, ...], tuple[float, ...]], Any] = {}
-        for (law, direction), acting in self.along.items():
-            if not np.any(acting):
+        for (law, direction), places in self.along.items():
+            if not np.any(places):
                 continue  # terms that cancel
-            first = next(j for j, entry in enumerate(direction) if entry)
-            scale = acting[first]
-            if np.allclose(acting, scale * np.array(direction), rtol=1e-14, atol=0.0) and scale:
-                law, acting = law * _number(scale), np.array(direction)
-            stop = self._stop(law, direction) if tuple(acting) == direction else None
+            acting = tuple(float(place) for place in places)
+            scale = acting[next(j for j, entry in enumerate(direction) if entry)]
+            if scale and np.allclose(places, scale * np.array(direction), rtol=1e-14, atol=0.0):
+                law, acting = law * _number(scale), direction
+            stop = self._stop(law, direction) if acting == direction else None
             if stop is not None:
                 made.append(stop)
             elif self._has_corner(law):
-                made.append(self._expression(law, direction, tuple(acting), taken))
+                made.append(self._expression(law, direction, acting, taken))
             else:
-                key = (direction, tuple(acting))
+                key = (direction, acting)
                 smooth[key] = smooth.get(key, 0) + law
         for (direction, acting), law in smooth.items():
             spring = self._spring(law, direction) if direction == acting else None
@@ -115,7 +115,12 @@ class Forces:
             factor = sympy.cancel(factor / argument)
         slope = argument.diff(self.u)
         varying = {self.u, self.rate, symbol("t"), symbol("omega")}
-        if factor.free_symbols & varying or not slope.is_number or slope == 0 or argument.free_symbols & (varying - {self.u}):
+        if (
+            factor.free_symbols & varying
+            or not slope.is_number
+            or slope == 0
+            or argument.free_symbols & (varying - {self.u})
+        ):
             return None
         gap = -argument.subs(self.u, 0) / slope
         side = "right" if slope > 0 else "left"
@@ -222,4 +227,3 @@ def _number(value: float) -> Any:
     import sympy
 
     return sympy.Integer(int(value)) if float(value).is_integer() else sympy.Float(value)
-

@@ -61,7 +61,9 @@ class _Equations:
             raise InputError("no second derivative such as x'' occurs in the equations: nothing has a mass")
         if len(found) != len(self.texts):
             listed = ", ".join(f"{name}''" for name in found)
-            raise InputError(f"{len(self.texts)} equations for {len(found)} accelerations ({listed}); give one for each")
+            raise InputError(
+                f"{len(self.texts)} equations for {len(found)} accelerations ({listed}); give one for each"
+            )
         for name in found:
             if name in self.parameters:
                 raise InputError(f"{name!r} is both a parameter and a degree of freedom ({name}'' occurs)")
@@ -85,9 +87,7 @@ class _Equations:
                 raise InputError(f"{self.where(i)}: {name}' occurs, but no equation has {name}''{hint}")
         import sympy
 
-        parts = [
-            read(" " * (len(sides[0]) + 1) * k + side, self.where(i), known) for k, side in enumerate(sides)
-        ]
+        parts = [read(" " * (len(sides[0]) + 1) * k + side, self.where(i), known) for k, side in enumerate(sides)]
         whole = parts[0] - (parts[1] if len(parts) > 1 else 0)
         return whole.replace(sympy.Abs, corner_functions().Modulus)
 
@@ -134,7 +134,7 @@ class _Equations:
             from scipy.optimize import linear_sum_assignment
 
             rows, columns = linear_sum_assignment(-np.abs(numbers))
-            order = [int(rows[list(columns).index(j)]) for j in range(self.n)]
+            order = [int(rows[columns.tolist().index(j)]) for j in range(self.n)]
         signs = [-1 if numbers[i, j] < 0.0 else 1 for j, i in enumerate(order)]
         mass = [[sign * entry for entry in mass[i]] for i, sign in zip(order, signs, strict=True)]
         return mass, [sign * equations[i] for i, sign in zip(order, signs, strict=True)]
@@ -181,11 +181,12 @@ class _Equations:
                     varying += part * state
                     continue
                 if self.omega in part.free_symbols:
-                    raise InputError(
-                        f"{self.where(i)}: omega occurs in {as_text(part * state)}; only loads may depend on the frequency"
-                    )
-                into, j = (self.stiffness, self.x.index(state)) if state in self.x else (self.damping, self.v.index(state))
-                into[i][j] += part
+                    what = as_text(part * state)
+                    raise InputError(f"{self.where(i)}: omega occurs in {what}; only loads may depend on the frequency")
+                if state in self.x:
+                    self.stiffness[i][self.x.index(state)] += part
+                else:
+                    self.damping[i][self.v.index(state)] += part
         if varying != 0:
             self.forces.add(i, varying)
         rest = term.xreplace(dict.fromkeys(inside, 0 * self.t))
@@ -219,8 +220,8 @@ class _Equations:
                     self._load(i, turned, True)
                     continue
             raise InputError(
-                f"{self.where(i)}: {as_text(part)} is no load: time occurs as cos(k*omega*t + phase) or sin, k a positive "
-                "integer"
+                f"{self.where(i)}: {as_text(part)} is no load: time occurs as cos(k*omega*t + phase) or sin, "
+                "k a positive integer"
             )
 
     def _wave(self, i: int, amplitude: Any, wave: Any, multiple: int) -> None:
@@ -233,7 +234,9 @@ class _Equations:
             amplitude = -amplitude if sine else amplitude
         if sine:
             phase = phase - sympy.pi / 2
-        self.waves[i].append((as_text(amplitude), multiple, "-pi/2" if sine and phase == -sympy.pi / 2 else as_text(phase)))
+        self.waves[i].append(
+            (as_text(amplitude), multiple, "-pi/2" if sine and phase == -sympy.pi / 2 else as_text(phase))
+        )
 
     def _loads(self) -> list[Load]:
         loads: list[Load] = []
@@ -245,9 +248,9 @@ class _Equations:
             loads.append(
                 HarmonicLoad(
                     dof=i,
-                    amplitude=amplitude,  # type: ignore[arg-type]
+                    amplitude=amplitude,
                     harmonic=harmonic,  # type: ignore[arg-type]
-                    phase=phase,  # type: ignore[arg-type]
+                    phase=phase,
                     static=as_text(static) if static != 0 else 0.0,
                 )
             )

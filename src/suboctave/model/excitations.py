@@ -61,7 +61,7 @@ class StaticLoad(Load):
 class RotatingUnbalance(Load):
     """The force of a mass that rotates off its axis, `mass_eccentricity * omega^2`.
 
-    It acts at `dof` as `m e (harmonic omega)^2 cos(harmonic omega t + phase)`; if the DOF `perpendicular` is given, too,
+    It acts at `dof` as `m e (harmonic omega)^2 cos(harmonic omega t + phase)` and, if the DOF `perpendicular` is given,
     there as the same with sin: forwards whirl from `dof` towards `perpendicular`. `harmonic` is the speed of the shaft
     in units of omega. Unit of `mass_eccentricity`: mass times length.
     """

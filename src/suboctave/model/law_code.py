@@ -31,7 +31,7 @@ _OPERATIONS = 5000
 
 @functools.lru_cache(maxsize=512)
 def law_of(text: str, states: tuple[str, ...], short: bool, where: str) -> Law:
-    """The law of a text in the displacements `states` and their rates, written with a prime; `short`: v is that of x."""
+    """The law of a text in the displacements `states` and their rates (with a prime); `short`: v is that of x."""
     expression = read(text, where)
     if short:
         expression = expression.subs(symbol("v"), symbol("x" + PRIME))
@@ -105,7 +105,9 @@ class Law:
         corner = corner_functions()
         above = {corner.Ramp: argument, corner.Step: 1, corner.Modulus: argument, corner.Sign: 1}
         below = {corner.Ramp: 0, corner.Step: 0, corner.Modulus: -argument, corner.Sign: -1}
-        jumps = any(isinstance(a, (corner.Step, corner.Sign)) and a.args[0] == argument for a in _functions(self.expression))
+        jumps = any(
+            isinstance(a, (corner.Step, corner.Sign)) and a.args[0] == argument for a in _functions(self.expression)
+        )
         if not jumps:
             return
         hint = (
@@ -113,10 +115,12 @@ class Law:
             "TanhFriction, or tanh(v/v0)"
         )
         if place is None:
-            raise InputError(f"{self.where}: it cannot be told whether the force jumps where {as_text(argument)} changes sign; {hint}")
+            where = f"where {as_text(argument)} changes sign"
+            raise InputError(f"{self.where}: it cannot be told whether the force jumps {where}; {hint}")
         sides = [self.expression.subs({kind(argument): v for kind, v in one.items()}) for one in (above, below)]
         draw = np.random.default_rng(1)
-        q, theta, c = draw.uniform(0.3, 1.7, (len(self.q), 5)), draw.uniform(0.0, 6.0, 5), draw.uniform(0.3, 1.7, len(self.c))
+        q, c = draw.uniform(0.3, 1.7, (len(self.q), 5)), draw.uniform(0.3, 1.7, len(self.c))
+        theta = draw.uniform(0.0, 6.0, 5)
         q[place[0]] = self._compile([place[1]])(q, theta, c)[0]
         upper, lower = self._compile(sides)(q, theta, c)
         if not np.all(np.abs(upper - lower) <= 1e-9 * (1.0 + np.abs(upper) + np.abs(lower))):
@@ -260,8 +264,8 @@ def _with_phase(expression: Any, where: str) -> tuple[Any, int]:
         multiple = harmonic_of(wave.args[0])
         if multiple is None:
             raise InputError(
-                f"{where}: {as_text(wave)} does not have the period of the load; time occurs as cos(k*omega*t + phase) or sin, "
-                "k a positive integer"
+                f"{where}: {as_text(wave)} does not have the period of the load; time occurs as cos(k*omega*t + phase) "
+                "or sin, k a positive integer"
             )
         swaps[wave] = type(wave)(multiple * theta + wave.args[0].subs(t, 0))
         highest = max(highest, abs(multiple))

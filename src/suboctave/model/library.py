@@ -137,10 +137,11 @@ def duffing(c: float = 0.05, k: float = 1.0, alpha: float = 1.0, F: float = 1.0,
 def mathieu_duffing(
     c: float = 0.05, k: float = 1.0, eps: float = 0.2, gamma: float = 0.3, F: float = 0.0, m: float = 1.0
 ) -> System:
-    """A Duffing oscillator of varying stiffness, `m x'' + c x' + k (1 + eps cos(omega t)) x + gamma x^3 = F cos(omega t)`.
+    """A Duffing oscillator of varying stiffness, `k (1 + eps cos(omega t))`.
 
-    Without `F` it is at rest until that loses its stability: by a period doubling around `omega = 2 sqrt(k/m)`, where
-    `eps` exceeds about `2 c / sqrt(k m)` (Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, section 5.2).
+    `m x'' + c x' + k (1 + eps cos(omega t)) x + gamma x^3 = F cos(omega t)`. Without `F` it is at rest until that
+    loses its stability: by a period doubling around `omega = 2 sqrt(k/m)`, where `eps` exceeds about `2 c / sqrt(k m)`
+    (Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, section 5.2).
     """
     return System(
         mass="m",
@@ -167,8 +168,8 @@ def jeffcott_rotor(
     """A Jeffcott rotor with an unbalance `me`, DOFs x and y; `omega` is the speed of its shaft.
 
     `clearance`: radial distance to a frictionless stator ring of stiffness `kc`, which pushes the shaft back along its
-    radius beyond it (None: no stator): `F_r = kc max(r - clearance, 0)` with `r^2 = x^2 + y^2 + (1e-6 clearance)^2`, which
-    keeps r from zero at rest.
+    radius beyond it (None: no stator): `F_r = kc max(r - clearance, 0)` with `r^2 = x^2 + y^2 + (1e-6 clearance)^2`,
+    which keeps r from zero at rest.
     """
     parameters = {"m": m, "c": c, "k": k, "me": me}
     rubbing = []

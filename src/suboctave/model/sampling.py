@@ -115,10 +115,5 @@ class SharpVelocitySampling:
 
 
 Sampling: TypeAlias = (
-    PolynomialSampling
-    | SharpSampling
-    | PiecewiseLinear
-    | AdaptiveSampling
-    | CornerSampling
-    | SharpVelocitySampling
+    PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling | CornerSampling | SharpVelocitySampling
 )

@@ -31,9 +31,9 @@ class System:
     `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
     numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite
     at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the
-    left-hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad` and
-    other loads, on the right-hand side. `parameters`: `{name: number}`, every
-    one of them used somewhere. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are circular.
+    left-hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad`
+    and other loads, on the right-hand side. `parameters`: `{name: number}`, every one of them used somewhere.
+    `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are circular.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -187,7 +187,9 @@ class System:
             element.check(self.parameters, first)
             kind = element.sampling(element.coefficient_values(self.parameters))
             if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
-                raise InputError(f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class")
+                raise InputError(
+                    f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class"
+                )
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
             check_mass(mass)

@@ -16,8 +16,8 @@ from suboctave.harmonic.group_force import GroupLaw
 from suboctave.harmonic.nodal import NodalForce
 from suboctave.harmonic.quadrature import FEWEST
 from suboctave.harmonic.state import BalanceState
-from suboctave.stability.nodes import NODES, ORDER
 from suboctave.model.sampling import AdaptiveSampling, CornerSampling, PolynomialSampling, SharpVelocitySampling
+from suboctave.stability.nodes import NODES, ORDER
 
 #: nodes per period of a law that tells nothing, in units of panels of one radian; phase of a tangent over a panel
 _BLIND, _TANGENT = 48.0, 7.0

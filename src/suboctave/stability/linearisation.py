@@ -8,7 +8,6 @@ exceeds the law's width the new ones lie between the nodes; the linear form has 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np

@@ -87,7 +87,10 @@ class Variational:
         for nodal in state.nodal:
             reaching = nodal.reaching(top)
             for j, direction in enumerate(nodal.own.ins):
-                left[i], right[i] = inverse @ state.linear.expand(nodal.own.out), state.linear.expand(direction) / weight
+                left[i], right[i] = (
+                    inverse @ state.linear.expand(nodal.own.out),
+                    state.linear.expand(direction) / weight,
+                )
                 k[i] = reaching.stiffness(j)
                 if nodal.own.moving:
                     c[i] = reaching.damping(j)
