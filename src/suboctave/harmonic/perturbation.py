@@ -196,7 +196,7 @@ def _inner(left: ComplexArray, right: ComplexArray) -> complex:
 
 def _form(left: ComplexArray, blocks: ComplexArray, right: ComplexArray) -> complex:
     """`left^H blocks right`, one block per frequency."""
-    return complex(np.einsum("fi,fij,fj->", left.conj(), blocks, right))
+    return complex(kernels.form(left, blocks, right))
 
 
 def _toeplitz_apply(spectrum: ComplexArray, waves: ComplexArray) -> ComplexArray:
