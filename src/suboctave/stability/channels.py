@@ -167,6 +167,8 @@ class Channels:
 
         events, start: see `panels.lay_out`; counts: how many pieces every channel has.
         """
+        if not self._sliced:
+            return
         owner = np.repeat(np.arange(len(counts)), counts)
         first = np.concatenate(([0], np.cumsum(counts)))
         pieces = events[:, 5].astype(int)
