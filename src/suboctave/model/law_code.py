@@ -68,6 +68,9 @@ class Law:
         self.c: list[Any] = sorted(self.expression.free_symbols - taken, key=str)
         self.coefficients = tuple(found.name for found in self.c)
         self._degree, self._corner_places = self._smoothness()
+        corner = corner_functions()
+        powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
+        self._rough = any(power.base.has(corner.Ramp, corner.Modulus, corner.Step) for power in powers)
 
     # ------------------------------------------------------------------------------------------------ smoothness
     def _smoothness(self) -> tuple[int | None, list[tuple[int, Any]] | None]:
@@ -160,7 +163,7 @@ class Law:
         rows = [row for row, _ in self._corner_places]
         points = sorted({float(v) for row, v in zip(rows, values, strict=True) if row == 0})
         velocities = sorted({float(v) for row, v in zip(rows, values, strict=True) if row})
-        return CornerSampling(tuple(points), tuple(velocities))
+        return CornerSampling(tuple(points), tuple(velocities), self._rough)
 
     # ------------------------------------------------------------------------------------------------ derivatives
     @functools.cached_property
