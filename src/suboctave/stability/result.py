@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
+
+#: logarithm of the product of all multipliers below which a motion counts as undamped
+_UNDAMPED = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,6 +33,8 @@ class FloquetResult:
         What the method found when it checked itself, by name.
     witnesses
         The results that were weighed against each other, in the order asked; empty if one method was enough.
+    stands_in
+        True where the method asked for was not applicable on a curve and the monodromy matrix stands in for it.
     """
 
     multipliers: ComplexArray
@@ -38,6 +43,7 @@ class FloquetResult:
     note: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
     witnesses: tuple[FloquetResult, ...] = ()
+    stands_in: bool = False
 
     @classmethod
     def inapplicable(
@@ -78,6 +84,11 @@ class FloquetResult:
         return self._verdict[1]
 
     @property
+    def undamped(self) -> bool:
+        """True if the product of all multipliers is one to rounding: pairs then stay on the unit circle."""
+        return abs(float(np.log(np.maximum(np.abs(self.multipliers), 1e-300)).sum())) < _UNDAMPED
+
+    @property
     def unstable(self) -> int:
         """Number of multipliers outside the unit circle."""
         return self._verdict[2]
@@ -105,7 +116,7 @@ class FloquetResult:
         return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
 
 
-@njit(cache=True)
+@kernel()
 def _judged(multipliers, errors):
     """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
     the distance of the nearest one.
