@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
@@ -49,8 +50,14 @@ class ResponseEvaluation:
 
     @lazy
     def at_rest(self) -> bool:
-        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve."""
-        return motion_size(self.state) <= _REST * self.reference
+        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve.
+
+        Without loads (parametric excitation alone) rest is a motion like any other, which may lose its stability; but
+        not in a corner of a law, where it has no linear neighbourhood.
+        """
+        if motion_size(self.state) > _REST * self.reference:
+            return False
+        return self.reference > 0.0 or rests_in_corner(self.state)
 
     @lazy
     def truncation(self) -> float:

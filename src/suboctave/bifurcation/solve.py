@@ -25,6 +25,8 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 
 _TOLERANCE = 1e-10
 _STEP = 1e-9
+#: size of motion and forces at rest: products of it with others neither overflow nor vanish
+_NOTHING = 1e-100
 #: step below which the matrix is not computed anew
 _SHORT = 1e-3
 
@@ -141,7 +143,7 @@ def newton(
         if not all(e.size > 0.0 for e in equations):
             raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
-        force = max(state.force_scale(), np.finfo(float).tiny)
+        force = max(state.force_scale(), _NOTHING)
         error = float(np.linalg.norm(residual * rows)) / force
         error = max([error] + [abs(e.value) / e.size for e in equations])
         if not np.isfinite(error):
@@ -196,7 +198,7 @@ def _linearised(
     """
     n, q = len(rows), len(spans)
     matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
-    scale_x = max(motion_size(state), np.finfo(float).tiny) / weight
+    scale_x = max(motion_size(state), _NOTHING) / weight
     scale_rows = rows / force
     matrix[:n, :n] = state.jacobian * scale_rows[:, None] * scale_x
     matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span

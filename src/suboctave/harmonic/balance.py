@@ -24,11 +24,12 @@ from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.group_force import Group, GroupLaw
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
+from suboctave.harmonic.nodal import own_elements
 from suboctave.harmonic.quadrature import samples_for
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 from suboctave.model.element import Element
-from suboctave.model.sampling import AdaptiveSampling, Sampling
+from suboctave.model.sampling import AdaptiveSampling, CornerSampling, Sampling
 from suboctave.model.system import System
 
 
@@ -70,6 +71,11 @@ class HarmonicBalance:
         self.samples = samples if samples is not None else (None,) * len(system.elements)
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
+        #: the elements that are evaluated direction by direction, and those with nodes of their own
+        self.elements: tuple[Element, ...] = tuple(
+            e for e in system.elements if isinstance(e, Element) and not e.own_nodes
+        )
+        self.own = own_elements(system, self.linear)
         self.groups = self._grouped()
         #: the groups' directions, packed: where each begins, its DOFs, its entries there
         self.directions = (
@@ -92,7 +98,7 @@ class HarmonicBalance:
 
     def _grouped(self) -> list[Group]:
         found: dict[bytes, tuple[Array, list[int]]] = {}
-        for i, element in enumerate(self.system.elements):
+        for i, element in enumerate(self.elements):
             d = np.asarray(self.linear.retain(element.direction(self.system.n)), dtype=float)
             found.setdefault(d.tobytes(), (d, []))[1].append(i)
         groups = []
@@ -100,11 +106,6 @@ class HarmonicBalance:
             dofs = np.flatnonzero(d)
             groups.append(Group(d, dofs, d[dofs].copy(), tuple(members)))
         return groups
-
-    @property
-    def elements(self) -> tuple[Element, ...]:
-        """The system's elements."""
-        return self.system.elements
 
     def with_samples(self, samples: tuple[int | None, ...]) -> HarmonicBalance:
         """The same equations with other frozen sample counts."""
@@ -146,18 +147,20 @@ class HarmonicBalance:
             samples_for(local.element, local.motion, local.rate, local.coefficients, self.top)
             for local in state.local_motions
         )
-        return self.with_samples(samples)
+        return self.with_samples(samples + tuple(force.settled() for force in state.nodal))
 
     @lazy
     def _settled(self) -> bool:
         """True if no element needs a number of samples."""
         kinds = self.coefficients(self.values)[1]
-        return all(s is None for s in self.samples) and not any(isinstance(kind, AdaptiveSampling) for kind in kinds)
+        blind = AdaptiveSampling | CornerSampling
+        return all(s is None for s in self.samples) and not any(isinstance(kind, blind) for kind in kinds)
 
     @lazy
     def highest_load(self) -> int:
-        """Highest harmonic of omega that is loaded, 0 without loads."""
-        return max((c.harmonic for c in self.system.load_components()), default=0)
+        """Highest harmonic of omega that is loaded, or that an element depends on; 0 without."""
+        times = [own.harmonic for own in self.own]
+        return max([c.harmonic for c in self.system.load_components()] + times, default=0)
 
     def load(self, values: Mapping[str, float], omega: float) -> Array:
         """Load coefficients P, shape (2 H + 1, size)."""

@@ -119,13 +119,14 @@ class _Several:
         self.along = along
         n, linear = len(mass), along.state.linear
         shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
+        acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float).reshape(-1, n)
         # DOFs weighted by the square roots of their masses: norms have no units
         weight = np.sqrt(mass.diagonal())
         inverse = np.linalg.inv(mass) * weight[:, None]
         self.matrices = (
             inverse @ stiffness / weight,
             inverse @ damping / weight,
-            np.ascontiguousarray(shapes @ inverse.T),
+            np.ascontiguousarray(acting @ inverse.T),
             shapes / weight,
         )
         self.none = np.zeros((len(shapes), 0))
