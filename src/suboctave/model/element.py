@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
 from suboctave.model.expression import Coefficient, coefficient
+from suboctave.model.recorded import Recorded
 from suboctave.model.sampling import Sampling
 
 __all__ = ["Array", "Dof", "Element", "Place"]
@@ -79,7 +80,7 @@ class Place:
         return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
 
 
-class Element(ABC):
+class Element(Recorded, ABC, family="element"):
     """A nonlinear force along one direction. Subclasses are immutable by convention.
 
     A subclass sets `coefficient_names` (on the class, or on the object before `Element.__init__`) and, if its force

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError
 from suboctave.model.element import Array, Dof, Place, required
 from suboctave.model.expression import ZERO, Coefficient, coefficient
+from suboctave.model.recorded import Recorded
 
 __all__ = ["HarmonicLoad", "LoadComponent"]
 
@@ -29,7 +30,7 @@ class LoadComponent:
     phase: Coefficient
 
 
-class HarmonicLoad:
+class HarmonicLoad(Recorded, family="load"):
     """A force `amplitude cos(harmonic omega t + phase)` on the right-hand side.
 
     It acts at `dof` (an index, or a pair `(i, j)` for `e_i - e_j`) or along the vector `direction`. `amplitude`,
