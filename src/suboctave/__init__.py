@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
-    from suboctave.analysis import Branch, continue_branch, frequency_response, stability, verify
+    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, verify
     from suboctave.bifurcation import Bifurcation
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
@@ -66,6 +66,8 @@ _HOME = {
     "Hill": "suboctave.stability",
     "KoopmanHill": "suboctave.stability",
     "verify": "suboctave.analysis",
+    "load": "suboctave.analysis",
+    "Results": "suboctave.analysis",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
@@ -91,6 +93,7 @@ __all__ = [
     "NewtonOptions",
     "PeriodicOrbit",
     "PolynomialSpring",
+    "Results",
     "SteppingOptions",
     "SuboctaveError",
     "System",
@@ -99,6 +102,7 @@ __all__ = [
     "continue_branch",
     "frequency_response",
     "library",
+    "load",
     "stability",
     "verify",
 ]

@@ -71,20 +71,19 @@ def build(
     Raises InputError where the description is not one, or names a class that is not known (see `allow_code` above).
     """
     try:
-        matrices = [_read_matrix(description[what], what, arrays or {}) for what in _MATRICES]
-        parts = {
-            family: tuple(build_part(item, family, arrays or {}, allow_code) for item in description[f"{family}s"])
+        mass, damping, stiffness = (_read_matrix(description[what], what, arrays or {}) for what in _MATRICES)
+        elements, loads = (
+            tuple(build_part(item, family, arrays or {}, allow_code) for item in description[f"{family}s"])
             for family in ("element", "load")
-        }
+        )
         parameters, name = description["parameters"], str(description["name"])
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
-    if any(matrix.n != matrices[0].n for matrix in matrices):
+    if not mass.n == damping.n == stiffness.n:
         raise InputError("this is not the description of a system: its matrices have different sizes")
-    system = _assemble(*matrices, parts["element"], parts["load"], _read_parameters(parameters), name)
+    system = _assemble(mass, damping, stiffness, elements, loads, _read_parameters(parameters), name)
     system._check_names()
     system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
-    mass = system.mass
     check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))
     return system
 

@@ -127,7 +127,7 @@ class Element(Recorded, ABC, family="element"):
             c[i] = source.value(values)
         return c
 
-    def check(self, values: Mapping[str, float], first: bool) -> None:  # noqa: B027 - most have nothing to refuse
+    def check(self, values: Mapping[str, float], first: bool) -> None:
         """Refuse coefficients that make no sense at a system's parameters.
 
         Called with `first=True` when a system is made, with False when it is given other parameters.

@@ -7,7 +7,6 @@ their plain names ("CubicSpring"), those of a user as "module:Class". Nothing ha
 from __future__ import annotations
 
 import copy
-import functools
 import inspect
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -69,7 +68,6 @@ def constructor_arguments(cls: type) -> list[str]:
     return [p.name for p in list(_signature(cls).parameters.values())[1:] if p.kind not in kinds]
 
 
-@functools.cache
 def _signature(cls: type) -> inspect.Signature:
     return inspect.signature(cls.__init__)  # type: ignore[misc]
 
