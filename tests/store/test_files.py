@@ -95,9 +95,7 @@ def test_saved_twice_is_the_same(curve, saved, tmp_path):
 
 @pytest.mark.parametrize("parameter", ["arclength", "amplitude", "coefficients", "record"])
 def test_a_parameter_may_have_a_name_of_the_layout(parameter, tmp_path):
-    system = so.System(
-        1.0, 0.1, 1.0, so.CubicSpring(0, "c"), so.HarmonicLoad(0, parameter), {parameter: 0.3, "c": 1.0}
-    )
+    system = so.System(1.0, 0.1, 1.0, so.CubicSpring(0, "c"), so.HarmonicLoad(0, parameter), {parameter: 0.3, "c": 1.0})
     branch = so.continue_branch(system, parameter, (0.3, 0.4), omega=1.2, max_step=0.3)
     branches_equal(branch, so.load(branch.save(tmp_path / "a.nc")))
     assert branch.to_csv(tmp_path / "b.csv", "bifurcations").read_text().startswith("kind,omega")
@@ -109,7 +107,9 @@ def test_matrices_and_several_dofs_with_a_sparse_mass(tmp_path):
     n = 9
     chain = scipy.sparse.diags_array([[-1.0] * (n - 1), [2.1] * n, [-1.0] * (n - 1)], offsets=[-1, 0, 1]).tocsr()
     eye = scipy.sparse.eye_array(n).tocsr()
-    system = so.System(eye, {"c": eye.toarray()}, chain, so.ElasticStop((0, 8), 2.0, 0.5), so.HarmonicLoad(0, 0.2), {"c": 0.2})
+    system = so.System(
+        eye, {"c": eye.toarray()}, chain, so.ElasticStop((0, 8), 2.0, 0.5), so.HarmonicLoad(0, 0.2), {"c": 0.2}
+    )
     branch = so.frequency_response(system, (0.5, 0.6), harmonics=3, max_step=0.3)
     branches_equal(branch, so.load(branch.save(tmp_path / "chain.nc")))
 
@@ -124,9 +124,7 @@ def test_xarray_reads_it_without_us(curve, saved):
     i, t = 5, np.linspace(0.0, 2.0, 9)
     x = dataset["coefficients"].to_numpy()[i, :, 0]
     w = float(dataset["omega"][i]) / dataset.attrs["period"]
-    waves = sum(
-        x[2 * k - 1] * np.cos(k * w * t) + x[2 * k] * np.sin(k * w * t) for k in range(1, len(x) // 2 + 1)
-    )
+    waves = sum(x[2 * k - 1] * np.cos(k * w * t) + x[2 * k] * np.sin(k * w * t) for k in range(1, len(x) // 2 + 1))
     np.testing.assert_allclose(x[0] + waves, curve.orbits[i].displacement(t)[0], atol=1e-13)
     assert dataset.attrs["suboctave"] == so.__version__
     assert {"python", "platform", "written", "digest"} <= set(dataset.attrs)

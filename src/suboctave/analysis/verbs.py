@@ -251,13 +251,15 @@ def _curve(
         )
     if linear is not None and not isinstance(linear, LinearPart):
         raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
-    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
-    if balance.dimension > _DENSE_UNKNOWNS:
+    size = system.n if linear is None else linear.size
+    unknowns = size * (2 * high * nu + 1)
+    if unknowns > _DENSE_UNKNOWNS:
         raise InputError(
-            f"{balance.size} DOFs with {high} harmonics are {balance.dimension} unknowns with dense matrices, more "
-            f"than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads "
-            "touch (linear=)"
+            f"{size} DOFs with {high} harmonics are {unknowns} unknowns with dense matrices, more than "
+            f"{_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
+            "(linear=)"
         )
+    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
     return ResponseCurve(balance, name, omega, span, adaptive)
 
 
