@@ -172,7 +172,7 @@ class Branch:
         return pd.DataFrame(columns)
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit; docs/results.md has its layout.
+        """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
 
         Raises
         ------

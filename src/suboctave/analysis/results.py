@@ -134,7 +134,7 @@ def to_dataset(item: Branch | Table, details: Mapping[str, Any] | None = None) -
     for name, variable in list(dataset.variables.items()):
         if variable.dtype.kind == "c":
             pair = {f"{name}_real": ("row", variable.values.real), f"{name}_imag": ("row", variable.values.imag)}
-            dataset = dataset.drop_vars(name).assign(pair)
+            dataset = dataset.drop_vars([name]).assign(pair)
         elif variable.dtype.kind == "O":
             dataset = dataset.assign({name: ("row", variable.values.astype(str))})
     order = "\n".join(item.columns)

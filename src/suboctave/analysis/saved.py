@@ -125,7 +125,7 @@ def _orbits(
 
 
 def _padded(rows: Sequence[Any], kind: type) -> np.ndarray:
-    table = np.full((len(rows), max((len(row) for row in rows), default=0)), np.nan, dtype=kind)
+    table: np.ndarray = np.full((len(rows), max((len(row) for row in rows), default=0)), np.nan, dtype=kind)
     for line, row in zip(table, rows, strict=True):
         line[: len(row)] = row
     return table
@@ -137,7 +137,7 @@ def _flat(dataset: xarray.Dataset) -> xarray.Dataset:
         array = np.asarray(variable.values)
         if array.dtype.kind == "c":
             pair = {f"{name}_{part}": (variable.dims, getattr(array, part), variable.attrs) for part in _PARTS}
-            dataset = dataset.drop_vars(name).assign(pair)
+            dataset = dataset.drop_vars([name]).assign(pair)
         elif array.dtype.kind == "O":
             dataset = dataset.assign({name: (variable.dims, array.astype(str), variable.attrs)})
     return dataset
@@ -270,7 +270,7 @@ class _Reader:
         system = self.systems[d.system]
         if d.linear and linear is None:
             raise InputError(
-                f"this branch was computed with another linear part, a {d.linear}; make that again and give it as linear="
+                f"this branch was computed with another linear part, a {d.linear}: make it again and give it as linear="
             )
         values = dict(zip(system.parameters, d.values, strict=True))
         given = linear if d.linear else None

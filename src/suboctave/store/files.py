@@ -1,7 +1,7 @@
 """Results as NetCDF files: written beside their place, synced and renamed; read back only if nothing has changed.
 
-One curve is the file's root group; a study has a group for each analysis. Every group carries a digest of its content in
-the attribute `digest`, so that damage is noticed even where HDF5 itself does not.
+One curve is the file's root group; a study has a group for each analysis. Every group carries a digest of its content
+in the attribute `digest`, so that damage is noticed even where HDF5 itself does not.
 """
 
 from __future__ import annotations

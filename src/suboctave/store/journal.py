@@ -1,8 +1,9 @@
 """What a running study has found so far, on disk at once: records appended to a file, each with its own checksum.
 
-The file begins with a line that names it. A record is the length of its body (8 bytes), the first 16 bytes of the body's
-SHA-256, and the body: a line of JSON, then, where there is one, a dataset as a block (`blocks`). A process that is killed
-can only leave a torn last record; whatever follows the last whole record is dropped when the journal is opened again.
+The file begins with a line that names it. A record is the length of its body (8 bytes), the first 16 bytes of the
+body's SHA-256, and the body: a line of JSON, then, where there is one, a dataset as a block (`blocks`). A process that
+is killed can only leave a torn last record; whatever follows the last whole record is dropped when the journal is
+opened again.
 NetCDF would not do here: HDF5 files do not survive a power cut while they are written.
 """
 
@@ -94,7 +95,7 @@ class Journal:
         """A new journal; InputError if there is one already."""
         place = Path(path)
         try:
-            file = open(place, "xb")
+            file = open(place, "xb")  # noqa: SIM115 - it stays open
         except FileExistsError:
             raise InputError(f"{place} exists: a run that did not finish left it, or one is under way") from None
         except OSError as error:
@@ -111,7 +112,7 @@ class Journal:
         place = Path(path)
         records, end, torn = read_journal(place)
         try:
-            file = open(place, "r+b")
+            file = open(place, "r+b")  # noqa: SIM115 - it stays open
         except OSError as error:
             raise InputError(f"cannot write {place}: {error.strerror}") from None
         _lock(file, place)

@@ -1,7 +1,7 @@
 """Options, contacts, audits and the like as plain data that JSON holds, and back without loss.
 
-Tuples, complex numbers, numbers that are not finite, arrays and dataclasses are wrapped in a mapping of one key that says
-what they are. Dataclasses come back only as one of the classes that the reader names: a file cannot choose.
+Tuples, complex numbers, numbers that are not finite, arrays and dataclasses are wrapped in a mapping of one key that
+says what they are. Dataclasses come back only as one of the classes that the reader names: a file cannot choose.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def _plain(value: Any) -> Any:
         number = float(value)
         return number if math.isfinite(number) else {"float": repr(number)}
     if isinstance(value, numbers.Complex):
-        number = complex(value)
-        return {"complex": [_plain(number.real), _plain(number.imag)]}
+        pair = complex(value)
+        return {"complex": [_plain(pair.real), _plain(pair.imag)]}
     if isinstance(value, tuple):
         return {"tuple": [_plain(item) for item in value]}
     if isinstance(value, list):

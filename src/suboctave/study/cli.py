@@ -34,7 +34,7 @@ def main() -> None:
         print("interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)
     except BrokenPipeError:  # the reader of our output has gone
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = None
         sys.exit(0)
     except (SuboctaveError, OSError) as error:
         status = WRONG if isinstance(error, InputError | OSError) else FAILED

@@ -113,9 +113,9 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
 
 
 def _fits(key: str, value: Any) -> bool:
-    return isinstance(value, {"title": str, "system": dict, "outputs": dict}.get(key, list)) and (
-        key != "analyses" or all(isinstance(item, dict) for item in value)
-    )
+    if key == "analyses":
+        return isinstance(value, list) and all(isinstance(item, dict) for item in value)
+    return isinstance(value, str if key == "title" else dict)
 
 
 def _text(source: Path) -> str:

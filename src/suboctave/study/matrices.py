@@ -80,7 +80,8 @@ def _npz(path: Path, key: str | None) -> Any:
 
     with np.load(path, allow_pickle=False) as archive:
         if {"format", "shape", "data"} <= set(archive.files):
-            return scipy.sparse.load_npz(path).tocsr()
+            sparse: Any = scipy.sparse.load_npz(path)
+            return sparse.tocsr()
         return archive[_chosen(path, key, archive.files)]
 
 

@@ -210,7 +210,7 @@ def _one(
         return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), False
     begin = perf_counter()
     interrupted = False
-    result = None
+    result: Branch | Table | None = None
     failure, wrong = "", False
     with (watch or _silent)(step) as progress, _noting(journal, step, progress) as noted:
         try:
@@ -259,16 +259,15 @@ class _Noting:
         if now - self.since < _OFTEN and events == self.events:
             return
         self.since = now
+        points, located = trace.points[self.points :], trace.bifurcations[self.events :]
         said = {
             "name": self.step.name,
             "from": self.points,
-            "omega": [point.orbit.omega for point in trace.points[self.points :]],
-            "values": [dict(point.orbit.values) for point in trace.points[self.points :]],
-            "coefficients": [point.orbit.coefficients.tolist() for point in trace.points[self.points :]],
-            "stable": [bool(point.floquet.stable) for point in trace.points[self.points :]],
-            "bifurcations": [
-                [b.kind, b.omega, dict(b.parameters), b.amplitude] for b in trace.bifurcations[self.events :]
-            ],
+            "omega": [point.orbit.omega for point in points],
+            "values": [dict(point.orbit.values) for point in points],
+            "coefficients": [point.orbit.coefficients.tolist() for point in points],
+            "stable": [bool(point.floquet.stable) for point in points],
+            "bifurcations": [[b.kind, b.omega, dict(b.parameters), b.amplitude] for b in located],
         }
         self.points, self.events = len(trace.points), events
         self.journal.append("points", said, sync=False)

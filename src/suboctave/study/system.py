@@ -71,7 +71,7 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
         return None
     elements, loads = ([item for _, item in parts[family]] for family in ("element", "load"))
     try:
-        return System(*(matrices[what] for what in MATRICES), elements, loads, section.parameters, section.name or "")
+        return System(*(matrices[what] for what in MATRICES), elements, loads, section.parameters, section.name)  # type: ignore[call-arg]
     except InputError as error:
         mistakes.add(_place_of(str(error), section, parts), str(error))
         return None

@@ -6,7 +6,7 @@ its `kind` and its arguments as fields, says in `check` what is wrong before any
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
@@ -30,7 +30,7 @@ Complaint = tuple[tuple[str | int, ...], str]
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is known of a study before it runs: the system as this step sees it, and the kinds of the steps before it."""
+    """What is known before a study runs: the system as this step sees it, and the kinds of the steps before it."""
 
     system: System
     before: Mapping[str, type[Step]]
@@ -77,6 +77,14 @@ class Step(BaseModel):
     def run(self, context: Context) -> Branch | Table:
         """The result. Raises InputError or ConvergenceError; on Ctrl-C what was computed comes back, or nothing."""
         raise TypeError(f"{type(self).__name__} does not say how it runs")
+
+
+def as_table(names: Sequence[str], kinds: Sequence[Any], rows: Sequence[Sequence[Any]]) -> dict[str, np.ndarray]:
+    """Rows as columns by name, each of its kind."""
+    return {
+        name: np.array([row[i] for row in rows], dtype=kind)
+        for i, (name, kind) in enumerate(zip(names, kinds, strict=True))
+    }
 
 
 def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:

@@ -82,7 +82,7 @@ class CurveStep(Step):
         if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * around.system.n > _MOST:
             yield (
                 ("harmonics",),
-                f"{self.harmonics} harmonics of {around.system.n} DOFs are too many unknowns: keep fewer",
+                f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics",
             )
         if self.motion is not None:
             for key, name in self.needs():

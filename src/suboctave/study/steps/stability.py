@@ -6,21 +6,31 @@ from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from suboctave.analysis import Table, stability
 from suboctave.study.options import as_stability
-from suboctave.study.steps.base import Complaint, Context, Motion, Step, Surroundings, check_branch, check_motion, tried
+from suboctave.study.steps.base import (
+    Complaint,
+    Context,
+    Motion,
+    Step,
+    Surroundings,
+    check_branch,
+    check_motion,
+    tried,
+)
 from suboctave.study.steps.base import chosen as chosen_motion
 
 
 class Stability(Step):
-    """`so.stability` at `points` of `branch` and at its bifurcations of the kinds `bifurcations`, by each of `methods`."""
+    """`so.stability` at `points` of `branch` and at its `bifurcations` of given kinds, by each of `methods`."""
 
     kind: ClassVar[str] = "stability"
 
     branch: str
     points: list[int] | None = None
-    bifurcations: list[str] = []
+    bifurcations: list[str] = Field(default_factory=list)
     nearest: dict[str, float] | None = None
     methods: list[Any] | None = None
 
