@@ -210,12 +210,12 @@ def _one(
         return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), False
     begin = perf_counter()
     interrupted = False
-    result: Branch | Table | None = None
+    outcome: Branch | Table | None = None
     failure, wrong = "", False
     with (watch or _silent)(step) as progress, _noting(journal, step, progress) as noted:
         try:
             system = study.system_of(step)
-            result = step.run(Context(system, results, noted, study.allow_code))
+            outcome = step.run(Context(system, results, noted, study.allow_code))
         except KeyboardInterrupt:
             interrupted = True
         except ConvergenceError as error:
@@ -223,13 +223,13 @@ def _one(
         except InputError as error:
             failure, wrong = str(error), True
     seconds = perf_counter() - begin
-    if isinstance(result, Branch) and result.ended.startswith("interrupted"):
+    if isinstance(outcome, Branch) and outcome.ended.startswith("interrupted"):
         interrupted = True
-    if result is not None and not interrupted:
-        journal.append("analysis", {"name": step.name, "key": key}, to_dataset(result, {"seconds": seconds}))
-    if result is None and interrupted:
+    if outcome is not None and not interrupted:
+        journal.append("analysis", {"name": step.name, "key": key}, to_dataset(outcome, {"seconds": seconds}))
+    if outcome is None and interrupted:
         return None, True
-    return Finished(step, result, seconds, failure=failure, wrong_input=wrong), interrupted
+    return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interrupted
 
 
 def _silent(step: Step) -> AbstractContextManager[Any]:

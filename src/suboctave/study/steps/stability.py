@@ -71,12 +71,8 @@ class Stability(Step):
                 errors.append(found.errors)
         names = ("what", "omega", "method", "stable", "decided", "note")
         kinds: tuple[Any, ...] = (str, float, str, bool, bool, str)
-        columns = {
-            n: np.array([row[i] for row in rows], dtype=k) for i, (n, k) in enumerate(zip(names, kinds, strict=True))
-        }
+        columns = as_table(names, kinds, rows)
         for i in range(max((len(mu) for mu in multipliers), default=0)):
-            columns[f"multiplier_{i}"] = np.array(
-                [mu[i] if i < len(mu) else np.nan for mu in multipliers], dtype=complex
-            )
-            columns[f"error_{i}"] = np.array([e[i] if i < len(e) else np.nan for e in errors], dtype=float)
+            for name, lists, sort in (("multiplier", multipliers, complex), ("error", errors, float)):
+                columns[f"{name}_{i}"] = np.array([row[i] if i < len(row) else np.nan for row in lists], dtype=sort)
         return Table(columns, f"multipliers of {self.branch}")

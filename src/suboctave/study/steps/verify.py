@@ -50,7 +50,4 @@ class Verify(Step):
             )
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "reason")
         kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str)
-        columns = {
-            n: np.array([row[i] for row in rows], dtype=k) for i, (n, k) in enumerate(zip(names, kinds, strict=True))
-        }
-        return Table(columns, f"{self.branch}, held against shooting")
+        return Table(as_table(names, kinds, rows), f"{self.branch}, held against shooting")
