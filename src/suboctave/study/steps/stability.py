@@ -16,6 +16,7 @@ from suboctave.study.steps.base import (
     Motion,
     Step,
     Surroundings,
+    as_table,
     check_branch,
     check_motion,
     tried,

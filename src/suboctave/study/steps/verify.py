@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from suboctave.analysis import Table, verify
-from suboctave.study.steps.base import Complaint, Context, Step, Surroundings, check_branch, chosen_branch
+from suboctave.study.steps.base import Complaint, Context, Step, Surroundings, as_table, check_branch, chosen_branch
 
 
 class Verify(Step):
