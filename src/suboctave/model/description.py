@@ -116,9 +116,11 @@ def build_part(
 
 def _kind(name: Any, family: str, allow_code: bool) -> type:
     known = known_kinds(family)
+    if not isinstance(name, str):
+        raise InputError(f"the type of an {family} is a text, not {name!r}")
     if name in known:
         return known[name]
-    if isinstance(name, str) and ":" in name:
+    if ":" in name:
         module, _, _ = name.partition(":")
         if not allow_code:
             raise InputError(f"the {family} {name!r} is not defined in this process: {_NO_CODE}")
@@ -126,7 +128,7 @@ def _kind(name: Any, family: str, allow_code: bool) -> type:
         known = known_kinds(family)
         if name in known:
             return known[name]
-    raise InputError(f"there is no {family} {name!r}{suggest(str(name), known)}")
+    raise InputError(f"there is no {family} {name!r}{suggest(name, known)}")
 
 
 def _import(module: str) -> Any:

@@ -166,7 +166,7 @@ def _steps(
     for index, given in enumerate(analyses):
         place = ("analyses", index)
         kind = given.get("type")
-        if kind not in STEPS:
+        if not isinstance(kind, str) or kind not in STEPS:
             if kind is None:
                 mistakes.add((*place, "type"), f"is missing{suggest('', STEPS)}")
             else:
@@ -187,7 +187,7 @@ def _steps(
         elif not re.fullmatch(r"[^\W][\w .-]*", name):
             mistakes.add((*place, "name"), f"{name!r} will not do: letters, digits, spaces, and . - _, no slash")
         names.add(name)
-        if kind in STEPS:
+        if isinstance(kind, str) and kind in STEPS:
             before[name] = STEPS[kind]
     return steps
 
