@@ -26,7 +26,7 @@ ODD = [
     '"x**1000**1000"', '"__import__(\'os\')"', "harmonics = 10000000", "dof = 999999999", "harmonic = 1000000000",
     'type = "PolynomialSpring"', "coefficients = { 1000000 = 1.0 }", "coefficients = [1.0, 2.0]", 'start = "response"',
 ]  # fmt: skip
-QUICK = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 SOON = 5.0  # seconds that no answer may take
 
 

@@ -287,6 +287,13 @@ def test_an_unwritable_folder_is_known_before_the_work(study_file, suboctave, tm
     assert "not writable" in err
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no place that refuses even the superuser")
+def test_a_folder_that_cannot_be_made(study_file, suboctave):
+    status, out, err = suboctave("run", study_file(), "--out", "/proc/suboctave")
+    assert (status, out) == (2, "")
+    assert "cannot be made" in err
+
+
 def test_a_folder_that_is_a_file(study_file, suboctave, tmp_path):
     path = study_file()
     (tmp_path / "taken").write_text("mine")

@@ -42,6 +42,7 @@ def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
     """
     return {
         "name": system.name,
+        "dof_names": list(getattr(system, "dof_names", ())),
         **{what: _matrix(getattr(system, what), arrays) for what in _MATRICES},
         "elements": [describe_part(element, arrays) for element in system.elements],
         "loads": [describe_part(load, arrays) for load in system.loads],
@@ -77,11 +78,13 @@ def build(
             for family in ("element", "load")
         )
         parameters, name = description["parameters"], str(description["name"])
+        names = tuple(str(n) for n in description.get("dof_names", ()))
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
     if not mass.n == damping.n == stiffness.n:
         raise InputError("this is not the description of a system: its matrices have different sizes")
-    system = _assemble(mass, damping, stiffness, elements, loads, _read_parameters(parameters), name)
+    more: Any = (names,) if names else ()
+    system = _assemble(mass, damping, stiffness, elements, loads, _read_parameters(parameters), name, *more)
     system._check_names()
     system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
     check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))

@@ -49,7 +49,8 @@ class Mistakes:
 
     def add(self, path: Path, message: str) -> None:
         """One mistake at the key `path`; the same one is noted once."""
-        mistake = Mistake(written(path), self.lines[path], message)
+        key = written(path)
+        mistake = Mistake(_cut(key, 80), self.lines[path], _cut(message, 600))
         if mistake not in self._found:
             self._found.append(mistake)
 
@@ -75,6 +76,10 @@ class Mistakes:
         """Raises StudyError if there is any."""
         if self._found:
             raise StudyError(self.source, self.sorted)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most // 2]} ... {text[-most // 3 :]}"
 
 
 def written(path: Path) -> str:
