@@ -64,13 +64,14 @@ def run(path: Path, out: Path | None, overwrite: bool, resume: bool, allow_code:
     """Run a study and print what came of it; the exit status."""
     study = read_study(path, allow_code)
     screen = console(quiet=as_json)
-    if study.title:
-        screen.print(study.title, style="bold", markup=False)
+    titles = [study.title] if study.title else []
 
     def watch(step: Step) -> AbstractContextManager[Any]:
         return bar(step.name)
 
     def said(item: Finished) -> None:
+        while titles:  # above the first result: what is refused before any work has no title
+            screen.print(titles.pop(), style="bold", markup=False)
         _print_finished(screen, item)
 
     outcome = run_study(study, out, overwrite, resume, watch, said)
