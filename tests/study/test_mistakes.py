@@ -230,6 +230,20 @@ def test_all_mistakes_are_told_at_once(study_file, suboctave):
     assert told == {"mass", "elements", "max_stp", "omega", "foldr"}
 
 
+def test_a_mistake_does_not_hide_those_beside_it(study_file, suboctave):
+    text = (
+        DUFFING.replace("c = 0.1", "c = nan")
+        .replace('"alpha" }]', '"alpa" }]')
+        .replace("mass", "misprint = 2\nmass", 1)
+    )
+    text = text.replace("omega = [3.0, 0.5]", "harmonics = -1\nnewton = { iteratons = 3 }")
+    status, out, _ = suboctave("check", study_file(text), "--json")
+    assert status == 2
+    keys = {m["key"] for m in json.loads(out)["mistakes"]}
+    assert {"system.parameters.c", "system.elements[0]", "system.misprint"} <= keys
+    assert {"analyses[0].omega", "analyses[0].harmonics", "analyses[0].newton"} <= keys
+
+
 def test_lines_are_right_in_arrays_of_tables_and_texts_of_several_lines(study_file, suboctave):
     text = """\
 title = '''

@@ -41,8 +41,23 @@ def main() -> None:
         if "--json" in sys.argv[1:]:
             print(json.dumps(_as_object(error, status), ensure_ascii=False))
         else:
-            print(f"suboctave: {error}", file=sys.stderr)
+            print(_readable(f"suboctave: {error}"), file=sys.stderr)
         sys.exit(status)
+
+
+def _readable(text: str) -> str:
+    """Broken into lines between words where somebody reads it; for other programs a line stays a line."""
+    if not sys.stderr.isatty():
+        return text
+    import shutil
+    import textwrap
+
+    width = min(80, shutil.get_terminal_size().columns)
+    lines = text.splitlines()
+    return "\n".join(
+        textwrap.fill(line, width, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
+        for line in lines
+    )
 
 
 def _as_object(error: Exception, status: int) -> dict[str, Any]:

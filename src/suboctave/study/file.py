@@ -102,6 +102,8 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     system = None
     if isinstance(sections.system, dict):
         section = _validated(SystemSection, sections.system, ("system",), mistakes)
+        if section is None:
+            section = _what_is_left(sections.system)
         if section is not None:
             system = make_system(section, source.parent, mistakes, allow_code)
     steps = _steps(sections.analyses, system, mistakes, allow_code)
@@ -110,6 +112,25 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     assert system is not None
     assert outputs is not None
     return Study(source, text, sections.title, system, tuple(s for s in steps if s), outputs, allow_code)
+
+
+def _what_is_left(given: Mapping[str, Any]) -> SystemSection | None:
+    """The [system] without what is wrong in it, so that the rest is looked at as well; None where that cannot be."""
+    kept = {name: value for name, value in given.items() if name in SystemSection.model_fields}
+    try:
+        return SystemSection.model_validate(kept)
+    except ValidationError as error:
+        for item in error.errors(include_url=False):
+            place = item["loc"]
+            if place[0] == "parameters" and len(place) > 1 and isinstance(kept["parameters"], dict):
+                # it exists: expressions that name it are right
+                kept["parameters"] = {**kept["parameters"], str(place[1]): 1.0}
+            else:
+                kept.pop(str(place[0]), None)
+    try:
+        return SystemSection.model_validate(kept)
+    except ValidationError:
+        return None
 
 
 def _fits(key: str, value: Any) -> bool:

@@ -82,7 +82,8 @@ def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> Non
     """A branch: its bifurcations, how many points, why it ended, what is to be said."""
     out.print(f"\n{name}", style="bold", markup=False, end="")
     values = branch.parameter(branch.name)
-    span = f"along {branch.name}, {values[0]:.6g} to {values[-1]:.6g}" if len(branch) else "empty"
+    ends = (min(values), max(values)) if branch.closed else (values[0], values[-1])
+    span = f"{'closed, ' if branch.closed else ''}along {branch.name}, {ends[0]:.6g} to {ends[1]:.6g}"
     out.print(f": {span}", markup=False)
     lines = [list(line) for line in event_lines(branch_dataset(branch))]
     if branch.name != "omega":

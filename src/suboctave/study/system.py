@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from suboctave.errors import InputError, suggest
 from suboctave.model import library
 from suboctave.model.description import build_part
+from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import matrix_coefficient
 from suboctave.model.system import System
 from suboctave.study.lines import Path as Key
@@ -67,6 +68,7 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
         return _from_equations(section, parts, mistakes) if len(mistakes) == before else None
     matrices = _matrices(section, folder, mistakes)
     _check_names(section, matrices, parts, mistakes)
+    _check_mass(section, matrices, mistakes)
     if len(mistakes) > before:
         return None
     elements, loads = ([item for _, item in parts[family]] for family in ("element", "load"))
@@ -206,6 +208,17 @@ def _check_names(
         for name in known:
             if name not in used:
                 mistakes.add(("system", "parameters", name), "is not used in any expression; remove or use it")
+
+
+def _check_mass(section: SystemSection, matrices: dict[str, Any], mistakes: Mistakes) -> None:
+    """Refuse a mass that is none, as far as its parameters are known."""
+    mass = matrices.get("mass")
+    if mass is None or not mass.names <= section.parameters.keys():
+        return
+    try:
+        check_mass(mass.sparse_value(section.parameters) if mass.sparse else mass.value(section.parameters))
+    except InputError as error:
+        mistakes.add(("system", "mass"), str(error))
 
 
 def _place_of(text: str, section: SystemSection, parts: dict[str, list[tuple[Key, Any]]]) -> Key:

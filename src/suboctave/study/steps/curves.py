@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from suboctave.analysis.checks import make_settings
 from suboctave.continuation import Event
@@ -51,6 +51,12 @@ class CurveStep(Step):
     stepping: dict[str, Any] | None = None
     stability: Any = None
 
+    @field_validator("newton", "stepping", "harmonics", "stability")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        _READ[str(info.field_name)](given)
+        return given
+
     @property
     def motion(self) -> Motion | None:
         """The motion of an earlier branch that it starts from; the name of one alone means its last point."""
@@ -68,14 +74,7 @@ class CurveStep(Step):
 
     def check(self, around: Surroundings) -> Iterator[Complaint]:
         """The options of every verb."""
-        options = {
-            "newton": lambda: as_newton(self.newton),
-            "stepping": lambda: as_stepping(self.stepping),
-            "harmonics": lambda: as_harmonics(self.harmonics),
-            "stability": lambda: as_stability(self.stability),
-            "events": lambda: self._events(around.allow_code),
-        }
-        wrong = [complaint for key, call in options.items() for complaint in tried(key, call)]
+        wrong = list(tried("events", lambda: self._events(around.allow_code)))
         yield from wrong
         if not wrong:
             yield from _by_name(self._settings(around))
@@ -135,6 +134,12 @@ class CurveStep(Step):
         return orbit
 
 
+_READ: dict[str, Callable[[Any], Any]] = {
+    "newton": as_newton,
+    "stepping": as_stepping,
+    "harmonics": as_harmonics,
+    "stability": as_stability,
+}
 _MOST = 8000  # unknowns of a dense problem, as the verbs have it
 
 
