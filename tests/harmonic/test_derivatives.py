@@ -11,7 +11,16 @@ import pytest
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator, parameter_gradient
 from suboctave.harmonic.second import Direction, second_derivative
-from suboctave.model import CubicSpring, ElasticStop, HarmonicLoad, System, check_derivatives
+from suboctave.model import (
+    CubicSpring,
+    ElasticStop,
+    Expression,
+    HarmonicLoad,
+    QuadraticDamper,
+    System,
+    TanhFriction,
+    check_derivatives,
+)
 
 OMEGA, KAPPA, STEP = 1.7, 0.37, 1e-6
 NAMES = ("zeta", "alpha", "Kc", "j", "p", "k")
@@ -25,13 +34,25 @@ def contacts(regularization):
     ]
 
 
-@pytest.fixture(scope="module", params=["exact", "regularised", "damper"])
+def own_nodes():
+    """Corners in displacement and velocity, sharp in velocity, coupled, and in time; parameters in all of them."""
+    return [
+        Expression(0, "alpha*max(x - j, 0)*(1 + zeta*v) + zeta*v*abs(v)"),
+        Expression(1, "k*x*y**2*(1 + j*cos(omega*t + p)) + Kc*x'*y", {"x": 0, "y": (0, 1)}),
+        QuadraticDamper((0, 1), "zeta*k"),
+        TanhFriction(1, "p", "0.05*k"),
+        CubicSpring(0, "alpha"),
+    ]
+
+
+@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes"])
 def elements(request, damper):
     cubic = CubicSpring(0, "alpha")
     return {
         "exact": [cubic, *contacts(None)],
         "regularised": [cubic, *contacts(30.0)],
         # in one direction with the cubic spring, and in one of its own
+        "own nodes": own_nodes(),
         "damper": [cubic, damper(0, ["zeta*k", "j**2"]), damper((0, 1), ["alpha", "zeta+Kc*j"])],
     }[request.param]
 

@@ -13,6 +13,7 @@ from suboctave.analysis.follow import Settings
 from suboctave.bifurcation import KINDS
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import InputError, suggest
+from suboctave.model.coupled import CoupledElement
 from suboctave.model.system import System
 
 #: DOFs up to which the stiffness is examined for motions that nothing holds
@@ -58,10 +59,13 @@ def check_system(system: System, omega: tuple[float, ...] = ()) -> None:
     if not isinstance(system, System):
         raise InputError(f"the first argument must be a System, not {type(system).__name__}")
     periodic = [c for c in system.load_components() if c.harmonic > 0]
-    if not periodic:
-        raise InputError("the system has no periodic load: add loads=[HarmonicLoad(dof=..., amplitude=...)]")
+    if not periodic and not system.excited_by_elements:
+        raise InputError(
+            "the system has no periodic load: add loads=[HarmonicLoad(dof=..., amplitude=...)], or an element that "
+            "depends on time"
+        )
     amplitudes = [c.amplitude.value({**system.parameters, "omega": w}) for c in periodic for w in omega]
-    if omega and not any(amplitudes):
+    if omega and not any(amplitudes) and not system.excited_by_elements:
         names = sorted({name for c in periodic for name in c.amplitude.names} - {"omega"})
         values = ", ".join(f"{name}={system.parameters[name]:g}" for name in names)
         raise InputError(f"the periodic load is zero at these parameters ({values or 'a number'}): nothing moves")
@@ -77,7 +81,8 @@ def _check_held(system: System) -> None:
     free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
     if not len(free):
         return
-    held = np.array([e.direction(system.n) * scale for e in system.elements]).reshape(-1, system.n)
+    felt = [e.inputs(system.n) if isinstance(e, CoupledElement) else [e.direction(system.n)] for e in system.elements]
+    held = np.array([d * scale for directions in felt for d in directions]).reshape(-1, system.n)
     if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
         shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
         raise InputError(

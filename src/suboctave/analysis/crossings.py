@@ -23,6 +23,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
@@ -43,6 +44,18 @@ def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float
     share = _doubtful(np.array(places), np.array(values), at)
     # not too close to the ends, so that both parts shrink
     return None if share < 0.0 else min(0.6, max(0.4, share))
+
+
+def first_doubtful(places: Sequence[float], tests: Sequence[NDArray[np.float64]], at: int) -> tuple[int, float] | None:
+    """The first of several functions of which `doubtful` is not sure, and where; None if none is in doubt.
+
+    Parameters
+    ----------
+    tests
+        At every place the functions' signs and logarithms of moduli, shape (2, m).
+    """
+    which, share = _first_doubtful(np.array(places), np.array(tests), at)
+    return None if which < 0 else (which, min(0.6, max(0.4, share)))
 
 
 @njit(cache=True)
@@ -164,4 +177,21 @@ def _doubtful(places, values, at):
     return -1.0
 
 
-__all__ = ["SAFETY", "doubtful"]
+@njit(cache=True)
+def _first_doubtful(places, tests, at):
+    count, _, functions = tests.shape
+    values = np.empty(count)
+    for k in range(functions):
+        top = -np.inf
+        for i in range(count):
+            top = max(top, tests[i, 1, k])
+        for i in range(count):
+            # in units of the largest: products of many factors leave the range of numbers
+            values[i] = tests[i, 0, k] * math.exp(tests[i, 1, k] - top) if top > -np.inf else 0.0
+        share = _doubtful(places, values, at)
+        if share >= 0.0:
+            return k, share
+    return -1, 0.0
+
+
+__all__ = ["SAFETY", "doubtful", "first_doubtful"]

@@ -9,34 +9,20 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
-from suboctave.analysis.guard import BRANCH_POINT, CountCheck, StepGuard
+from suboctave.analysis.guard import CountCheck, StepGuard
+from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.bifurcation import ALL_KINDS, Bifurcation, BifurcationKind, Sample
+from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings, touches
-from suboctave.bifurcation.layer import (
-    behind_grazing,
-    behind_their_grazings,
-    grazing_beside,
-    layer_of,
-    solve_or_behind,
-    unresolved,
-)
-from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.bifurcation.kinds import BRANCH_POINT, changes
+from suboctave.bifurcation.layer import behind_their_grazings
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import make_point, point_between
 from suboctave.continuation.newton import correct
-from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
-from suboctave.harmonic.state import BalanceState
-from suboctave.stability import floquet_multipliers
-
-#: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
-_CRITICAL = 1e-3
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point
 _APART = 1e-5
@@ -188,7 +174,7 @@ class _Follower:
             if self.previous is not None:
                 self._search(self.previous, new)
             where = new.point
-            self.trace.points.append(BranchPoint(self._orbit(new), new.floquet, where.arclength, where.iterations))
+            self.trace.points.append(BranchPoint(orbit_of(new), new.floquet, where.arclength, where.iterations))
             self.previous = new
         report = self.settings.report
         if report is not None:
@@ -200,23 +186,18 @@ class _Follower:
         if self._found is not None:
             self._found(self.trace)
 
-    def _orbit(self, sample: Sample) -> PeriodicOrbit:
-        evaluation = sample.point.evaluation
-        assert isinstance(evaluation, ResponseEvaluation)
-        curve = sample.point.curve
-        assert isinstance(curve, ResponseCurve)
-        return _as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
+    def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
+        return bifurcation_at(located, a, b, self.settings.observe, self.trace.warnings)
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""
-        kinds: list[BifurcationKind] = [kind for kind in ALL_KINDS if kind.changed(old, again)]
-        kinds += touches(old, again)[0]
+        kinds = [*changes(old, again), *touches(old, again)[0]]
         if not kinds:
             return
         points = self.trace.points
         reach = points[-1].arclength - points[-2].arclength if len(points) > 1 else self.settings.stepping.initial_step
         for kind in kinds:
-            located = locate_near(kind, again, reach, _guess)
+            located = locate_near(kind, again, reach, guess_at)
             if located is not None:
                 item = self._bifurcation(located, again, again)
                 if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
@@ -229,9 +210,8 @@ class _Follower:
         found: list[tuple[float, Bifurcation]] = []
         branch_point: Located | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
-        for kind in () if _at_rest(a) or _at_rest(b) else ALL_KINDS:
-            if not kind.changed(a, b):
-                continue
+        resting = _at_rest(a) or _at_rest(b)
+        for kind in () if resting else changes(a, b):
             located = self._located(kind, a, b)
             if kind is BRANCH_POINT:
                 branch_point = located
@@ -246,8 +226,8 @@ class _Follower:
                 continue
             found.append((located.fraction, self._bifurcation(located, a, b)))
         complaint = self._count.complaint(b, [item for _, item in found])
-        if not (_at_rest(a) or _at_rest(b)):
-            for touched in locate_grazings(a, b, self.settings.newton, self._sample, _guess):
+        if not resting and self._guard.grazes(a, b):
+            for touched in locate_grazings(a, b, self.settings.newton, self._sample, guess_at):
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self._guard.doubt(*complaint)
@@ -263,129 +243,14 @@ class _Follower:
         if known is not None and known[0] is kind and known[1] is a and known[2] is b:
             return known[3]
         must_solve = kind is BRANCH_POINT
-        found = locate(kind, a, b, self.settings.newton, self._sample, _guess, 9 if must_solve else 34)
+        found = locate(kind, a, b, self.settings.newton, self._sample, guess_at, 9 if must_solve else 34)
         if must_solve and found is not None and found.solution is None:
             found = None
         self._last_located = (kind, a, b, found)
         return found
 
-    def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
-        arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
-        curve = b.point.curve
-        assert isinstance(curve, ResponseCurve)
-        solution = located.solution
-        if solution is None:
-            guess = _guess(located.sample.point.u, located.sample.point, _kappa(located))
-            solution = behind_grazing(located.kind, guess) or self._with_more_harmonics(located, a, b)
-        if solution is None:
-            orbit = self._orbit(located.sample)
-            beside = grazing_beside(guess)
-            # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
-            width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
-            self.trace.warnings.append(
-                f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
-                f"to +- {width:.1e}: "
-                + (f"{beside.label} grazes there" if beside else "too few harmonics are kept, or a law is rough there")
-            )
-            return Bifurcation(
-                located.kind.name,
-                orbit,
-                located.sample.floquet,
-                orbit.residual,
-                orbit.amplitude(self.settings.observe),
-                curve.name,
-                uncertainty=width,
-                arclength=arclength,
-                contact=beside,
-            )
-        solution = self._refined(located, solution, curve)
-        state = solution.state
-        guess = Guess(state.balance, state.x, state.omega, state.values, curve.name, curve.span, solution.kappa)
-        layer = layer_of(located.kind, solution, guess)
-        orbit = _as_orbit(state, solution.residual, truncation(state), curve)
-        return Bifurcation(
-            located.kind.name,
-            orbit,
-            floquet_multipliers(state),
-            solution.residual,
-            orbit.amplitude(self.settings.observe),
-            curve.name,
-            solution.vectors,
-            solution.kappa,
-            0.0 if layer is None else unresolved(located.kind, guess, layer),
-            arclength=arclength,
-            contact=layer or located.kind.contact(solution, curve.name),
-        )
-
-    def _with_more_harmonics(self, located: Located, a: Sample, b: Sample) -> Singular | None:
-        """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
-        the way with fewer.
-        """
-        sample = located.sample
-        curve = sample.point.curve
-        assert isinstance(curve, ResponseCurve)
-        state, size = sample.state, b.point.arclength - a.point.arclength
-        while curve.adaptive is not None:
-            basis = next_harmonics(state, curve.adaptive)
-            if basis.harmonics <= state.basis.harmonics:
-                break
-            x = state.basis.resized(state.x, basis)
-            balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-            state = balance.at(x, state.omega, state.values)
-            try:
-                guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, located.kind.kappa(sample))
-                found = located.kind.solve(guess)
-            except ConvergenceError:
-                continue
-            wide = curve.with_balance(balance)
-            there = wide.join(
-                found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name]
-            )
-            away = sample.point.weights * (sample.point.curve.transfer(there, wide) - sample.point.u)
-            if located.kind.genuine(found, guess) and length(away) <= size:
-                return found
-        return None
-
-    def _refined(self, located: Located, solution: Singular, curve: ResponseCurve) -> Singular:
-        """Solved again with the harmonics that the tolerance for events asks for."""
-        adaptive = curve.adaptive
-        if adaptive is None:
-            return solution
-        for _ in range(8):
-            state = solution.state
-            basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
-            if basis.harmonics <= state.basis.harmonics:
-                # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
-                critical = located.kind.critical(solution)
-                if critical is None or np.abs(floquet_multipliers(state).multipliers - critical).min() <= _CRITICAL:
-                    break
-                basis = next_harmonics(state, adaptive)
-            if basis.harmonics <= state.basis.harmonics:
-                break
-            x = state.completed.basis.resized(state.completed.x, basis)
-            # more harmonics need more samples of a law that tells nothing of itself
-            balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, solution.kappa)
-            try:
-                better = solve_or_behind(located.kind, guess)
-            except ConvergenceError as failure:
-                self.trace.warnings.append(
-                    f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
-                    f"harmonics; with {basis.harmonics} it was not found again ({failure})"
-                )
-                break
-            moved = abs(better.state.omega - state.omega) / state.omega
-            if moved > 0.05:
-                self.trace.warnings.append(
-                    f"{located.kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
-                    f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
-                )
-                break
-            solution = better
-        return solution
-
     def _event_value(self, event: Event, sample: Sample) -> float:
-        value = event.function(self._orbit(sample))
+        value = event.function(orbit_of(sample))
         try:
             number = float(value)
         except (TypeError, ValueError):
@@ -412,7 +277,7 @@ class _Follower:
             self.trace.warnings.append(f"event {event.name!r}: {failure}")
             return None
         sample = self._sample(point)
-        orbit = self._orbit(sample)
+        orbit = orbit_of(sample)
         curve = point.curve
         assert isinstance(curve, ResponseCurve)
         return Bifurcation(
@@ -427,28 +292,9 @@ class _Follower:
 
 
 def _at_rest(sample: Sample) -> bool:
-    curve = sample.point.curve
-    assert isinstance(curve, ResponseCurve)
-    return curve.at_rest(sample.point.u)
-
-
-def _as_orbit(state: BalanceState, residual: float, neglected: float, curve: ResponseCurve) -> PeriodicOrbit:
-    values = dict(state.values)
-    return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, residual, neglected, curve.adaptive)
-
-
-def _guess(u: Array, point: CurvePoint, kappa: float) -> Guess:
-    curve = point.curve
-    assert isinstance(curve, ResponseCurve)
-    x, omega, values = curve.split(u)
-    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
-
-
-def _kappa(located: Located) -> float:
-    try:
-        return located.kind.kappa(located.sample)
-    except ConvergenceError:
-        return 0.0
+    evaluation = sample.point.evaluation
+    assert isinstance(evaluation, ResponseEvaluation)
+    return evaluation.at_rest
 
 
 def _same_event(a: Bifurcation, b: Bifurcation) -> bool:

@@ -22,17 +22,18 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 
 from suboctave.analysis.audit import Audit, Unsettled
-from suboctave.analysis.crossings import doubtful
+from suboctave.analysis.crossings import first_doubtful
 from suboctave.analysis.response import ResponseCurve
-from suboctave.bifurcation import ALL_KINDS, Bifurcation, Sample
+from suboctave.bifurcation import Bifurcation, Sample
 from suboctave.bifurcation.grazing import touches
-from suboctave.bifurcation.measures import scaled
+from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
+from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import ComplexArray
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
 FINEST = 1e-5
@@ -52,8 +53,6 @@ _AWAY = 0.03
 _AGREE = 0.03
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
 _NEAR_CIRCLE = 0.02
-
-BRANCH_POINT = next(kind for kind in ALL_KINDS if kind.name == "BP")
 
 
 @dataclass
@@ -87,6 +86,7 @@ class StepGuard:
         self._finest, self._longest = np.inf, 0.0
         self._unsettled: list[Unsettled] = []
         self._last: tuple[Sample, Sample, _Step] | None = None
+        self._touching: dict[tuple[Sample, Sample], bool] = {}
 
     @property
     def audit(self) -> Audit:
@@ -108,11 +108,21 @@ class StepGuard:
         for interval in step.settled:
             self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
         self._behind = step.samples[-4:]
+        kept = set(self._behind)
+        self._touching = {pair: known for pair, known in self._touching.items() if kept.issuperset(pair)}
         return Passage(_separating(step.inside), step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""
         self._unsettled.append(_unsettled(old, new, reason))
+
+    def grazes(self, p: Sample, q: Sample) -> bool:
+        """Whether a contact begins or ceases to touch between two samples."""
+        known = self._touching.get((p, q))
+        if known is None:
+            passing, clear = touches(p, q)
+            known = self._touching[p, q] = bool(passing) or not clear
+        return known
 
     def forget(self) -> None:
         """What lies behind says nothing of what comes (a corner of the equations)."""
@@ -122,7 +132,7 @@ class StepGuard:
         if self._last is None or self._last[0] is not old or self._last[1] is not new:
             # the last one may have been solved again with other harmonics
             behind = [*(s for s in self._behind if _place(s) < _place(old)), old]
-            self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point))
+            self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point, self.grazes))
         return self._last[2]
 
 
@@ -135,7 +145,9 @@ class _Step:
         new: Sample,
         solve: Callable[[Sample, Sample, float], Sample],
         is_branch_point: Callable[[Sample, Sample], bool],
+        grazes: Callable[[Sample, Sample], bool],
     ) -> None:
+        self.grazes = grazes
         self.samples = [*behind, new]
         self.old, self.new = behind[-1], new
         self.solve = solve
@@ -161,7 +173,7 @@ class _Step:
             share, reason = doubt
             if _place(q) - _place(p) <= least:
                 self.settled.append(_place(q) - _place(p))
-                if not any(kind.changed(p, q) for kind in ALL_KINDS):
+                if not changes(p, q):
                     # no event, but too close to one to tell it from two
                     self.unsettled.append(_unsettled(p, q, reason))
                 continue
@@ -204,7 +216,7 @@ class _Step:
             )
         if _mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
-        if _grazes(p, q):
+        if self.grazes(p, q):
             return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
@@ -212,12 +224,8 @@ class _Step:
         if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
         places = [_place(s) for s in stencil]
-        columns = zip(*(s.measures for s in stencil), strict=True)
-        for reason, column in zip(_REASONS, columns, strict=True):
-            where = doubtful(places, scaled(list(column)), at)
-            if where is not None:
-                return where, reason
-        return None
+        found = first_doubtful(places, [s.measures for s in stencil], at)
+        return None if found is None else (found[1], _REASONS[found[0]])
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
         """The samples to interpolate through, up to two on either side, and the position of p among them.
@@ -226,7 +234,7 @@ class _Step:
         """
         i = self.samples.index(p)
         h = _place(q) - _place(p)
-        before, behind = _smooth(self.samples[: i + 1][::-1]), _smooth(self.samples[i + 1 :])
+        before, behind = self._smooth(i, -1), self._smooth(i + 1, 1)
         left = _spaced([_place(p) - _place(s) for s in before], h)
         right = _spaced([_place(s) - _place(q) for s in behind], h)
         # one at least
@@ -236,21 +244,18 @@ class _Step:
             left, right = ([0], []) if far[0] <= far[1] else ([], [0])
         return [*(before[k] for k in reversed(left)), p, q, *(behind[k] for k in right)], len(left)
 
-
-def _grazes(p: Sample, q: Sample) -> bool:
-    """Whether a contact begins or ceases to touch between two samples."""
-    passing, clear = touches(p, q)
-    return bool(passing) or not clear
-
-
-def _smooth(samples: list[Sample]) -> list[Sample]:
-    """Up to four of the samples behind the first, as far as no contact begins or ceases to touch on the way."""
-    kept: list[Sample] = []
-    for near, far in pairwise(samples[:5]):
-        if _grazes(near, far):
-            break
-        kept.append(far)
-    return kept
+    def _smooth(self, start: int, way: int) -> list[Sample]:
+        """Up to four of the samples beyond one, as far as no contact begins or ceases to touch on the way."""
+        kept: list[Sample] = []
+        samples = self.samples
+        for k in range(start, start + 4 * way, way):
+            if not 0 <= k + way < len(samples):
+                break
+            near, far = samples[min(k, k + way)], samples[max(k, k + way)]
+            if self.grazes(near, far):
+                break
+            kept.append(samples[k + way])
+        return kept
 
 
 def _spaced(distances: list[float], h: float) -> list[int]:
@@ -305,7 +310,7 @@ def _separating(samples: list[Sample]) -> list[Sample]:
     kept = [samples[0]]
     since: set[str] = set()
     for p, q in pairwise(samples):
-        now = {kind.name for kind in ALL_KINDS if kind.changed(p, q)}
+        now = {kind.name for kind in changes(p, q)}
         if now & since or (now and since and "NS" in now | since):
             kept.append(p)
             since = set()
@@ -315,13 +320,8 @@ def _separating(samples: list[Sample]) -> list[Sample]:
 
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
     """Distance between the chord and the mean tangent of a step, in units of its length."""
-    chord = b.u - b.curve.transfer(a.u, a.curve)
-    size = length(b.weights * chord)
-    if size == 0.0:
-        return 0.0
-    tangents = b.weights * (b.curve.transfer(a.tangent, a.curve)), b.weights * b.tangent
-    mean = sum(t / length(t) for t in tangents) / 2.0
-    return length(b.weights * chord / size - mean)
+    u, heading = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
+    return float(kernels.disagreement(u, heading, b.u, b.tangent, b.weights))
 
 
 def _explained(p: Sample, q: Sample) -> bool:
@@ -329,7 +329,7 @@ def _explained(p: Sample, q: Sample) -> bool:
     change = abs(p.floquet.unstable - q.floquet.unstable)
     if not (p.floquet.decided and q.floquet.decided):
         return True
-    changed = {kind.name for kind in ALL_KINDS if kind.changed(p, q)}
+    changed = {kind.name for kind in changes(p, q)}
     if {"LP", "BP"} <= changed:
         # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
         return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)
@@ -343,9 +343,9 @@ def _mixed(p: Sample, q: Sample) -> bool:
 
     Its product changes sign there (and where two real ones are each other's inverses): alone the count tells which.
     """
-    if p.measures[-1][0] == q.measures[-1][0]:
+    if p.measures[0, -1] == q.measures[0, -1]:
         return False
-    return any(kind.changed(p, q) for kind in ALL_KINDS if kind.name != "NS")
+    return any(kind is not NEIMARK_SACKER for kind in changes(p, q))
 
 
 class CountCheck:
@@ -364,8 +364,7 @@ class CountCheck:
         sample do not explain.
         """
         self._since += found
-        mu = sample.floquet.multipliers
-        if not sample.floquet.decided or np.any(np.abs(np.abs(mu) - 1.0) < _NEAR_CIRCLE):
+        if not sample.floquet.decided or sample.floquet.clearance < _NEAR_CIRCLE:
             return None
         last, items = self._last, self._since
         self._last, self._since = sample, []
@@ -388,10 +387,16 @@ class CountCheck:
         )
 
 
-def _movement(old: ComplexArray, new: ComplexArray) -> float:
+@njit(cache=True)
+def _movement(old, new):
     """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    relevant = new[np.abs(new) > 0.5]
-    if not relevant.size:
-        return 0.0
-    nearest = np.abs(relevant[:, None] - old[None, :]).min(axis=1)
-    return float(np.max(nearest / np.maximum(1.0, np.abs(relevant))))
+    largest = 0.0
+    for i in range(new.shape[0]):
+        size = abs(new[i])
+        if size <= 0.5:
+            continue
+        nearest = np.inf
+        for j in range(old.shape[0]):
+            nearest = min(nearest, abs(new[i] - old[j]))
+        largest = max(largest, nearest / max(1.0, size))
+    return largest

@@ -13,7 +13,7 @@ from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, truncation
+from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, motion_size, truncation
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 
@@ -24,11 +24,11 @@ _TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True, eq=False)
 class ResponseEvaluation:
-    """Harmonic balance and its derivatives at one u."""
+    """Harmonic balance and its derivatives at one u; `reference`: a size of the motion elsewhere on the curve."""
 
     state: BalanceState
     name: str
-    floor: float
+    reference: float
 
     @property
     def residual(self) -> Array:
@@ -42,9 +42,18 @@ class ResponseEvaluation:
 
     @lazy
     def error(self) -> float:
-        """Residual in units of the forces that balance (or of `floor`: at rest there are none)."""
+        """Residual in units of the forces that balance (at rest, where there are none, of those of a tiny motion)."""
         state = self.state
-        return state.residual_size() / max(state.force_scale(), self.floor, _TINY)
+        floor = _REST * state.omega**2 * self.reference
+        return state.residual_size() / max(state.force_scale(), floor, _TINY)
+
+    @lazy
+    def at_rest(self) -> bool:
+        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve.
+
+        Without loads (parametric excitation alone) rest is a motion like any other, which may lose its stability.
+        """
+        return self.reference > 0.0 and motion_size(self.state) <= _REST * self.reference
 
     @lazy
     def truncation(self) -> float:
@@ -116,15 +125,11 @@ class ResponseCurve:
         x, omega, values = self.split(u)
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
-        return ResponseEvaluation(self.balance.at(x, omega, values), self.name, _REST * omega**2 * self.reference)
+        return ResponseEvaluation(self.balance.at(x, omega, values), self.name, self.reference)
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
         return length(self._weight * u[:-1])
-
-    def at_rest(self, u: Array) -> bool:
-        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve."""
-        return self.size(u) <= _REST * self.reference
 
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
@@ -161,7 +166,7 @@ class ResponseCurve:
     def transfer(self, u: Array, origin: Curve) -> Array:
         """See `Curve.transfer`."""
         assert isinstance(origin, ResponseCurve)
-        if origin.balance.basis == self.balance.basis:
+        if origin.balance is self.balance or origin.balance.basis == self.balance.basis:
             return u
         x = u[:-1].reshape(origin.balance.basis.size, -1)
         return self.join(origin.balance.basis.resized(x, self.balance.basis), u[-1])

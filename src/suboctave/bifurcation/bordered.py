@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.continuation.linear import Factor
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.state import BalanceState
 
@@ -36,6 +36,24 @@ class NullVectors:
 
     right: np.ndarray
     left: np.ndarray
+
+    def resized(self, basis: HarmonicBasis, size: int, kind: Kind) -> NullVectors:
+        """The same vectors with the harmonics of a basis, those that it does not have dropped."""
+        rows = size * (basis.size + (kind is Kind.HALF))
+        return NullVectors(*(_resized(v, rows, kind is Kind.FREE) for v in (self.right, self.left)))
+
+
+def _resized(vector: np.ndarray, rows: int, two_sided: bool) -> np.ndarray:
+    excess = len(vector) - rows
+    if excess == 0:
+        return vector
+    # harmonics in ascending order, from 0 or from -H
+    front = excess // 2 if two_sided else 0
+    if excess > 0:
+        vector = vector[front : front + rows]
+    else:
+        vector = np.concatenate((np.zeros(-front), vector, np.zeros(front - excess)))
+    return vector / np.linalg.norm(vector)
 
 
 @dataclass(frozen=True)

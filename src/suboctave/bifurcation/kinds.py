@@ -13,10 +13,8 @@ neighbours, where in between, how to solve for it, and whether a solution is one
 from __future__ import annotations
 
 import cmath
-import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -28,8 +26,10 @@ from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
 from suboctave.stability import FloquetResult, floquet_multipliers
 
 
@@ -40,33 +40,32 @@ class Sample:
     point: CurvePoint
     state: BalanceState
 
-    @cached_property
+    @lazy
     def floquet(self) -> FloquetResult:
         """Multipliers and their errors."""
         return floquet_multipliers(self.state)
 
-    @cached_property
+    @lazy
     def half_sign(self) -> float:
         """Sign of det J_half."""
         return Factor.of(self.state.half_jacobian).sign
 
-    @cached_property
+    @lazy
     def gaps(self) -> tuple[GapExtrema, ...]:
         """The elements' gaps with the extrema of the motion there."""
         return gap_extrema(self.state)
 
-    @property
+    @lazy
     def slope(self) -> float:
         """Component of the tangent along the free parameter."""
         return float(self.point.tangent[self.point.curve.parameter])
 
-    @cached_property
-    def measures(self) -> tuple[measures.Value, ...]:
-        """The smooth test functions turn, fold, double, torus of `bifurcation.measures`."""
-        point, mu = self.point, self.floquet.multipliers
+    @lazy
+    def measures(self) -> Array:
+        """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
+        point = self.point
         turn = self.slope * float(point.weights[point.curve.parameter]) / length(point.weights * point.tangent)
-        value = (1.0 if turn > 0.0 else -1.0, math.log(abs(turn)) if turn else -math.inf)
-        return (value, *measures.of_multipliers(mu))
+        return measures.measured(turn, self.floquet.multipliers)
 
 
 class BifurcationKind(ABC):
@@ -161,8 +160,10 @@ class NeimarkSacker(BifurcationKind):
 
     def changed(self, a: Sample, b: Sample) -> bool:
         """Count of unstable multipliers changed by more than LP, BP and PD account for."""
-        folded, branched = LimitPoint().changed(a, b), BranchPoint().changed(a, b)
-        accounted = int(folded or branched) + int(PeriodDoubling().changed(a, b))
+        return any(kind.name == "NS" for kind in changes(a, b))
+
+    def beyond(self, a: Sample, b: Sample, accounted: int) -> bool:
+        """Whether a pair crosses the circle, `accounted` changes of the count being explained by others."""
         return abs(a.floquet.unstable - b.floquet.unstable) >= accounted + 2 and self._pair(a, b) is not None
 
     @staticmethod
@@ -204,8 +205,24 @@ class NeimarkSacker(BifurcationKind):
         return cmath.exp(2j * cmath.pi * found.kappa / found.state.rate)
 
 
+BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER = (
+    BranchPoint(),
+    LimitPoint(),
+    PeriodDoubling(),
+    NeimarkSacker(),
+)
 #: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork
-ALL_KINDS: tuple[BifurcationKind, ...] = (BranchPoint(), LimitPoint(), PeriodDoubling(), NeimarkSacker())
+ALL_KINDS: tuple[BifurcationKind, ...] = (BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER)
+
+
+def changes(a: Sample, b: Sample) -> list[BifurcationKind]:
+    """The kinds whose tests have changed between two neighbours, in the order in which they are looked for."""
+    found: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
+    # one multiplier passes +1 at a limit point or a branch point, or at both in one
+    accounted = len(found) - (len(found) > 1 and found[1] is LIMIT_POINT)
+    if NEIMARK_SACKER.beyond(a, b, accounted):
+        found.append(NEIMARK_SACKER)
+    return found
 
 
 def _zero(a: float, b: float) -> float:

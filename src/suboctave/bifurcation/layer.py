@@ -50,8 +50,6 @@ _NEAR = 0.05
 _REACH = 0.01
 #: the same for one that is bracketed only
 _BRACKETED = 1e-3
-#: unknowns beyond which neglected harmonics are judged by fewer rather than by more of them
-_LARGE = 800
 #: ways behind the grazing at which Newton's method starts
 _STARTS = (1e-10, 1e-8, 1e-6, 1e-4)
 
@@ -103,25 +101,28 @@ def solve_or_behind(kind: BifurcationKind, guess: Guess) -> Singular:
         return found
 
 
-def unresolved(kind: BifurcationKind, guess: Guess, contact: GrazingContact) -> float:
+def unresolved(
+    kind: BifurcationKind, guess: Guess, contact: GrazingContact, coarser: tuple[int, float] | None = None
+) -> float:
     """What the neglected harmonics may do to the place of a bifurcation behind a grazing, in the free parameter.
 
-    A short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H: half as many harmonics
-    more (or a third less, where the matrices are large) tell it. A bifurcation that is not found again with them is
-    known up to the thickness of the layer.
+    A short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H: the place with fewer
+    harmonics tells it. A bifurcation that is not found with two thirds of them is known up to the thickness of the
+    layer. `coarser`: a number of harmonics with which it was found before, and where.
     """
-    basis, size = guess.balance.basis, guess.balance.size
-    other, factor = HarmonicBasis((3 * basis.harmonics + 1) // 2, basis.nu), 3.0
-    if size * other.size > _LARGE:
-        other, factor = HarmonicBasis(2 * basis.harmonics // 3, basis.nu), 2.0
-    x = basis.resized(guess.x, other)
-    balance = guess.balance.with_basis(other).settle(x, guess.omega, guess.values)
-    try:
-        state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
-    except ConvergenceError:
-        return abs(guess.parameter - contact.parameter)
-    value = state.omega if guess.name == "omega" else state.values[guess.name]
-    return factor * abs(value - guess.parameter)
+    basis = guess.balance.basis
+    if coarser is not None and 0.5 * basis.harmonics <= coarser[0] <= 0.75 * basis.harmonics:
+        fewer, value = coarser
+    else:
+        other = HarmonicBasis(2 * basis.harmonics // 3, basis.nu)
+        fewer, x = other.harmonics, basis.resized(guess.x, other)
+        balance = guess.balance.with_basis(other).settle(x, guess.omega, guess.values)
+        try:
+            state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
+        except ConvergenceError:
+            return abs(guess.parameter - contact.parameter)
+        value = state.omega if guess.name == "omega" else state.values[guess.name]
+    return abs(value - guess.parameter) / (basis.harmonics / fewer - 1.0)
 
 
 def behind_their_grazings(found: list[tuple[float, Bifurcation]]) -> list[Bifurcation]:

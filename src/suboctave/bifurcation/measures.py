@@ -9,8 +9,8 @@ symmetric functions are:
     torus    prod_{i<j} (1 - mu_i mu_j)                                     Neimark-Sacker points (and neutral saddles)
 
 (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 10.2). Each factor is divided by a positive one,
-sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest. Values are pairs (sign, logarithm of the
-modulus): products of many factors leave the range of numbers. `turn` belongs to the equations solved, the others to
+sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest. Values are kept as signs and logarithms
+of moduli: products of many factors leave the range of numbers. `turn` belongs to the equations solved, the others to
 the multipliers, whose zeros lie as far from those of `det J_0` and `det J_half` as the harmonics left out make them:
 they tell whether something may hide, not what has happened.
 """
@@ -22,59 +22,50 @@ import math
 import numpy as np
 from numba import njit
 
-from suboctave.harmonic.basis import ComplexArray
-
-#: (sign, logarithm of the modulus)
-Value = tuple[float, float]
+from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
 
 
-def of_multipliers(mu: ComplexArray) -> tuple[Value, Value, Value]:
-    """fold, double and torus of multipliers (2 n,).
+def measured(turn: float, mu: ComplexArray) -> Array:
+    """turn, fold, double, torus from the first of them and the multipliers (2 n,): signs and logarithms of the moduli,
+    shape (2, 4).
 
     `torus` is constant for motions without damping, whose pairs never leave the circle.
     """
-    signs, logs = _products(mu)
-    return (signs[0], logs[0]), (signs[1], logs[1]), (signs[2], logs[2])
+    out = np.empty((2, 4))
+    _measure(turn, mu, out[0], out[1])
+    return out
 
 
 @njit(cache=True)
-def _products(mu):
-    """Signs and logarithms of the three products. Complex factors come in conjugate pairs: the sign is that of the
-    real ones.
-    """
+def _measure(turn, mu, sign, log):
+    """Complex factors come in conjugate pairs: the sign is that of the real ones."""
     n = mu.shape[0]
-    signs = (np.ones(3), np.zeros(3))
-    sign, log = signs
+    sign[0] = 1.0 if turn > 0.0 else -1.0
+    log[0] = math.log(abs(turn)) if turn != 0.0 else -np.inf
+    for k in range(1, 4):
+        sign[k] = 1.0
+        log[k] = 0.0
     total = 0.0
     for i in range(n):
         size = abs(mu[i])
         total += math.log(size) if size > 0.0 else -np.inf
         half = 0.5 * math.log1p(size * size)
         real = abs(mu[i].imag) <= 1e-12 * size
-        for k in range(2):
-            factor = 1.0 - mu[i] if k == 0 else 1.0 + mu[i]
+        for k in range(1, 3):
+            factor = 1.0 - mu[i] if k == 1 else 1.0 + mu[i]
             if real and factor.real < 0.0:
                 sign[k] = -sign[k]
             log[k] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - half
     if abs(total) < UNDAMPED:
-        return signs
+        return
     for i in range(n):
         for j in range(i + 1, n):
             product = mu[i] * mu[j]
             factor = 1.0 - product
             size = abs(product)
             if abs(product.imag) <= 1e-12 * size and factor.real < 0.0:
-                sign[2] = -sign[2]
-            log[2] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - 0.5 * math.log1p(size * size)
-    return signs
-
-
-def scaled(values: list[Value]) -> list[float]:
-    """Values as plain numbers in units of the largest of them."""
-    top = max(log for _, log in values)
-    if top == -math.inf:
-        return [sign * 0.0 for sign, _ in values]
-    return [sign * math.exp(log - top) for sign, log in values]
+                sign[3] = -sign[3]
+            log[3] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - 0.5 * math.log1p(size * size)

@@ -20,15 +20,21 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, floquet_multipliers
 
 _TOLERANCE = 1e-10
 _STEP = 1e-9
+#: size of motion and forces at rest: products of it with others neither overflow nor vanish
+_NOTHING = 1e-100
+#: step below which the matrix is not computed anew
+_SHORT = 1e-3
 
 
 @dataclass(frozen=True)
 class Guess:
     """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter,
-    kappa.
+    kappa; null vectors of the operator nearby, where they are known (with any number of harmonics).
     """
 
     balance: HarmonicBalance
@@ -38,6 +44,7 @@ class Guess:
     name: str
     span: float
     kappa: float = 0.0
+    vectors: NullVectors | None = None
 
     def state(self) -> BalanceState:
         """The equations at the guess."""
@@ -60,6 +67,11 @@ class Singular:
     kappa: float
     residual: float
     iterations: int
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Its multipliers."""
+        return floquet_multipliers(self.state)
 
 
 #: derivatives of a scalar equation by X, by the free parameter and by the extra unknowns
@@ -87,7 +99,12 @@ Augmentation = Callable[[BalanceState, Array], tuple[list[Extra], Array | None, 
 
 
 def newton(
-    guess: Guess, unknowns: Array, spans: Array, augmentation: Augmentation, iterations: int = 15
+    guess: Guess,
+    unknowns: Array,
+    spans: Array,
+    augmentation: Augmentation,
+    iterations: int = 10,
+    start: BalanceState | None = None,
 ) -> tuple[BalanceState, Array, float, int]:
     """Solve `[R + columns . unknowns; extras] = 0` in (X, parameter, unknowns).
 
@@ -95,6 +112,8 @@ def newton(
     ----------
     unknowns, spans
         Start and natural size of the extra unknowns, shape (q,); one more equation than unknowns is needed.
+    start
+        The equations at the guess, where they have been evaluated.
 
     Returns
     -------
@@ -108,18 +127,21 @@ def newton(
     balance, n = guess.balance, guess.balance.dimension
     x, parameter, extra = guess.x.ravel().copy(), guess.parameter, unknowns.astype(float).copy()
     weight = np.tile(balance.scales()[0], balance.basis.size)
-    rows = residual_scale(guess.state())
-    previous = np.inf
+    state = guess.state() if start is None else start
+    rows = residual_scale(state)
+    previous, contraction = np.inf, 0.0
+    linear: tuple[Factor, Array, Array, list[float]] | None = None
     for iteration in range(iterations + 1):
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
             raise ConvergenceError("omega left the positive axis")
-        state = balance.at(x, omega, values)
+        if iteration > 0:
+            state = balance.at(x, omega, values)
         equations, addition, columns = augmentation(state, extra)
         if not all(e.size > 0.0 for e in equations):
             raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
-        force = max(state.force_scale(), np.finfo(float).tiny)
+        force = max(state.force_scale(), _NOTHING)
         error = float(np.linalg.norm(residual * rows)) / force
         error = max([error] + [abs(e.value) / e.size for e in equations])
         if not np.isfinite(error):
@@ -129,28 +151,16 @@ def newton(
             return state, extra, error, iteration
         if iteration == iterations:
             break
-        q = len(extra)
-        matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
-        size = max(motion_size(state), np.finfo(float).tiny)
-        scale_x = size / weight
-        matrix[:n, :n] = state.jacobian * (rows / force)[:, None] * scale_x
-        matrix[:n, n] = state.residual_by(guess.name) * (rows / force) * guess.span
-        for j, column in enumerate(columns):
-            matrix[:n, n + 1 + j] = column * (rows / force) * spans[j]
-        rhs = np.empty(n + 1 + q)
-        rhs[:n] = residual * (rows / force)
-        for i, e in enumerate(equations):
-            by_x, by_parameter, by_unknowns = e.slopes()
-            matrix[n + i, :n] = by_x * scale_x / e.size
-            matrix[n + i, n] = by_parameter * guess.span / e.size
-            for j, value in enumerate(by_unknowns):
-                matrix[n + i, n + 1 + j] = value * spans[j] / e.size
-            rhs[n + i] = e.value / e.size
-        factor = Factor.of(matrix, overwrite=True)
-        if factor.singular:
-            raise ConvergenceError("the bordered system is singular")
+        # after a short step that contracts, the old factors take the next one as far
+        if linear is None or previous > _SHORT or contraction > 0.1:
+            linear = _linearised(state, guess, equations, columns, spans, weight, rows, force)
+        factor, scale_x, scale_rows, sizes = linear
+        rhs = np.empty(n + 1 + len(extra))
+        rhs[:n] = residual * scale_rows
+        rhs[n:] = [e.value / e_size for e, e_size in zip(equations, sizes, strict=True)]
         step = factor.solve(rhs)
         length = float(np.linalg.norm(step))
+        contraction = length / previous
         if not np.isfinite(length):
             raise ConvergenceError("the bordered system is singular")
         if iteration > 3 and length > 0.5 * previous and previous > 1e-6:
@@ -165,6 +175,39 @@ def newton(
     raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
 
 
+def _linearised(
+    state: BalanceState,
+    guess: Guess,
+    equations: list[Extra],
+    columns: list[Array],
+    spans: Array,
+    weight: Array,
+    rows: Array,
+    force: float,
+) -> tuple[Factor, Array, Array, list[float]]:
+    """The factorised matrix of the augmented system in dimensionless unknowns and equations, the units of the
+    coefficients, the factors of the residual's entries, and the sizes of the other equations.
+    """
+    n, q = len(rows), len(spans)
+    matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
+    scale_x = max(motion_size(state), _NOTHING) / weight
+    scale_rows = rows / force
+    matrix[:n, :n] = state.jacobian * scale_rows[:, None] * scale_x
+    matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span
+    for j, column in enumerate(columns):
+        matrix[:n, n + 1 + j] = column * scale_rows * spans[j]
+    for i, e in enumerate(equations):
+        by_x, by_parameter, by_unknowns = e.slopes()
+        matrix[n + i, :n] = by_x * scale_x / e.size
+        matrix[n + i, n] = by_parameter * guess.span / e.size
+        for j, value in enumerate(by_unknowns):
+            matrix[n + i, n + 1 + j] = value * spans[j] / e.size
+    factor = Factor.of(matrix, overwrite=True)
+    if factor.singular:
+        raise ConvergenceError("the bordered system is singular")
+    return factor, scale_x, scale_rows, [e.size for e in equations]
+
+
 def locate_singular(guess: Guess, kind: Kind) -> Singular:
     """Locate a motion at which J_kappa is singular, kappa = 0, w0/2, or free (starting from `guess.kappa`).
 
@@ -173,7 +216,11 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
-    borders = null_vectors(guess.state(), kind, guess.kappa)
+    begin = guess.state()
+    if guess.vectors is None:
+        borders = null_vectors(begin, kind, guess.kappa)
+    else:
+        borders = guess.vectors.resized(guess.balance.basis, guess.balance.size, kind)
     last: list[Bordered] = []
 
     def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
@@ -200,6 +247,6 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
 
     start = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(0)
     spans = np.full(len(start), guess.omega / guess.balance.basis.nu)
-    state, extra, residual, iterations = newton(guess, start, spans, augmentation)
+    state, extra, residual, iterations = newton(guess, start, spans, augmentation, start=begin)
     kappa = float(extra[0]) if kind is Kind.FREE else 0.0
     return Singular(state, last[0].vectors, kappa, residual, iterations)

@@ -82,12 +82,85 @@ def cosine(a, b, weights):
 
 
 @njit(cache=True)
-def predicted(u, tangent, bend, step):
-    """`u + step tangent + step^2 / 2 bend`."""
-    out = np.empty(u.shape[0])
-    for i in range(u.shape[0]):
-        out[i] = u[i] + step * (tangent[i] + 0.5 * step * bend[i])
+def predict(points, tangents, weights, step, out):
+    """The Hermite polynomial through points and tangents (m, n) taken `step` further in scaled arclength, into `out`.
+
+    The latest point comes first; one point gives a straight line, two a cubic, three a quintic.
+    """
+    m, n = points.shape
+    size = np.empty(m)
+    where = np.zeros(m)
+    for j in range(m):
+        total = 0.0
+        for i in range(n):
+            d = weights[i] * tangents[j, i]
+            total += d * d
+        size[j] = math.sqrt(total)
+        if j > 0:
+            chord = turn = 0.0
+            for i in range(n):
+                d = weights[i] * (points[j - 1, i] - points[j, i])
+                chord += d * d
+                d = weights[i] * (tangents[j - 1, i] / size[j - 1] - tangents[j, i] / size[j])
+                turn += d * d
+            # the arc is longer than its chord
+            where[j] = where[j - 1] - math.sqrt(chord) * (1.0 + turn / 24.0)
+    for i in range(n):
+        out[i] = 0.0
+    for j in range(m):
+        product, total = 1.0, 0.0
+        for k in range(m):
+            if k != j:
+                product *= (step - where[k]) / (where[j] - where[k])
+                total += 1.0 / (where[j] - where[k])
+        square = product * product
+        ahead = step - where[j]
+        value = square * (1.0 - 2.0 * ahead * total)
+        slope = square * ahead / size[j]
+        for i in range(n):
+            out[i] += value * points[j, i] + slope * tangents[j, i]
+
+
+@njit(cache=True)
+def between(u, tangent, v, heading, weights, s):
+    """Cubic Hermite interpolation at the share s of the way from u to v, with tangents of any length."""
+    n = u.shape[0]
+    chord = first = last = 0.0
+    for i in range(n):
+        w = weights[i] * weights[i]
+        d = v[i] - u[i]
+        chord += w * d * d
+        first += w * tangent[i] * tangent[i]
+        last += w * heading[i] * heading[i]
+    a = (1.0 + 2.0 * s) * (1.0 - s) ** 2
+    b = s * (1.0 - s) ** 2 * math.sqrt(chord / first)
+    c = s * s * (3.0 - 2.0 * s)
+    d = s * s * (s - 1.0) * math.sqrt(chord / last)
+    out = np.empty(n)
+    for i in range(n):
+        out[i] = a * u[i] + b * tangent[i] + c * v[i] + d * heading[i]
     return out
+
+
+@njit(cache=True)
+def disagreement(u, tangent, v, heading, weights):
+    """Distance between the unit chord from u to v and the mean of the unit tangents there; 0 without a chord."""
+    n = u.shape[0]
+    chord = first = last = 0.0
+    for i in range(n):
+        w = weights[i] * weights[i]
+        d = v[i] - u[i]
+        chord += w * d * d
+        first += w * tangent[i] * tangent[i]
+        last += w * heading[i] * heading[i]
+    if chord == 0.0:
+        return 0.0
+    chord, first, last = 1.0 / math.sqrt(chord), 0.5 / math.sqrt(first), 0.5 / math.sqrt(last)
+    total = 0.0
+    for i in range(n):
+        d = weights[i] * (chord * (v[i] - u[i]) - first * tangent[i] - last * heading[i])
+        total += d * d
+    return math.sqrt(total)
 
 
 @njit(cache=True)

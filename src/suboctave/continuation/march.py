@@ -1,8 +1,8 @@
 """Predictor-corrector continuation with scaled arclength.
 
-Predictor: tangent and curvature from the last two tangents. Corrector: Newton's method in the hyperplane orthogonal
-to the tangent. Step length: from the distance between prediction and solution, the angle between tangents and the
-rate at which Newton's method contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The
+Predictor: the quintic through the last three points and their tangents. Corrector: Newton's method in the hyperplane
+orthogonal to the tangent. Step length: from the distance between prediction and solution, the angle between tangents
+and the rate at which Newton's method contracts (Allgower & Georg, Numerical Continuation Methods, 1990, chapter 6). The
 engine hands out the points one by one; what is looked for along the curve is the caller's business.
 """
 
@@ -19,6 +19,9 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
+
+#: points behind the last one that a prediction takes into account
+_BEHIND = 2
 
 
 @dataclass(frozen=True)
@@ -96,15 +99,8 @@ def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
     ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    h = length(b.weights * (b.u - ua))
-    s = fraction
-    # unit tangents in the scaling of this step: a comes with that of the step before
-    return (
-        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * ua
-        + s * (1.0 - s) ** 2 * h / length(b.weights * ta) * ta
-        + s**2 * (3.0 - 2.0 * s) * b.u
-        + s**2 * (s - 1.0) * h / length(b.weights * b.tangent) * b.tangent
-    )
+    result: Array = kernels.between(ua, ta, b.u, b.tangent, b.weights, fraction)
+    return result
 
 
 def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonOptions) -> CurvePoint:
@@ -164,7 +160,7 @@ class March:
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
-        bend = np.zeros_like(point.u)
+        behind: list[CurvePoint] = []
         count = 1
         while True:
             if count >= options.max_points:
@@ -174,7 +170,7 @@ class March:
                 return
             point = self._rescaled(point, largest)
             try:
-                new, step, deviation = self._advance(point, step, bend)
+                new, step, deviation = self._advance(point, step, behind)
             except ConvergenceError as failure:
                 self.ended = (
                     f"step size fell below {options.min_step:.0e} at {point.curve.where(point.u)}: {failure}. "
@@ -198,16 +194,14 @@ class March:
                         f"left the range after {point.curve.where(point.u)}; no solution was found exactly on its end"
                     )
                 return
-            taken = new.arclength - point.arclength
             yield new
             count += 1
-            old = point.tangent if new.curve is point.curve else new.curve.transfer(point.tangent, point.curve)
-            bend = (new.tangent - old) / taken
-            step = self._next_step(point, new, taken, deviation)
+            step = self._next_step(point, new, new.arclength - point.arclength, deviation)
+            # beyond a corner nothing leads on from what lies behind
+            behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             adapted = new.curve.adapted(new.u, new.evaluation)
             if adapted is not new.curve:
                 u, t = adapted.transfer(new.u, new.curve), adapted.transfer(new.tangent, new.curve)
-                bend = adapted.transfer(bend, new.curve)
                 weights = adapted.weights(u, largest)
                 point = replace(new, curve=adapted, u=u, tangent=t, weights=weights)
             else:
@@ -224,13 +218,20 @@ class March:
     def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
         """The same point with scaling and tangent length of the present amplitude."""
         weights = point.curve.weights(point.u, largest)
-        return replace(point, weights=weights, tangent=kernels.normalised(weights * point.tangent, weights))
+        t = kernels.normalised(weights * point.tangent, weights)
+        p = point
+        return CurvePoint(p.curve, p.u, t, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
-    def _advance(self, point: CurvePoint, step: float, bend: Array) -> tuple[CurvePoint, float, float]:
+    def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, step length used, distance between prediction and solution."""
+        known = [point, *behind]
+        points = np.array([point.curve.transfer(p.u, p.curve) for p in known])
+        tangents = np.array([point.curve.transfer(p.tangent, p.curve) for p in known])
+        order = len(known)
         while True:
             try:
-                guess = kernels.predicted(point.u, point.tangent, bend, step)
+                guess = np.empty(len(point.u))
+                kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
                 solved = correct(point.curve, guess, point.weights * point.tangent, point.weights, self.newton)
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
@@ -244,6 +245,8 @@ class March:
                 failure = error
             if step <= self.stepping.min_step:
                 return self._around_corner(point, failure)
+            # what lies behind may not tell what comes
+            order = max(1, order - 1)
             step = max(0.5 * step, self.stepping.min_step)
 
     def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float]:

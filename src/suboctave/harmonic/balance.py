@@ -16,7 +16,6 @@ Griffin, J. Appl. Mech. 56 (1989) 149-154 (alternating frequency/time); the clos
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 
 import numpy as np
 
@@ -25,10 +24,12 @@ from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.group_force import Group, GroupLaw
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
+from suboctave.harmonic.nodal import own_elements
 from suboctave.harmonic.quadrature import samples_for
 from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
 from suboctave.model.element import Element
-from suboctave.model.sampling import AdaptiveSampling, Sampling
+from suboctave.model.sampling import AdaptiveSampling, CornerSampling, Sampling
 from suboctave.model.system import System
 
 
@@ -70,6 +71,11 @@ class HarmonicBalance:
         self.samples = samples if samples is not None else (None,) * len(system.elements)
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
+        #: the elements that are evaluated direction by direction, and those with nodes of their own
+        self.elements: tuple[Element, ...] = tuple(
+            e for e in system.elements if isinstance(e, Element) and not e.own_nodes
+        )
+        self.own = own_elements(system, self.linear)
         self.groups = self._grouped()
         #: the groups' directions, packed: where each begins, its DOFs, its entries there
         self.directions = (
@@ -85,13 +91,14 @@ class HarmonicBalance:
         self.loads = LoadSpectrum(system, basis, shapes)
         self._load_cache: tuple[tuple, Array] | None = None
         self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
+        self._load_order = sorted(self.load_names)
         self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
     def _grouped(self) -> list[Group]:
         found: dict[bytes, tuple[Array, list[int]]] = {}
-        for i, element in enumerate(self.system.elements):
+        for i, element in enumerate(self.elements):
             d = np.asarray(self.linear.retain(element.direction(self.system.n)), dtype=float)
             found.setdefault(d.tobytes(), (d, []))[1].append(i)
         groups = []
@@ -99,11 +106,6 @@ class HarmonicBalance:
             dofs = np.flatnonzero(d)
             groups.append(Group(d, dofs, d[dofs].copy(), tuple(members)))
         return groups
-
-    @property
-    def elements(self) -> tuple[Element, ...]:
-        """The system's elements."""
-        return self.system.elements
 
     def with_samples(self, samples: tuple[int | None, ...]) -> HarmonicBalance:
         """The same equations with other frozen sample counts."""
@@ -117,7 +119,7 @@ class HarmonicBalance:
             return self
         return HarmonicBalance(self.system, basis, self.values, self.linear, self.samples)
 
-    @cached_property
+    @lazy
     def completed(self) -> HarmonicBalance:
         """The same equations in the basis of 2 H + 1 harmonics, which a motion is completed in."""
         return self.with_basis(HarmonicBasis(self.top, self.basis.nu))
@@ -145,37 +147,53 @@ class HarmonicBalance:
             samples_for(local.element, local.motion, local.rate, local.coefficients, self.top)
             for local in state.local_motions
         )
-        return self.with_samples(samples)
+        return self.with_samples(samples + tuple(force.settled() for force in state.nodal))
 
-    @cached_property
+    @lazy
     def _settled(self) -> bool:
         """True if no element needs a number of samples."""
         kinds = self.coefficients(self.values)[1]
-        return all(s is None for s in self.samples) and not any(isinstance(kind, AdaptiveSampling) for kind in kinds)
+        blind = AdaptiveSampling | CornerSampling
+        return all(s is None for s in self.samples) and not any(isinstance(kind, blind) for kind in kinds)
 
-    @cached_property
+    @lazy
     def highest_load(self) -> int:
-        """Highest harmonic of omega that is loaded, 0 without loads."""
-        return max((c.harmonic for c in self.system.load_components()), default=0)
+        """Highest harmonic of omega that is loaded, or that an element depends on; 0 without."""
+        times = [own.harmonic for own in self.own]
+        return max([c.harmonic for c in self.system.load_components()] + times, default=0)
 
     def load(self, values: Mapping[str, float], omega: float) -> Array:
         """Load coefficients P, shape (2 H + 1, size)."""
-        key = tuple(omega if n == "omega" else values[n] for n in sorted(self.load_names))
+        if values is self.values and "omega" not in self.load_names:
+            return self._own_load
+        key = tuple(omega if n == "omega" else values[n] for n in self._load_order)
         if self._load_cache is None or self._load_cache[0] != key:
             self._load_cache = (key, self.loads.value({**values, "omega": omega}, self.size))
         return self._load_cache[1]
 
     def coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
         """Coefficient values of every element, what it tells of its law at them, and that sorted by groups."""
+        if values is self.values:
+            return self._own_coefficients
         key = tuple(values[name] for name in self._coefficient_names)
         if self._coefficients is None or self._coefficients[0] != key:
-            numbers = [e.coefficient_values(values) for e in self.system.elements]
-            kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
-            laws = [GroupLaw.of(group, numbers, kinds) for group in self.groups]
-            self._coefficients = (key, (numbers, kinds, laws))
+            self._coefficients = (key, self._sorted_coefficients(values))
         return self._coefficients[1]
 
-    @cached_property
+    def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
+        numbers = [e.coefficient_values(values) for e in self.system.elements]
+        kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
+        return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
+
+    @lazy
+    def _own_coefficients(self) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
+        return self._sorted_coefficients(self.values)
+
+    @lazy
+    def _own_load(self) -> Array:
+        return self.loads.value(self.values, self.size)
+
+    @lazy
     def _scales(self) -> tuple[Array, Array]:
         mass = self.linear.equation_of_motion()[0]
         shapes = np.array([self.linear.expand(unit) for unit in np.eye(self.size)])

@@ -228,3 +228,16 @@ def add_element(out, matrix, rows, row_values, cols, col_values, n):
             for p in range(rows.shape[0]):
                 for q in range(cols.shape[0]):
                     out[i * n + rows[p], j * n + cols[q]] += matrix[i, j] * row_values[p] * col_values[q]
+
+
+@njit(cache=True)
+def form(left, blocks, right):
+    """`sum_f left_f^H blocks_f right_f`; left, right (F, n), blocks (F, n, n)."""
+    total = 0.0 + 0.0j
+    for f in range(left.shape[0]):
+        for i in range(left.shape[1]):
+            row = 0.0 + 0.0j
+            for j in range(right.shape[1]):
+                row += blocks[f, i, j] * right[f, j]
+            total += left[f, i].conjugate() * row
+    return total

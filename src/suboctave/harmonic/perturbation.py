@@ -19,7 +19,7 @@ from enum import Enum
 
 import numpy as np
 
-from suboctave.harmonic import kernels
+from suboctave.harmonic import kernels, nodal_second
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import Curvature, coefficient_force
 from suboctave.harmonic.rates import coefficient_rates
@@ -63,6 +63,10 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
         if damping.size:
             matrix = matrix + _two_sided(damping, k) * (1j * frequency)
         kernels.add_element(out, matrix, group.dofs, group.values, group.dofs, group.values, size)
+    for nodal in state.nodal:
+        own = nodal.own
+        for matrix, packed in zip(nodal_second.two_sided(nodal, k, frequency, _two_sided), own.in_packed, strict=True):
+            kernels.add_element(out, matrix, *own.out_packed, *packed, size)
     compliance = state.linear.compliance(frequency)
     shaped = out.reshape(len(k), size, -1)
     if compliance is not None:
@@ -142,6 +146,15 @@ def bilinear_gradient(
             drive += np.multiply.outer(response, group.direction)
         if "omega" in rates:
             rates["omega"] += local_omega
+    for nodal in state.nodal:
+        part, changes, part_kappa, response = nodal_second.form_gradient(
+            nodal, u_force, v, frequency, by_omega, state.values, names, _toeplitz_apply
+        )
+        gx += part
+        g_kappa += part_kappa
+        drive += np.multiply.outer(response, nodal.own.out)
+        for name, by_name in changes.items():
+            rates[name] += by_name
     for name in names:
         if name == "omega":
             continue
@@ -183,7 +196,7 @@ def _inner(left: ComplexArray, right: ComplexArray) -> complex:
 
 def _form(left: ComplexArray, blocks: ComplexArray, right: ComplexArray) -> complex:
     """`left^H blocks right`, one block per frequency."""
-    return complex(np.einsum("fi,fij,fj->", left.conj(), blocks, right))
+    return complex(kernels.form(left, blocks, right))
 
 
 def _toeplitz_apply(spectrum: ComplexArray, waves: ComplexArray) -> ComplexArray:
@@ -285,12 +298,20 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
                 if c.damping is not None:
                     part = part - state.omega * basis.derivative(_transposed(change @ c.damping, ue, basis.harmonics))
                 gx += np.multiply.outer(part, d)
+    for nodal in state.nodal:
+        found = nodal_second.parameter_form_gradient(nodal, u_force, state.x, state.values, name, _waves_of)
+        if found is not None:
+            gx += found
     zero = np.zeros_like(state.x)
     rates = {
         other: complex(left @ second_derivative(state, Direction(zero, {name: 1.0}), Direction(zero, {other: 1.0})))
         for other in names
     }
     return Gradient(gx, rates, 0.0)
+
+
+def _waves_of(coefficients: Array, left: bool) -> ComplexArray:
+    return _as_waves(coefficients, Kind.INTEGER, 1, left)[0][:, 0]
 
 
 def _transposed(spectrum: ComplexArray, left: Array, harmonics: int) -> Array:

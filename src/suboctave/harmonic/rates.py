@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from suboctave.harmonic.basis import Array
-from suboctave.model.element import Element
+from suboctave.model.element import BaseElement
 
 
-def coefficient_rates(element: Element, values: Mapping[str, float], rates: Mapping[str, float]) -> Array:
+def coefficient_rates(element: BaseElement, values: Mapping[str, float], rates: Mapping[str, float]) -> Array:
     """First change of an element's coefficients along parameter changes, shape (nc,)."""
     result = np.zeros(len(element.coefficients))
     for i, coefficient in enumerate(element.coefficients):
@@ -21,7 +21,7 @@ def coefficient_rates(element: Element, values: Mapping[str, float], rates: Mapp
 
 
 def coefficient_curvature(
-    element: Element, values: Mapping[str, float], a: Mapping[str, float], b: Mapping[str, float]
+    element: BaseElement, values: Mapping[str, float], a: Mapping[str, float], b: Mapping[str, float]
 ) -> Array:
     """Second change of an element's coefficients along two parameter changes, shape (nc,)."""
     result = np.zeros(len(element.coefficients))

@@ -21,6 +21,7 @@ import numpy as np
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
+from suboctave.harmonic.nodal_second import second as nodal_second
 from suboctave.harmonic.rates import coefficient_curvature, coefficient_rates
 from suboctave.harmonic.state import BalanceState, apply_blocks
 
@@ -71,6 +72,8 @@ def unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
         if rates_a.any() or rates_b.any():
             d = state.linear.retain(element.direction(state.balance.system.n))
             result += np.multiply.outer(_coefficient_second(state, local, a, b, rates_a, rates_b, d), d)
+    for nodal in state.nodal:
+        result += np.multiply.outer(nodal_second(nodal, state.x, state.values, a, b), nodal.own.out)
     for first, one in a.rates.items():
         for second, two in b.rates.items():
             if one * two != 0.0:

@@ -11,12 +11,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels
 from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.state import BalanceState, length
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
 _MOST_UNKNOWNS = 4000
@@ -54,7 +52,7 @@ class AdaptiveHarmonics:
 
 def motion_size(state: BalanceState) -> float:
     """Size of a motion with the DOF weights of `HarmonicBalance.scales`."""
-    return float(np.linalg.norm(state.x * state.balance.scales()[0]))
+    return length(state.x * state.balance.scales()[0])
 
 
 def truncation(state: BalanceState) -> float:

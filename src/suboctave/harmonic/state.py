@@ -15,10 +15,12 @@ import numpy as np
 
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import group_kernels, kernels
-from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real
+from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.group_force import Group, add_spectra, curvature_of
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
+from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
+from suboctave.harmonic.nodal_second import force_by
 from suboctave.harmonic.quadrature import uniform_nodes
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.lazy import lazy
@@ -75,6 +77,16 @@ class BalanceState:
             LocalMotion(element, motions[i], self.rate, coefficients[i], balance.top, balance.samples[i], kinds[i])
             for i, element in enumerate(balance.elements)
         ]
+
+    @lazy
+    def nodal(self) -> list[NodalForce]:
+        """The elements with nodes of their own, along the motion."""
+        balance = self.balance
+        if not balance.own:
+            return []
+        known = balance.coefficients(self.values)[:2]
+        amplitudes = to_complex(self.x)
+        return nodal_forces(balance.own, known, balance.samples, amplitudes, self.basis, self.omega, balance.top)
 
     @lazy
     def curvatures(self) -> list[Curvature]:
@@ -134,7 +146,16 @@ class BalanceState:
             *balance.directions,
             balance.scales()[1],
         )
-        return parts
+        return self._with_nodal(*parts) if self.nodal else parts
+
+    def _with_nodal(self, parts: Array, sizes: Array) -> tuple[Array, Array]:
+        """The same with the elements that have nodes of their own."""
+        for nodal in self.nodal:
+            force = spectrum_to_real(nodal.force[:, None], self.basis.harmonics)[:, 0]
+            parts[1:] += np.multiply.outer(force, nodal.own.out)
+        weight = self.balance.scales()[1]
+        sizes[0], sizes[2] = length(parts[2] * weight), length(parts[1] * weight)
+        return parts, sizes
 
     @property
     def force(self) -> Array:
@@ -168,6 +189,7 @@ class BalanceState:
         group_kernels.tangent_matrix(
             out, table[1], table[2], balance.moving, self.rate, mean, *balance.directions, balance.size
         )
+        add_tangent(self.nodal, out, mean, balance.size)
         return out
 
     @lazy
@@ -257,6 +279,10 @@ class BalanceState:
                     spectrum = (rates @ coefficient_force(local).force)[:, None]
                     direction = self.linear.retain(element.direction(self.balance.system.n))
                     parts.append((spectrum_to_real(spectrum, self.basis.harmonics)[:, 0], direction))
+        for nodal in self.nodal:
+            change = force_by(nodal, self.x, self.values, name)
+            if change is not None:
+                parts.append((change, nodal.own.out))
         if not parts:
             return None
         total = np.zeros_like(self.x)
@@ -280,6 +306,8 @@ class BalanceState:
         force = np.zeros((high + 1, size), dtype=complex)
         for group, spectrum, _, _ in self.spectra:
             force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
+        for nodal in self.nodal:
+            force += np.multiply.outer(2.0 * nodal.force[high + 1 : 2 * high + 2], nodal.own.out)
         frequency = basis.beyond * self.omega
         compliance = self.linear.compliance(frequency)
         if compliance is not None:

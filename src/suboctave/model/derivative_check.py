@@ -10,8 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
-from suboctave.model.element import Array, Element
-from suboctave.model.sampling import PiecewiseLinear, PolynomialSampling, SharpSampling
+from suboctave.model.coupled import CoupledElement
+from suboctave.model.element import Array, BaseElement, Element
+from suboctave.model.sampling import (
+    CornerSampling,
+    PiecewiseLinear,
+    PolynomialSampling,
+    SharpSampling,
+    SharpVelocitySampling,
+)
 
 __all__ = ["DerivativeReport", "check_derivatives"]
 
@@ -53,7 +60,7 @@ class DerivativeReport:
 
 
 def check_derivatives(
-    element: Element,
+    element: BaseElement,
     parameters: Mapping[str, float] | None = None,
     u: ArrayLike | None = None,
     v: ArrayLike | None = None,
@@ -63,9 +70,16 @@ def check_derivatives(
 
     `u`, `v` (N,): where to look (default: around the gaps or sharp points, on both sides of each). Those closer to
     a corner of a piecewise-linear law than the step are left out. `parameters` gives the element's expressions their
-    numbers. Errors are relative to the largest value that the derivative takes there; `rtol` bounds them.
+    numbers. Errors are relative to the largest value that the derivative takes there; `rtol` bounds them. Of a coupled
+    element, u and v are (m, N), one row per input.
     """
     c = element.coefficient_values(parameters or {})
+    if isinstance(element, CoupledElement):
+        from suboctave.model.derivative_check_coupled import check_coupled
+
+        errors, messages = check_coupled(element, c, u, v)
+        return DerivativeReport(repr(element), rtol, errors, messages)
+    assert isinstance(element, Element)
     points, widths = _features(element, c)
     reach = max([abs(p) for p in points] + [0.0]) or max(widths, default=1.0)
     at = np.asarray(u, dtype=float).ravel() if u is not None else _displacements(points, widths, reach)
@@ -73,7 +87,11 @@ def check_derivatives(
     if len(speed) != len(at) or not len(at) or not (np.all(np.isfinite(at)) and np.all(np.isfinite(speed))):
         raise InputError(f"u and v must be finite and of equal length, not {len(at)} and {len(speed)} entries")
     length = min([*widths, float(np.max(np.abs(at))) or 1.0])
-    if isinstance(element.sampling(c), PiecewiseLinear):
+    kind = element.sampling(c)
+    if isinstance(kind, CornerSampling):
+        speeds = list(kind.velocities)
+        speed, at = _away_from(speed, at, speeds, 4.0 * _STEP * max(map(abs, [*speeds, *speed])))
+    if isinstance(kind, PiecewiseLinear | CornerSampling):
         margin = 4.0 * _STEP * max(length, reach)
         at, speed = _away_from(at, speed, points, margin)
     return _Check(element, c, at, speed, length, reach, points, rtol).report()
@@ -84,6 +102,8 @@ def _features(element: Element, c: Array) -> tuple[list[float], list[float]]:
     sampling = element.sampling(c)
     if isinstance(sampling, SharpSampling):
         return list(sampling.points), list(sampling.widths)
+    if isinstance(sampling, CornerSampling):
+        return list(sampling.points), []
     if isinstance(sampling, PiecewiseLinear):
         return [float(c[piece.gap]) for piece in sampling.pieces], []
     return [], []
@@ -98,9 +118,9 @@ def _displacements(points: list[float], widths: list[float], reach: float) -> Ar
 
 
 def _away_from(u: Array, v: Array, points: list[float], margin: float) -> tuple[Array, Array]:
-    far = np.all([np.abs(u - point) > margin for point in points], axis=0)
+    far = np.all([np.abs(u - point) > margin for point in points], axis=0) if points else np.full(len(u), True)
     if not np.any(far):
-        raise InputError("every u given lies on a corner of the law; give some away from it")
+        raise InputError("every place given lies on a corner of the law; give some away from it")
     return u[far], v[far]
 
 
@@ -117,7 +137,11 @@ class _Check:
         rtol: float,
     ) -> None:
         self.element, self.c, self.u, self.v, self.rtol = element, c, u, v, rtol
-        self.steps = {"u": _STEP * length, "v": _STEP * (float(np.max(np.abs(v))) or 1.0)}
+        kind = element.sampling(c)
+        fast = float(np.max(np.abs(v))) or 1.0
+        if isinstance(kind, SharpVelocitySampling):
+            fast = min([fast, *kind.widths])
+        self.steps = {"u": _STEP * length, "v": _STEP * fast}
         self.coefficient_steps = []
         for value in c:
             own = abs(float(value)) or reach
@@ -133,15 +157,16 @@ class _Check:
         curvature = e.curvature(u, v, c)
         by_c = e.coefficient_tangent(u, v, c)
         f_cc = e.coefficient_curvature(u, v, c)
+        third = e.third(u, v, c)
         moving = e.depends_on_velocity
-        self._shapes(tangent, curvature, by_c, f_cc, moving)
+        self._shapes(tangent, curvature, third, by_c, f_cc, moving)
         if not self.messages:
-            self._states(tangent, curvature, moving)
+            self._states(tangent, curvature, third, moving)
             self._coefficients(by_c, f_cc, moving)
             self._pieces(tangent)
         return DerivativeReport(repr(e), self.rtol, self.errors, tuple(self.messages))
 
-    def _shapes(self, tangent: Any, curvature: Any, by_c: Any, f_cc: Any, moving: bool) -> None:
+    def _shapes(self, tangent: Any, curvature: Any, third: Any, by_c: Any, f_cc: Any, moving: bool) -> None:
         n, nc = len(self.u), len(self.c)
         expected = [
             ("f", tangent[0], (n,), True),
@@ -150,6 +175,10 @@ class _Check:
             ("f_uu", curvature[0], (n,), True),
             ("f_uv", curvature[1], (n,), moving),
             ("f_vv", curvature[2], (n,), moving),
+            ("f_uuu", third[0], (n,), True),
+            ("f_uuv", third[1], (n,), moving),
+            ("f_uvv", third[2], (n,), moving),
+            ("f_vvv", third[3], (n,), moving),
             ("f_c", by_c[0], (nc, n), True),
             ("f_uc", by_c[1], (nc, n), True),
             ("f_vc", by_c[2], (nc, n), moving),
@@ -164,14 +193,20 @@ class _Check:
             elif there and not np.all(np.isfinite(value)):
                 self.messages.append(f"{name} is not finite everywhere")
 
-    def _states(self, tangent: Any, curvature: Any, moving: bool) -> None:
-        def law(order: int, name: str) -> Callable[[float], Array]:
+    def _states(self, tangent: Any, curvature: Any, third: Any, moving: bool) -> None:
+        def law(order: int, name: str, laws: Any = None) -> Callable[[float], Array]:
             def shifted(step: float) -> Array:
                 u = self.u + (step if name == "u" else 0.0)
                 v = self.v + (step if name == "v" else 0.0)
-                return np.asarray(self.element.tangent(u, v, self.c)[order])
+                return np.asarray((laws or self.element.tangent)(u, v, self.c)[order])
 
             return shifted
+
+        bent = self.element.curvature
+        self._compare("f_uuu", third[0], law(0, "u", bent), self.steps["u"])
+        if moving:
+            for i, name in enumerate(("f_uuv", "f_uvv", "f_vvv")):
+                self._compare(name, third[i + 1], law(i, "v", bent), self.steps["v"])
 
         self._compare("f_u", tangent[1], law(0, "u"), self.steps["u"])
         self._compare("f_uu", curvature[0], law(1, "u"), self.steps["u"])

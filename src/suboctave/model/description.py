@@ -24,7 +24,7 @@ from suboctave.model.expression import Coefficient, coefficient
 from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import MatrixCoefficient
 from suboctave.model.recorded import Recorded, constructor_arguments, known_kinds, type_name
-from suboctave.model.system import System, _assemble, _read_parameters
+from suboctave.model.system import System, _assemble, _read_dof_names, _read_parameters
 
 __all__ = ["build", "build_part", "describe", "describe_part", "plain_value"]
 
@@ -42,7 +42,7 @@ def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
     """
     return {
         "name": system.name,
-        "dof_names": list(getattr(system, "dof_names", ())),
+        "dof_names": list(system.dof_names),
         **{what: _matrix(getattr(system, what), arrays) for what in _MATRICES},
         "elements": [describe_part(element, arrays) for element in system.elements],
         "loads": [describe_part(load, arrays) for load in system.loads],
@@ -78,13 +78,13 @@ def build(
             for family in ("element", "load")
         )
         parameters, name = description["parameters"], str(description["name"])
-        names = tuple(str(n) for n in description.get("dof_names", ()))
+        dof_names = _read_dof_names(description["dof_names"], mass.n)
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
     if not mass.n == damping.n == stiffness.n:
         raise InputError("this is not the description of a system: its matrices have different sizes")
-    more: Any = (names,) if names else ()
-    system = _assemble(mass, damping, stiffness, elements, loads, _read_parameters(parameters), name, *more)
+    read = _read_parameters(parameters)
+    system = _assemble(mass, damping, stiffness, elements, loads, read, name, dof_names)
     system._check_names()
     system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
     check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))

@@ -3,14 +3,15 @@
 An element acts on the relative displacement `u = d . x` and velocity `v = d . x'` with the force `d f(u, v; c)` on the
 left-hand side of the equation of motion. Its coefficients `c` are numbers or expressions in the system's parameters. A
 new element is a subclass that passes its coefficients to `Element.__init__` and provides the laws below as pure
-functions of arrays; `check_derivatives` compares them with finite differences.
+functions of arrays; `check_derivatives` compares them with finite differences. Forces that depend on several
+displacements, or on time, are in `coupled`.
 """
 
 from __future__ import annotations
 
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,7 +22,7 @@ from suboctave.model.expression import Coefficient, coefficient
 from suboctave.model.recorded import Recorded
 from suboctave.model.sampling import Sampling
 
-__all__ = ["Array", "Dof", "Element", "Place"]
+__all__ = ["Array", "BaseElement", "Dof", "Element", "Place"]
 
 Array: TypeAlias = NDArray[np.float64]
 Dof: TypeAlias = int | Sequence[int]
@@ -80,15 +81,18 @@ class Place:
         return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
 
 
-class Element(Recorded, ABC, family="element"):
-    """A nonlinear force along one direction. Subclasses are immutable by convention.
+class BaseElement(Recorded, ABC, family="element"):
+    """What all elements have in common: where they act, and their coefficients. Immutable by convention.
 
-    A subclass sets `coefficient_names` (on the class, or on the object before `Element.__init__`) and, if its force
-    depends on velocity, `depends_on_velocity = True`. Below, `u`, `v` are arrays (N,) and `c` is (nc,).
+    own_nodes
+        Whether it is integrated at instants of its own, chosen for it alone (`sampling` tells them), instead of
+        together with the others along the same direction.
     """
 
     coefficient_names: tuple[str, ...] = ()
     depends_on_velocity: bool = False
+    depends_on_time: bool = False
+    own_nodes: bool = False
 
     def __init__(
         self,
@@ -137,6 +141,22 @@ class Element(Recorded, ABC, family="element"):
     def sampling(self, c: Array) -> Sampling:
         """How smooth the law is at these coefficients."""
 
+    def __repr__(self) -> str:
+        shown = [str(self.place)]
+        shown += [f"{name}={c.text}" for name, c in zip(self.coefficient_names, self.coefficients, strict=True)]
+        return f"{type(self).__name__}({', '.join(shown + self._options())})"
+
+    def _options(self) -> list[str]:
+        return []
+
+
+class Element(BaseElement):
+    """A nonlinear force along one direction. Subclasses are immutable by convention.
+
+    A subclass sets `coefficient_names` (on the class, or on the object before `Element.__init__`) and, if its force
+    depends on velocity, `depends_on_velocity = True`. Below, `u`, `v` are arrays (N,) and `c` is (nc,).
+    """
+
     @abstractmethod
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array | None]:
         """`(f, f_u, f_v)`, (N,) each; `f_v` is None for a law without velocity."""
@@ -153,13 +173,24 @@ class Element(Recorded, ABC, family="element"):
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""
 
-    def __repr__(self) -> str:
-        shown = [str(self.place)]
-        shown += [f"{name}={c.text}" for name, c in zip(self.coefficient_names, self.coefficients, strict=True)]
-        return f"{type(self).__name__}({', '.join(shown + self._options())})"
+    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, Array | None, Array | None, Array | None]:
+        """`(f_uuu, f_uuv, f_uvv, f_vvv)`, (N,) each; the last three are None for a law without velocity.
 
-    def _options(self) -> list[str]:
-        return []
+        Unless a subclass knows better: differences of `curvature`, good for about eight digits of smooth laws.
+        """
+        moving = self.depends_on_velocity
+        f_uuu = _difference(lambda h: self.curvature(u + h, v, c)[0], u)
+        if not moving:
+            return f_uuu, None, None, None
+        by_v = _difference(lambda h: np.array(self.curvature(u, v + h, c)), v)
+        return f_uuu, by_v[0], by_v[1], by_v[2]
+
+
+def _difference(law: Callable[[float], Any], at: Array) -> Array:
+    """Central differences of fourth order; the step is a share of the size of the argument."""
+    h = 2e-3 * (float(np.max(np.abs(at), initial=0.0)) or 1.0)
+    result: Array = (8.0 * (law(h) - law(-h)) - (law(2.0 * h) - law(-2.0 * h))) / (12.0 * h)
+    return result
 
 
 def required(owner: str, **given: Any) -> None:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 
 from suboctave.errors import InputError
+from suboctave.model.excitations import RotatingUnbalance
+from suboctave.model.expression_element import Expression
 from suboctave.model.loads import HarmonicLoad
 from suboctave.model.springs import CubicSpring
 from suboctave.model.stops import ElasticStop
@@ -16,6 +18,8 @@ from suboctave.model.system import System
 
 __all__ = [
     "duffing",
+    "jeffcott_rotor",
+    "mathieu_duffing",
     "nltva",
     "nondimensional",
     "reference_oscillator",
@@ -127,6 +131,64 @@ def duffing(c: float = 0.05, k: float = 1.0, alpha: float = 1.0, F: float = 1.0,
         loads=[HarmonicLoad(dof=0, amplitude="F")],
         parameters={"m": m, "c": c, "k": k, "alpha": alpha, "F": F},
         name="Duffing oscillator",
+    )
+
+
+def mathieu_duffing(
+    c: float = 0.05, k: float = 1.0, eps: float = 0.2, gamma: float = 0.3, F: float = 0.0, m: float = 1.0
+) -> System:
+    """A Duffing oscillator of varying stiffness, `k (1 + eps cos(omega t))`.
+
+    `m x'' + c x' + k (1 + eps cos(omega t)) x + gamma x^3 = F cos(omega t)`. Without `F` it is at rest until that
+    loses its stability: by a period doubling around `omega = 2 sqrt(k/m)`, where `eps` exceeds about `2 c / sqrt(k m)`
+    (Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, section 5.2).
+    """
+    return System(
+        mass="m",
+        damping="c",
+        stiffness="k",
+        elements=[
+            CubicSpring(dof=0, coefficient="gamma"),
+            Expression(dof=0, expression="k*eps*cos(omega*t)*x"),
+        ],
+        loads=[HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"m": m, "c": c, "k": k, "eps": eps, "gamma": gamma, "F": F},
+        name="Mathieu-Duffing oscillator",
+    )
+
+
+def jeffcott_rotor(
+    m: float = 1.0,
+    c: float = 0.1,
+    k: float = 1.0,
+    me: float = 0.05,
+    kc: float = 20.0,
+    clearance: float | None = 0.2,
+) -> System:
+    """A Jeffcott rotor with an unbalance `me`, DOFs x and y; `omega` is the speed of its shaft.
+
+    `clearance`: radial distance to a frictionless stator ring of stiffness `kc`, which pushes the shaft back along its
+    radius beyond it (None: no stator): `F_r = kc max(r - clearance, 0)` with `r^2 = x^2 + y^2 + (1e-6 clearance)^2`,
+    which keeps r from zero at rest.
+    """
+    parameters = {"m": m, "c": c, "k": k, "me": me}
+    rubbing = []
+    if clearance is not None:
+        parameters |= {"kc": kc, "clearance": clearance}
+        radius = "sqrt(x**2 + y**2 + (1e-6*clearance)**2)"
+        rubbing = [
+            Expression(dof, f"kc*max({radius} - clearance, 0)*{name}/{radius}", inputs={"x": 0, "y": 1})
+            for dof, name in enumerate("xy")
+        ]
+    return System(
+        mass=[["m", 0.0], [0.0, "m"]],
+        damping=[["c", 0.0], [0.0, "c"]],
+        stiffness=[["k", 0.0], [0.0, "k"]],
+        elements=rubbing,
+        loads=[RotatingUnbalance(dof=0, mass_eccentricity="me", perpendicular=1)],
+        parameters=parameters,
+        name="Jeffcott rotor",
+        dof_names=("x", "y"),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,11 +14,14 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError
 from suboctave.model.element import Array, Dof, Place, required
 from suboctave.model.expression import ZERO, Coefficient, coefficient
+from suboctave.model.matrix import MatrixCoefficient
 from suboctave.model.recorded import Recorded
 
-__all__ = ["HarmonicLoad", "LoadComponent"]
+__all__ = ["HarmonicLoad", "Load", "LoadComponent", "Matrices"]
 
 Number = float | str | Coefficient
+#: mass, damping and stiffness of the structure that a load acts on
+Matrices = tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +34,46 @@ class LoadComponent:
     phase: Coefficient
 
 
-class HarmonicLoad(Recorded, family="load"):
+class Load(Recorded, ABC, family="load"):
+    """A periodic or constant force on the right-hand side. Subclasses are immutable by convention."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """How messages name this load."""
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
+        """Every expression that its user gave, with what it is."""
+
+    @abstractmethod
+    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+        """Its cosines in a structure of n degrees of freedom; constant parts are of harmonic 0.
+
+        `matrices`: those of the structure, for loads of inertia and of moving bases.
+        """
+
+    def check_elements(self, n: int, elements: Sequence[Any]) -> None:
+        """Refuse elements that the load cannot act beside."""
+
+    def _read(self, what: str, source: Any) -> Coefficient:
+        try:
+            return coefficient(source)
+        except InputError as error:
+            raise InputError(f"{self.label}, {what}: {error}") from None
+
+    def _read_harmonic(self, given: Any, least: int = 0) -> int:
+        try:
+            harmonic = operator.index(given)
+        except TypeError:
+            harmonic = -1
+        if harmonic < least or isinstance(given, bool):
+            raise InputError(f"{self.label}: harmonic must be an integer from {least} on, not {given!r}")
+        return harmonic
+
+
+class HarmonicLoad(Load):
     """A force `amplitude cos(harmonic omega t + phase)` on the right-hand side.
 
     It acts at `dof` (an index, or a pair `(i, j)` for `e_i - e_j`) or along the vector `direction`. `amplitude`,
@@ -68,21 +111,6 @@ class HarmonicLoad(Recorded, family="load"):
         """How messages name this load."""
         return f"HarmonicLoad({self.place})"
 
-    def _read(self, what: str, source: Any) -> Coefficient:
-        try:
-            return coefficient(source)
-        except InputError as error:
-            raise InputError(f"{self.label}, {what}: {error}") from None
-
-    def _read_harmonic(self, given: Any) -> int:
-        try:
-            harmonic = operator.index(given)
-        except TypeError:
-            harmonic = -1
-        if harmonic < 0 or isinstance(given, bool):
-            raise InputError(f"{self.label}: harmonic must be an integer from 0 on, not {given!r}")
-        return harmonic
-
     @property
     def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
         """Every expression of this load, with what it is."""
@@ -93,7 +121,7 @@ class HarmonicLoad(Recorded, family="load"):
         """The vector (n,) along which the load acts."""
         return self.place.direction(n)
 
-    def components(self, n: int) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
         """The cosines of this load, the static part last (harmonic 0)."""
         direction = self.direction(n)
         direction.setflags(write=False)

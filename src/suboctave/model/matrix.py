@@ -54,6 +54,11 @@ class MatrixCoefficient:
             result = result + c.value(values) * scipy.sparse.csr_array(pattern)
         return result
 
+    def products(self, vector: Array) -> list[tuple[Coefficient, Array]]:
+        """Its product with a vector (n,), as pairs of an expression and a vector that add up to it."""
+        parts = [(coefficient(1.0), self._base), *self._terms]
+        return [(c, np.asarray(pattern @ vector, dtype=float).ravel()) for c, pattern in parts]
+
     def derivative(self, name: str) -> MatrixCoefficient | None:
         """The derivative by a parameter; None if it is identically zero."""
         if name not in self._derivatives:

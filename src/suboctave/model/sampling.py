@@ -7,7 +7,16 @@ from typing import TypeAlias
 
 from suboctave.errors import InputError
 
-__all__ = ["AdaptiveSampling", "Piece", "PiecewiseLinear", "PolynomialSampling", "Sampling", "SharpSampling"]
+__all__ = [
+    "AdaptiveSampling",
+    "CornerSampling",
+    "Piece",
+    "PiecewiseLinear",
+    "PolynomialSampling",
+    "Sampling",
+    "SharpSampling",
+    "SharpVelocitySampling",
+]
 
 
 @dataclass(frozen=True)
@@ -77,4 +86,34 @@ class AdaptiveSampling:
     """Nothing is known: samples are added until force and tangent stop moving."""
 
 
-Sampling: TypeAlias = PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling
+@dataclass(frozen=True)
+class CornerSampling:
+    """A continuous force that is smooth but for corners at `u = points[i]` and at `v = velocities[i]`.
+
+    Only its derivatives may jump there. It is integrated between the instants at which a motion reaches these places,
+    with as many nodes as force and tangent need to settle. For elements with `own_nodes`; of a coupled element, the
+    places are those of its first input.
+    """
+
+    points: tuple[float, ...] = ()
+    velocities: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class SharpVelocitySampling:
+    """Analytic on the real axis, with complex singularities at `v = velocities[i] +- 1j * widths[i]` (length / time).
+
+    For elements with `own_nodes`: nodes are graded towards the instants at which the velocity passes there.
+    """
+
+    velocities: tuple[float, ...]
+    widths: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.widths) != len(self.velocities):
+            raise InputError("a sharp law has as many widths as velocities")
+
+
+Sampling: TypeAlias = (
+    PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling | CornerSampling | SharpVelocitySampling
+)

@@ -64,6 +64,14 @@ class PolynomialSpring(Element):
                 f_uu += factor * power * (power - 1) * _power(u, power - 2)
         return f_uu, None, None
 
+    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
+        """See `Element.third`."""
+        f_uuu = np.zeros_like(u)
+        for power, factor in zip(self.powers, c, strict=True):
+            if power > 2:
+                f_uuu += factor * power * (power - 1) * (power - 2) * _power(u, power - 3)
+        return f_uuu, None, None, None
+
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`."""
         f_c = np.array([_power(u, power) for power in self.powers])

@@ -123,6 +123,13 @@ class ElasticStop(Element):
             return np.zeros_like(u), None, None
         return self._sign * c[0] * _phi_yy(u - c[1], c[2]), None, None
 
+    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
+        """`f_uuu`; for the exact law its regular part, which is zero."""
+        if not self.regularised:
+            return np.zeros_like(u), None, None, None
+        y, s = u - c[1], c[2]
+        return -self._sign * c[0] * 2.0 * s**3 * y / (np.pi * (1.0 + (s * y) ** 2) ** 2), None, None, None
+
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`; for the exact law the regular parts."""
         if not self.regularised:

@@ -6,7 +6,7 @@ import keyword
 import math
 import numbers
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, suggest
-from suboctave.model.element import Array, Element
+from suboctave.model.coupled import CoupledElement
+from suboctave.model.element import Array, BaseElement
 from suboctave.model.expression import RESERVED, Coefficient
-from suboctave.model.loads import HarmonicLoad, LoadComponent
+from suboctave.model.loads import Load, LoadComponent
 from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
+from suboctave.model.sampling import CornerSampling, SharpVelocitySampling
 
 __all__ = ["System"]
 
@@ -29,8 +31,9 @@ class System:
     `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
     numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite
     at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the
-    left-hand side. `loads`: a sequence of `HarmonicLoad`, on the right-hand side. `parameters`: `{name: number}`, every
-    one of them used somewhere. Units are the user's own, if they are consistent; frequencies are circular.
+    left-hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad`
+    and other loads, on the right-hand side. `parameters`: `{name: number}`, every one of them used somewhere.
+    `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are circular.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -38,10 +41,11 @@ class System:
     mass: MatrixCoefficient
     damping: MatrixCoefficient
     stiffness: MatrixCoefficient
-    elements: tuple[Element, ...]
-    loads: tuple[HarmonicLoad, ...]
+    elements: tuple[BaseElement, ...]
+    loads: tuple[Load, ...]
     parameters: Mapping[str, float]
     name: str
+    dof_names: tuple[str, ...]
     n: int
     _components: tuple[LoadComponent, ...]
 
@@ -50,38 +54,65 @@ class System:
         mass: Any,
         damping: Any,
         stiffness: Any,
-        elements: Iterable[Element] = (),
-        loads: Iterable[HarmonicLoad] = (),
+        elements: Iterable[BaseElement] = (),
+        loads: Iterable[Load] = (),
         parameters: Mapping[str, float] | None = None,
         name: str = "",
+        dof_names: Iterable[str] = (),
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
         self._fill(
             read,
             matrix_coefficient(damping, read.n, "damping"),
             matrix_coefficient(stiffness, read.n, "stiffness"),
-            _several(elements, Element, "elements"),
-            _several(loads, HarmonicLoad, "loads"),
+            tuple(sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes)),
+            _several(loads, Load, "HarmonicLoad", "loads"),
             _read_parameters(parameters),
             str(name),
+            _read_dof_names(dof_names, read.n),
         )
         self._check_names()
         self._check_values(self.parameters)
+
+    @classmethod
+    def from_equations(
+        cls, equations: str | Sequence[str], parameters: Mapping[str, float] | None = None, name: str = ""
+    ) -> System:
+        """A system from equations of motion as text, such as `"x'' + 2*zeta*x' + x + a*x**3 = p*cos(omega*t)"`.
+
+        What has a second derivative is a degree of freedom, in the order of appearance; accelerations enter with
+        constant factors. Linear terms go to mass, damping and stiffness, `cos(k*omega*t + phase)` and `sin` (k an
+        integer) to loads, constants to static loads, all others to elements: `Expression`, or `CubicSpring`,
+        `PolynomialSpring`, `ElasticStop` where they are such. State times cosine is parametric excitation. Functions:
+        those of coefficients, `sign`, `heaviside`, and `max` and `min` of two arguments.
+
+        Raises `InputError` with the place in the text.
+        """
+        from suboctave.model.equations import parts_of
+
+        read = _read_parameters(parameters)
+        return cls(**parts_of(equations, read), parameters=read, name=name)
 
     def _fill(
         self,
         mass: MatrixCoefficient,
         damping: MatrixCoefficient,
         stiffness: MatrixCoefficient,
-        elements: tuple[Element, ...],
-        loads: tuple[HarmonicLoad, ...],
+        elements: tuple[BaseElement, ...],
+        loads: tuple[Load, ...],
         parameters: Mapping[str, float],
         name: str,
+        dof_names: tuple[str, ...],
     ) -> None:
         n = mass.n
         for element in elements:
             element.direction(n)
-        components = tuple(component for load in loads for component in load.components(n))
+            if isinstance(element, CoupledElement):
+                element.inputs(n)
+        for load in loads:
+            load.check_elements(n, elements)
+        matrices = (mass, damping, stiffness)
+        components = tuple(component for load in loads for component in load.components(n, matrices))
         fields = {
             "mass": mass,
             "damping": damping,
@@ -90,6 +121,7 @@ class System:
             "loads": loads,
             "parameters": MappingProxyType(dict(parameters)),
             "name": name,
+            "dof_names": dof_names,
             "n": n,
             "_components": components,
         }
@@ -104,7 +136,7 @@ class System:
             self.check_parameter(name)
             changed[name] = _number(name, value)
         parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        result = _assemble(*parts, {**self.parameters, **changed}, self.name)
+        result = _assemble(*parts, {**self.parameters, **changed}, self.name, self.dof_names)
         result._check_values(changed)
         return result
 
@@ -153,6 +185,11 @@ class System:
         first = changed is self.parameters
         for element in self.elements:
             element.check(self.parameters, first)
+            kind = element.sampling(element.coefficient_values(self.parameters))
+            if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
+                raise InputError(
+                    f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class"
+                )
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
             check_mass(mass)
@@ -201,10 +238,18 @@ class System:
         return force
 
     @property
+    def excited_by_elements(self) -> bool:
+        """Whether an element depends on time (parametric excitation)."""
+        return any(element.depends_on_time for element in self.elements)
+
+    @property
     def observed_dof(self) -> int:
         """The degree of freedom watched by default: where the first load acts most (a non-static one if any)."""
         for component in (*(c for c in self._components if c.harmonic > 0), *self._components):
             return int(np.argmax(np.abs(component.direction)))
+        for element in self.elements:  # without loads: what time acts on
+            if element.depends_on_time:
+                return int(np.argmax(np.abs(element.direction(self.n))))
         return 0
 
     # ------------------------------------------------------------------------------------------------------ object
@@ -216,7 +261,7 @@ class System:
 
     def __reduce__(self) -> tuple[Any, ...]:
         parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        return _assemble, (*parts, dict(self.parameters), self.name)
+        return _assemble, (*parts, dict(self.parameters), self.name, self.dof_names)
 
     def __repr__(self) -> str:
         title = f"System {self.name!r}" if self.name else "System"
@@ -234,28 +279,36 @@ def _assemble(
     mass: MatrixCoefficient,
     damping: MatrixCoefficient,
     stiffness: MatrixCoefficient,
-    elements: tuple[Element, ...],
-    loads: tuple[HarmonicLoad, ...],
+    elements: tuple[BaseElement, ...],
+    loads: tuple[Load, ...],
     parameters: Mapping[str, float],
     name: str,
+    dof_names: tuple[str, ...] = (),
 ) -> System:
     """A system from parts that a system has already accepted."""
     result = object.__new__(System)
-    result._fill(mass, damping, stiffness, elements, loads, parameters, name)
+    result._fill(mass, damping, stiffness, elements, loads, parameters, name, dof_names)
     return result
 
 
-def _several(items: Any, kind: type, what: str) -> tuple[Any, ...]:
+def _several(items: Any, kind: type, name: str, what: str) -> tuple[Any, ...]:
     if isinstance(items, kind):
         return (items,)
     try:
         listed = tuple(items)
     except TypeError:
-        raise InputError(f"{what} must be a sequence of {kind.__name__}, not {items!r}") from None
+        raise InputError(f"{what} must be a sequence of {name}, not {items!r}") from None
     for item in listed:
         if not isinstance(item, kind):
-            raise InputError(f"{what} must hold objects of the kind {kind.__name__}, not {item!r}")
+            raise InputError(f"{what} must hold objects of the kind {name}, not {item!r}")
     return listed
+
+
+def _read_dof_names(names: Iterable[str], n: int) -> tuple[str, ...]:
+    read = tuple(str(name) for name in names)
+    if len(set(read)) < len(read) or len(read) not in (0, n):
+        raise InputError(f"dof_names must be {n} different names, or none, not {read!r}")
+    return read
 
 
 def _read_parameters(parameters: Mapping[str, float] | None) -> dict[str, float]:

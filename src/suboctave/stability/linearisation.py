@@ -8,7 +8,6 @@ exceeds the law's width the new ones lie between the nodes; the linear form has 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,9 @@ from suboctave.harmonic.group_force import GroupLaw
 from suboctave.harmonic.quadrature import FEWEST, search_grid
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.sampling import AdaptiveSampling
-from suboctave.stability.panels import NODES, closed_changes, lay_out
+from suboctave.stability.channels import Channels
+from suboctave.stability.nodes import NODES
+from suboctave.stability.panels import closed_changes, lay_out
 
 #: a law that tells nothing of itself and needs this many samples per period is smooth over one radian
 _BLIND = 48.0
@@ -31,8 +32,9 @@ class Linearisation:
 
     Attributes
     ----------
-    directions
-        (G, size), in the unknown DOFs.
+    directions, acting
+        What every direction reads and where it acts, (G, size) each, in the unknown DOFs: the same but for elements
+        with nodes of their own (`channels`).
     stretch, path, law, base
         See `panels.lay_out`; `law` with the elements that are not known in closed form.
     moving
@@ -47,11 +49,14 @@ class Linearisation:
         balance = state.balance
         self.state = state
         _, kinds, laws = balance.coefficients(state.values)
-        self.directions = [group.direction for group in balance.groups]
-        self.moving = True in balance.moving
+        own = self._own = Channels(state, len(laws))
+        self.directions = [group.direction for group in balance.groups] + own.right
+        self.acting = self.directions[: len(laws)] + own.left
+        self.moving = True in balance.moving or any(nodal.own.moving for nodal in state.nodal)
+        laws = laws + own.laws
         self._laws = _gathered(laws)
-        degree, finest = max(0, self._laws.polynomial.shape[1] - 2), math.inf
-        self.blind = False
+        degree, finest = max(own.degree, self._laws.polynomial.shape[1] - 2), own.finest
+        self.blind = own.blind
         for law in laws:
             if law.sharp or len(law.smooth_steps):
                 degree = max(degree, 1)
@@ -61,12 +66,13 @@ class Linearisation:
                     self.blind = True
                     finest = min(finest, _BLIND / (balance.samples[i] or FEWEST))
         self.varying = degree > 0
-        motions = state.motions
+        motions = state.motions + own.motions
+        forces = np.concatenate((state.spectra_table[0], own.forces)) if own.forces else state.spectra_table[0]
         high = state.basis.harmonics
         grid = search_grid(high)
         self.stretch, self.path, self.law, self.base, self._events, self._start = lay_out(
             motions[0][None] if len(motions) == 1 else np.array(motions, dtype=complex).reshape(-1, high + 1),
-            state.spectra_table[0],
+            forces,
             state.rate,
             *self._laws,
             degree,
@@ -87,6 +93,8 @@ class Linearisation:
                     if f_v is not None:
                         self.law[g, 2] += f_v
                     self._asked.append((g, element, a, sharp, f_u, f_v))
+        own.locate(self._events, self._start, self._laws.counts[:, 0])
+        own.ask(self.path, self.law)
 
     def changed(self, change: Array) -> tuple[Array, Array]:
         """Along the motion changed by (G, 2, N): stiffness and damping (G, 2, N), kicks at the beginnings of panels
@@ -122,6 +130,7 @@ class Linearisation:
             law[g, 0] += f_u
             if f_v is not None:
                 law[g, 1] += f_v
+        self._own.changed(self.path, change, law, self.stretch)
         return law, kick
 
 

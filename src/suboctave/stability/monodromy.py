@@ -29,7 +29,8 @@ from scipy.linalg import lapack
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState
 from suboctave.stability.linearisation import Linearisation
-from suboctave.stability.panels import NODES
+from suboctave.stability.magnus import BETWEEN, STEPS
+from suboctave.stability.nodes import NODES
 from suboctave.stability.result import FloquetResult
 from suboctave.stability.several import (
     POWERS,
@@ -39,7 +40,7 @@ from suboctave.stability.several import (
     standing_several,
     weighted,
 )
-from suboctave.stability.single import BETWEEN, STEPS, corrected_single, standing_single
+from suboctave.stability.single import corrected_single, standing_single
 
 #: a correction larger than this share of the motion is cut down to it
 _LARGEST = 0.1
@@ -125,7 +126,11 @@ class _Several:
         self.along = along
         n, linear = len(mass), along.state.linear
         shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
-        self.about = (along.moving, along.varying, weighted(mass, damping, stiffness, shapes), POWERS, NODES)
+        matrices = weighted(mass, damping, stiffness, shapes)
+        if along.state.nodal:
+            acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float)
+            matrices = (*matrices[:2], weighted(mass, damping, stiffness, acting)[2], matrices[3])
+        self.about = (along.moving, along.varying, matrices, POWERS, NODES)
         self.scale = 1.0 / along.state.rate
         self.before: Array = np.zeros((0, 0))
 

@@ -16,12 +16,8 @@ import math
 import numpy as np
 from numba import njit
 
-from suboctave.harmonic.instants import _jet, crossings_of
-from suboctave.harmonic.kernels import motion
-from suboctave.harmonic.sharp_nodes import singular_instants
+from suboctave.stability.passages import depths, events_along
 
-#: nodes per panel, both ends among them: quadrature of order 12
-ORDER = 7
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
 #: period that it covers
 _NEAR, _FAR = 3.0, 4.5
@@ -31,116 +27,6 @@ _CLEAR = 0.25
 _TANGENT, _MOTION = 7.0, 5.5
 #: harmonics of less than this share of the largest do not count for the former
 _RELEVANT = 1e-3
-#: extrema that miss a gap by less than this share of the motion are kept in sight: the true motion may touch it
-_MISS = 1e-3
-
-
-def lobatto(order: int) -> np.ndarray:
-    """Nodes on [-1, 1]: the ends and the extrema of the Legendre polynomial of degree order - 1; shape (order,)."""
-    slope = np.polynomial.Legendre.basis(order - 1).deriv()
-    inner = np.sort(slope.roots().real)
-    for _ in range(3):
-        inner -= slope(inner) / slope.deriv()(inner)
-    return np.concatenate(([-1.0], inner, [1.0]))
-
-
-NODES = lobatto(ORDER)
-
-
-def moments(low: float, high: float, count: int) -> np.ndarray:
-    """Integrals over (low, high) of the polynomials that are one at a node and zero at the others, times powers of
-    `(s - middle) / (high - low)`, 0 .. count - 1; shape (count, ORDER).
-    """
-    points, weights = np.polynomial.legendre.leggauss(ORDER + 2)
-    s = 0.5 * (low + high) + 0.5 * (high - low) * points
-    others = [np.delete(NODES, j) for j in range(ORDER)]
-    basis = np.array([np.prod((s[:, None] - o) / (NODES[j] - o), axis=1) for j, o in enumerate(others)])
-    return np.array([basis @ (0.5 * (high - low) * weights * (0.5 * points) ** i) for i in range(count)])
-
-
-@njit(cache=True)
-def _note(row, tau, depth, slope, bend, miss, piece):
-    row[0] = tau
-    row[1] = depth
-    row[2] = slope
-    row[3] = bend
-    row[4] = miss
-    row[5] = piece
-
-
-@njit(cache=True)
-def _events(c, pieces, owner, where, where_owner, zr, zi, reach):
-    """What happens along the motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
-
-    A crossing of the gap of a piece has infinite depth; an extremum that falls short of it is kept with the distance
-    `miss`. A passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece.
-    """
-    n = zr.shape[0]
-    h = 2.0 * math.pi / n
-    found = np.empty((4 * n + 16, 6))
-    count = 0
-    last = -1
-    size = 0.0
-    values = np.empty((2, 0))
-    for q in range(pieces.shape[0]):
-        g = owner[q]
-        gap = pieces[q, 1]
-        if g != last:
-            values = motion(c[g], zr, zi)
-            size = values[0].max() - values[0].min()
-            last = g
-        at, _above = crossings_of(c[g], gap, values)
-        while count + at.shape[0] + n > found.shape[0]:
-            found = np.concatenate((found, np.empty_like(found)))
-        for i in range(at.shape[0]):
-            _x, d, s = _jet(c[g], math.cos(at[i]), math.sin(at[i]))
-            _note(found[count], at[i], np.inf, d, s, 0.0, q)
-            count += 1
-        for j in range(n):
-            follow = j + 1 if j + 1 < n else 0
-            f0 = values[0, j] - gap
-            f1 = values[0, follow] - gap
-            d0 = values[1, j]
-            d1 = values[1, follow]
-            # an extremum towards the gap that falls short of it
-            if d0 * d1 >= 0.0 or (f0 > 0.0) != (d0 < 0.0) or (f0 > 0.0) != (f1 > 0.0):
-                continue
-            if min(abs(f0), abs(f1)) > h * (abs(d0) + abs(d1)) + _MISS * size:
-                continue
-            tau = j * h + h * d0 / (d0 - d1)
-            x, d, s = _jet(c[g], math.cos(tau), math.sin(tau))
-            for _ in range(3):
-                if s != 0.0 and abs(d / s) < h:
-                    tau -= d / s
-                    x, d, s = _jet(c[g], math.cos(tau), math.sin(tau))
-            if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
-                _note(found[count], tau, np.inf, 0.0, s, x - gap, q)
-                count += 1
-    for g in range(c.shape[0]):
-        own = where_owner == g
-        if own.any():
-            passed = singular_instants(c[g], where[own, 0], where[own, 1], reach, zr, zi)
-            while count + passed.shape[1] > found.shape[0]:
-                found = np.concatenate((found, np.empty_like(found)))
-            for i in range(passed.shape[1]):
-                _note(found[count], passed[0, i], passed[1, i], 0.0, 0.0, 0.0, -1)
-                count += 1
-    return found[np.argsort(found[:count, 0])]
-
-
-@njit(cache=True)
-def _depths(events):
-    """Distance from every event to the nearest complex singularity, its own or another's."""
-    n = events.shape[0]
-    out = np.empty(n)
-    for i in range(n):
-        least = events[i, 1]
-        for j in range(n):
-            if events[j, 1] < np.inf:
-                apart = abs(events[i, 0] - events[j, 0])
-                least = min(least, math.hypot(min(apart, 2.0 * math.pi - apart), events[j, 1]))
-        out[i] = least
-    return out
 
 
 @njit(cache=True)
@@ -150,7 +36,7 @@ def _panels(events, longest):
     With depth 0, from and to are instants, else values of v.
     """
     n = events.shape[0]
-    depth = _depths(events)
+    depth = depths(events)
     start = np.zeros(n, dtype=np.int64)
     out = np.empty((64, 4))
     count = 0
@@ -329,7 +215,7 @@ def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degre
     where_owner = np.concatenate((step_owner, np.repeat(np.arange(groups), counts[:, 2])))
     longest = min(_longest(c, degree), finest)
     # singularities further away than this do not disturb a panel
-    events = _events(c, pieces, owner, where, where_owner, zr, zi, longest)
+    events = events_along(c, pieces, owner, where, where_owner, zr, zi, longest)
     panels, start = _panels(events, longest)
     count = panels.shape[0]
     m = nodes.shape[0]

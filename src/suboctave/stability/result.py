@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
@@ -57,24 +58,34 @@ class FloquetResult:
         return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
 
     @lazy
+    def _verdict(self) -> tuple[float, bool, int, float]:
+        verdict: tuple[float, bool, int, float] = _judged(self.multipliers, self.errors)
+        return verdict
+
+    @property
     def margin(self) -> float:
         """Largest modulus minus one: negative if stable."""
-        return float(np.abs(self.multipliers).max() - 1.0)
+        return self._verdict[0]
 
     @property
     def stable(self) -> bool:
         """True if all multipliers lie inside the unit circle."""
         return self.margin < 0.0
 
-    @lazy
+    @property
     def decided(self) -> bool:
         """True if no multiplier is closer to the unit circle than its error estimate."""
-        return bool(np.all(np.abs(np.abs(self.multipliers) - 1.0) > self.errors))
+        return self._verdict[1]
 
-    @lazy
+    @property
     def unstable(self) -> int:
         """Number of multipliers outside the unit circle."""
-        return int(np.count_nonzero(np.abs(self.multipliers) > 1.0))
+        return self._verdict[2]
+
+    @property
+    def clearance(self) -> float:
+        """Distance of the multiplier nearest to the unit circle from it."""
+        return self._verdict[3]
 
     @property
     def unstable_pairs(self) -> int:
@@ -92,6 +103,26 @@ class FloquetResult:
         more = f", ... ({count} in all)" if count > 4 else ""
         note = f". {self.note}" if self.note else ""
         return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
+
+
+@njit(cache=True)
+def _judged(multipliers, errors):
+    """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
+    the distance of the nearest one.
+    """
+    largest, nearest = -1.0, np.inf
+    decided = True
+    outside = 0
+    for i in range(multipliers.shape[0]):
+        beyond = abs(multipliers[i]) - 1.0
+        if not beyond <= largest:
+            largest = beyond
+        if beyond > 0.0:
+            outside += 1
+        if not abs(beyond) > errors[i]:
+            decided = False
+        nearest = min(nearest, abs(beyond))
+    return largest, decided, outside, nearest
 
 
 def written(mu: complex, error: float) -> str:

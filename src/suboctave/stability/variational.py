@@ -72,8 +72,9 @@ class Variational:
         inverse = np.linalg.inv(mass) * weight[:, None]
         damping, stiffness = inverse @ damping / weight, inverse @ stiffness / weight
         groups = state.balance.groups
-        left, right = np.zeros((2, len(groups), len(mass)))
-        k, c = np.zeros((2, len(groups), top + 1), dtype=complex)
+        count = len(groups) + sum(nodal.own.count for nodal in state.nodal)
+        left, right = np.zeros((2, count, len(mass)))
+        k, c = np.zeros((2, count, top + 1), dtype=complex)
         for i, group in enumerate(groups):
             direction = state.linear.expand(group.direction)
             left[i], right[i] = inverse @ direction, direction / weight
@@ -82,6 +83,19 @@ class Variational:
                 k[i] += force.stiffness
                 if force.damping.size:
                     c[i] += force.damping
+        i = len(groups)
+        for nodal in state.nodal:
+            reaching = nodal.reaching(top)
+            for j, direction in enumerate(nodal.own.ins):
+                left[i], right[i] = (
+                    inverse @ state.linear.expand(nodal.own.out),
+                    state.linear.expand(direction) / weight,
+                )
+                k[i] = reaching.stiffness(j)
+                if nodal.own.moving:
+                    c[i] = reaching.damping(j)
+                i += 1
+        for i in range(count):
             outer = np.outer(left[i], right[i])
             stiffness, damping = stiffness + k[i, 0].real * outer, damping + c[i, 0].real * outer
         k[:, 0] = c[:, 0] = 0.0

@@ -39,6 +39,7 @@ class SystemSection(BaseModel):
     elements: list[dict[str, Any]] = Field(default_factory=list)
     loads: list[dict[str, Any]] = Field(default_factory=list)
     parameters: dict[str, float] = Field(default_factory=dict)
+    dof_names: list[str] = Field(default_factory=list)
 
 
 def published() -> dict[str, Any]:
@@ -73,7 +74,9 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
         return None
     elements, loads = ([item for _, item in parts[family]] for family in ("element", "load"))
     try:
-        return System(*(matrices[what] for what in MATRICES), elements, loads, section.parameters, section.name)  # type: ignore[call-arg]
+        return System(
+            *(matrices[what] for what in MATRICES), elements, loads, section.parameters, section.name, section.dof_names
+        )  # type: ignore[call-arg]
     except InputError as error:
         mistakes.add(_place_of(str(error), section, parts), str(error))
         return None
@@ -124,21 +127,18 @@ def overridden(system: System, values: dict[str, float], place: Key, mistakes: M
 
 
 def _from_equations(section: SystemSection, parts: dict[str, Any], mistakes: Mistakes) -> System | None:
-    maker: Any = System.from_equations  # type: ignore[attr-defined]
-    takes = inspect.signature(maker).parameters
-    more: dict[str, Any] = {"name": section.name} if section.name and "name" in takes else {}
-    for family, items in parts.items():
-        if items and f"{family}s" not in takes:
-            mistakes.add(("system", f"{family}s"), "write these forces into the equations")
-            return None
-        if items:
-            more[f"{family}s"] = [item for _, item in items]
+    unwanted = [f"{family}s" for family, items in parts.items() if items]
+    for what in unwanted:
+        mistakes.add(("system", what), "write these forces into the equations")
+    if section.dof_names:
+        mistakes.add(("system", "dof_names"), "the equations name their degrees of freedom: leave it out")
+    if unwanted or section.dof_names:
+        return None
     try:
-        system: System = maker(section.equations, parameters=section.parameters, **more)
+        return System.from_equations(section.equations or (), section.parameters, section.name)
     except InputError as error:
         mistakes.add(_place_of(str(error), section, parts), str(error))
         return None
-    return system
 
 
 def _matrices(section: SystemSection, folder: Path, mistakes: Mistakes) -> dict[str, Any]:

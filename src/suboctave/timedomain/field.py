@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.model import System
-from suboctave.model.sampling import PiecewiseLinear, SharpSampling
+from suboctave.model.coupled import CoupledElement
+from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpSampling
 
 __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
@@ -118,6 +119,7 @@ class Field:
         self.inverse_mass = np.linalg.inv(self.mass)
         self.loads = _loads(system, self.values, self.omega)
         self.smooth: list[tuple[Any, Array, Array]] = []
+        self.coupled: list[tuple[CoupledElement, Array]] = []
         self.switches: list[Switch] = []
         for index, element in enumerate(system.elements):
             self._sort_in(index, element)
@@ -127,13 +129,19 @@ class Field:
         direction = np.asarray(element.direction(self.n), dtype=float)
         c = np.asarray(element.coefficient_values(self.values), dtype=float)
         sampling = element.sampling(c)
+        if isinstance(element, CoupledElement):
+            self.coupled.append((element, c))
+            if isinstance(sampling, CornerSampling):
+                first = element.inputs(self.n)[0]
+                self.switches += [Switch(index, first, float(point), 1, None) for point in sampling.points]
+            return
         if isinstance(sampling, PiecewiseLinear):
             for piece in sampling.pieces:
                 switch = Switch(index, direction, float(c[piece.gap]), int(piece.side), float(c[piece.stiffness]))
                 self.switches.append(switch)
             return
         self.smooth.append((element, direction, c))
-        if isinstance(sampling, SharpSampling):
+        if isinstance(sampling, SharpSampling | CornerSampling):
             self.switches += [Switch(index, direction, float(point), 1, None) for point in sampling.points]
 
     # ---------------------------------------------------------------------------------------------- scales
@@ -155,6 +163,15 @@ class Field:
             [np.hstack([directions * self.lengths, zero]), np.hstack([zero, directions * self.lengths * reference])]
         )
         self._acts = np.hstack([zero, -directions @ velocity_per_force.T])
+        self._coupled = []
+        for element, c in self.coupled:
+            inputs = element.inputs(n)
+            zero = np.zeros_like(inputs)
+            read = np.hstack([inputs * self.lengths, zero])
+            if element.depends_on_velocity:
+                read = np.vstack([read, np.hstack([zero, inputs * self.lengths * reference])])
+            act = np.concatenate([np.zeros(n), -velocity_per_force @ element.direction(n)])
+            self._coupled.append((element.tangent, c, np.ascontiguousarray(read.T), act))
 
         along = np.array([s.side * s.direction for s in self.switches]).reshape(-1, n)
         gap = np.array([s.side * s.gap for s in self.switches])
@@ -192,6 +209,7 @@ class Field:
         loads, amplitude, push = self.loads, self.loads.amplitude, self._push
         harmonic, phase = loads.harmonic, loads.phase
         relative = self.reference / self.omega
+        coupled = self._coupled
 
         def rate(tau: float, y: Array) -> Array:
             rows = y.reshape(-1, m)
@@ -210,6 +228,12 @@ class Field:
                         weight[:, i] += uv[:, count + i] * f_v
                     weight[0, i] = f[0]
                 out += weight @ acts
+            for law, c, read, act in coupled:
+                q = rows @ read
+                f, f_q = law(q[0][:, None], np.array([tau]), c)
+                force = q @ f_q[:, 0]
+                force[0] = f[0]
+                out += np.multiply.outer(force, act)
             if slope:
                 # F_tau = F / omega, so d F_tau / d(omega/W) = -(W/omega) F_tau + W (1/omega) dF/d omega
                 change = loads.amplitude_slope * cosine - amplitude * loads.phase_slope * np.sin(angle)

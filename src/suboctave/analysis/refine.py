@@ -1,0 +1,189 @@
+"""From what a step brackets to a bifurcation: solved, with as many harmonics as it needs, and labelled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
+from suboctave.bifurcation import Bifurcation, Sample
+from suboctave.bifurcation.finder import Located
+from suboctave.bifurcation.layer import (
+    behind_grazing,
+    grazing_beside,
+    layer_of,
+    solve_or_behind,
+    unresolved,
+)
+from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.continuation import CurvePoint
+from suboctave.continuation.linear import length
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.selection import choose_harmonics, next_harmonics, truncation
+from suboctave.harmonic.state import BalanceState
+
+#: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
+_CRITICAL = 1e-3
+
+
+def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> Bifurcation:
+    """The bifurcation located between two neighbours: solved again with the harmonics that events ask for, labelled.
+
+    What could only be bracketed, or was not found again, is noted in `warnings`.
+    """
+    arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
+    curve = b.point.curve
+    assert isinstance(curve, ResponseCurve)
+    solution = located.solution
+    if solution is None:
+        guess = guess_at(located.sample.point.u, located.sample.point, _kappa(located))
+        solution = behind_grazing(located.kind, guess) or _with_more_harmonics(located, a, b)
+    if solution is None:
+        orbit = orbit_of(located.sample)
+        beside = grazing_beside(guess)
+        # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
+        width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
+        warnings.append(
+            f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
+            f"to +- {width:.1e}: "
+            + (f"{beside.label} grazes there" if beside else "too few harmonics are kept, or a law is rough there")
+        )
+        return Bifurcation(
+            located.kind.name,
+            orbit,
+            located.sample.floquet,
+            orbit.residual,
+            orbit.amplitude(observe),
+            curve.name,
+            uncertainty=width,
+            arclength=arclength,
+            contact=beside,
+        )
+    solution, coarser = _refined(located, solution, curve, warnings)
+    guess = _guess_from(solution, curve)
+    state = solution.state
+    layer = layer_of(located.kind, solution, guess)
+    orbit = as_orbit(state, solution.residual, truncation(state), curve)
+    return Bifurcation(
+        located.kind.name,
+        orbit,
+        solution.floquet,
+        solution.residual,
+        orbit.amplitude(observe),
+        curve.name,
+        solution.vectors,
+        solution.kappa,
+        0.0 if layer is None else unresolved(located.kind, guess, layer, coarser),
+        arclength=arclength,
+        contact=layer or located.kind.contact(solution, curve.name),
+    )
+
+
+def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | None:
+    """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
+    the way with fewer.
+    """
+    sample = located.sample
+    curve = sample.point.curve
+    assert isinstance(curve, ResponseCurve)
+    state, size = sample.state, b.point.arclength - a.point.arclength
+    while curve.adaptive is not None:
+        basis = next_harmonics(state, curve.adaptive)
+        if basis.harmonics <= state.basis.harmonics:
+            break
+        x = state.basis.resized(state.x, basis)
+        balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+        state = balance.at(x, state.omega, state.values)
+        try:
+            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, located.kind.kappa(sample))
+            found = located.kind.solve(guess)
+        except ConvergenceError:
+            continue
+        wide = curve.with_balance(balance)
+        there = wide.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
+        away = sample.point.weights * (sample.point.curve.transfer(there, wide) - sample.point.u)
+        if located.kind.genuine(found, guess) and length(away) <= size:
+            return found
+    return None
+
+
+def _refined(
+    located: Located, solution: Singular, curve: ResponseCurve, warnings: list[str]
+) -> tuple[Singular, tuple[int, float] | None]:
+    """Solved again with the harmonics that events ask for; with how many it was found before that, and where."""
+    adaptive = curve.adaptive
+    coarser = None
+    if adaptive is None:
+        return solution, coarser
+    for _ in range(8):
+        state = solution.state
+        basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
+        if basis.harmonics <= state.basis.harmonics:
+            # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
+            critical = located.kind.critical(solution)
+            if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
+                break
+            basis = next_harmonics(state, adaptive)
+        if basis.harmonics <= state.basis.harmonics:
+            break
+        x = state.completed.basis.resized(state.completed.x, basis)
+        # more harmonics need more samples of a law that tells nothing of itself
+        balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+        guess = replace(_guess_from(solution, curve), balance=balance, x=x)
+        try:
+            better = solve_or_behind(located.kind, guess)
+        except ConvergenceError as failure:
+            warnings.append(
+                f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
+                f"harmonics; with {basis.harmonics} it was not found again ({failure})"
+            )
+            break
+        moved = abs(better.state.omega - state.omega) / state.omega
+        if moved > 0.05:
+            warnings.append(
+                f"{located.kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
+                f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
+            )
+            break
+        coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
+        solution = better
+    return solution, coarser
+
+
+def orbit_of(sample: Sample) -> PeriodicOrbit:
+    """A point of a response curve as a periodic motion."""
+    evaluation = sample.point.evaluation
+    assert isinstance(evaluation, ResponseEvaluation)
+    curve = sample.point.curve
+    assert isinstance(curve, ResponseCurve)
+    return as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
+
+
+def as_orbit(state: BalanceState, residual: float, neglected: float, curve: ResponseCurve) -> PeriodicOrbit:
+    """A solved state as a periodic motion."""
+    values = dict(state.values)
+    return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, residual, neglected, curve.adaptive)
+
+
+def guess_at(u: Array, point: CurvePoint, kappa: float) -> Guess:
+    """Where the system of a bifurcation begins: a point of a response curve."""
+    curve = point.curve
+    assert isinstance(curve, ResponseCurve)
+    x, omega, values = curve.split(u)
+    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
+
+
+def _guess_from(solution: Singular, curve: ResponseCurve) -> Guess:
+    state = solution.state
+    at = (state.balance, state.x, state.omega, state.values)
+    return Guess(*at, curve.name, curve.span, solution.kappa, solution.vectors)
+
+
+def _kappa(located: Located) -> float:
+    try:
+        return located.kind.kappa(located.sample)
+    except ConvergenceError:
+        return 0.0

@@ -1,0 +1,200 @@
+"""Forces given as Python functions: `Callable(0, lambda x, v, k: k * np.sinh(x), {"k": "k0"})`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable as Function
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError
+from suboctave.model.element import Array, Dof, Element, required
+from suboctave.model.expression import Coefficient
+from suboctave.model.sampling import AdaptiveSampling
+
+__all__ = ["Callable"]
+
+Number = float | str | Coefficient
+#: step of complex differences; step of real ones of fourth order, as a share of the size of the argument
+_COMPLEX, _REAL = 1e-30, 2e-3
+_CHECKED, _AGREE = 9, 1e-6
+
+
+class Callable(Element):
+    """A force given as a Python function `f(x, v, *coefficients)` of arrays (N,), at `dof` or along `direction`.
+
+    `coefficients` are handed over after displacement and velocity, in their order: `{name: number or expression}`.
+    `derivatives` may give `(f_x, f_v)` as a function of the same arguments. Otherwise they are taken by complex steps,
+    exact to rounding, if the function is found to bear them, else by differences of fourth order (`accuracy` tells,
+    relative to the force's own scale: 1e-15 or about 1e-10). Second derivatives are differences of the first, good
+    for about nine (six) digits: enough for Newton's method at bifurcations, not for normal forms of high order.
+
+    The function must be smooth or at least continuous, depend on its arguments alone, and return real arrays of the
+    shape of x. It is called often; a law that can be written as text is faster as `Expression`.
+    """
+
+    depends_on_velocity = True
+
+    def __init__(
+        self,
+        dof: Dof | None = None,
+        function: Function[..., Any] | None = None,
+        coefficients: Mapping[str, Number] | None = None,
+        derivatives: Function[..., tuple[Any, Any]] | None = None,
+        *,
+        direction: ArrayLike | None = None,
+    ) -> None:
+        required("Callable", function=function)
+        for what, given in (("function", function), ("derivatives", derivatives)):
+            if given is not None and not callable(given):
+                raise InputError(f"Callable: {what} must be a function of arrays, not {given!r}")
+        named: Sequence[str] = tuple(coefficients or {})
+        self.coefficient_names = tuple(named)
+        super().__init__(dof, list((coefficients or {}).values()), direction=direction)
+        assert function is not None
+        self.function, self.derivatives = function, derivatives
+        self._complex = False
+        self._complex = self._bears_complex()
+
+    @property
+    def label(self) -> str:
+        """How messages name this element."""
+        return f"Callable({self.place}, {getattr(self.function, '__name__', 'function')})"
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy of the first derivatives."""
+        return 1e-15 if self._complex or self.derivatives is not None else 1e-10
+
+    def check(self, values: Mapping[str, float], first: bool) -> None:
+        """Refuse a function that fails, or does not return finite numbers, or derivatives that are not its own."""
+        if not first:
+            return
+        u, v = self._draws()
+        c = self.coefficient_values(values)
+        f = self._value(u, v, c)
+        if not np.all(np.isfinite(f)):
+            raise InputError(f"{self.label}: the force is not finite for displacements and velocities between -1 and 1")
+        if self.derivatives is not None:
+            given = self._given(u, v, c)
+            self.derivatives, kept = None, self.derivatives
+            own = self._slopes(u, v, c)
+            self.derivatives = kept
+            for name, one, other in zip("xv", given, own, strict=True):
+                size = max(float(np.abs(f).max()), float(np.abs(other).max()))
+                if float(np.abs(one - other).max()) > 1e-5 * size:
+                    raise InputError(f"{self.label}: f_{name} from derivatives= is not the derivative of the force")
+
+    def _draws(self) -> tuple[Array, Array]:
+        angles = np.arange(1, _CHECKED + 1)
+        return np.sin(1.3 * angles), np.cos(2.1 * angles)
+
+    def _bears_complex(self) -> bool:
+        """Whether complex arguments give what differences give, and the same real part."""
+        u, v = self._draws()
+        c = np.where(np.isnan(self._constant), 0.7, self._constant)
+        try:
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
+                real = np.asarray(self.function(u, v, *c))
+                for arguments in ((u + 1j * _COMPLEX, v), (u, v + 1j * _COMPLEX)):
+                    got = np.asarray(self.function(*arguments, *c))
+                    if got.shape != u.shape or not np.allclose(got.real, real, rtol=1e-12, atol=0.0, equal_nan=True):
+                        return False
+                self._complex = True
+                exact = self._slopes(u, v, c)
+                self._complex = False
+                rough = self._slopes(u, v, c)
+        except Exception:  # the user's function may raise anything on complex numbers
+            return False
+        size = float(np.nanmax(np.abs(real), initial=0.0)) + max(
+            float(np.nanmax(np.abs(r), initial=0.0)) for r in rough
+        )
+        # a function that drops imaginary parts has slopes of zero; corners between the points may disagree elsewhere
+        return all(float(np.nanmedian(np.abs(a - b))) <= _AGREE * size for a, b in zip(exact, rough, strict=True))
+
+    def _value(self, u: Array, v: Array, c: Array) -> Array:
+        try:
+            f = np.asarray(self.function(u, v, *c))
+        except Exception as error:
+            raise InputError(f"{self.label}: the function failed with {type(error).__name__}: {error}") from error
+        if np.iscomplexobj(f) or f.shape != u.shape:
+            if f.shape == () and not np.iscomplexobj(f):
+                return np.full(u.shape, float(f))
+            raise InputError(
+                f"{self.label}: the function must return real arrays of shape {u.shape}, not {f.dtype} {f.shape}"
+            )
+        return f.astype(float)
+
+    def _given(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
+        assert self.derivatives is not None
+        f_u, f_v = self.derivatives(u, v, *c)
+        return np.broadcast_to(np.asarray(f_u, float), u.shape), np.broadcast_to(np.asarray(f_v, float), u.shape)
+
+    def _slopes(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
+        """`(f_u, f_v)`."""
+        if self.derivatives is not None:
+            return self._given(u, v, c)
+        if self._complex:
+            h = _COMPLEX
+            return (
+                np.imag(self.function(u + 1j * h, v, *c)) / h * np.ones_like(u),
+                np.imag(self.function(u, v + 1j * h, *c)) / h * np.ones_like(u),
+            )
+        return (
+            _difference(lambda h: self._value(u + h, v, c), u),
+            _difference(lambda h: self._value(u, v + h, c), v),
+        )
+
+    def sampling(self, c: Array) -> AdaptiveSampling:
+        """Nothing is known of a function."""
+        return AdaptiveSampling()
+
+    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `Element.tangent`."""
+        return (self._value(u, v, c), *self._slopes(u, v, c))
+
+    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `Element.curvature`; by differences."""
+        f_uu = _difference(lambda h: self._slopes(u + h, v, c)[0], u)
+        f_uv = _difference(lambda h: self._slopes(u, v + h, c)[0], v)
+        f_vv = _difference(lambda h: self._slopes(u, v + h, c)[1], v)
+        return f_uu, f_uv, f_vv
+
+    def _shifted(self, c: Array, i: int, h: float) -> Array:
+        moved = c.copy()
+        moved[i] += h
+        return moved
+
+    def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `Element.coefficient_tangent`; by differences."""
+        out = np.zeros((3, len(c), len(u)))
+        for i, value in enumerate(c):
+
+            def law(h: float, i: int = i) -> Array:
+                moved = self._shifted(c, i, h)
+                return np.array([self._value(u, v, moved), *self._slopes(u, v, moved)])
+
+            out[:, i] = _difference(law, value)
+        return out[0], out[1], out[2]
+
+    def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
+        """See `Element.coefficient_curvature`; by differences."""
+        out = np.zeros((len(c), len(c), len(u)))
+        for i, value in enumerate(c):
+
+            def law(h: float, i: int = i) -> Array:
+                return self.coefficient_tangent(u, v, self._shifted(c, i, h))[0]
+
+            out[i] = _difference(law, value)
+        return 0.5 * (out + out.transpose(1, 0, 2))
+
+
+def _difference(law: Function[[float], Any], at: Any) -> Array:
+    """Central differences of fourth order; the step is a share of the size of the argument."""
+    h = _REAL * (float(np.max(np.abs(at), initial=0.0)) or 1.0)
+    result: Array = (8.0 * (law(h) - law(-h)) - (law(2.0 * h) - law(-2.0 * h))) / (12.0 * h)
+    return result
