@@ -25,6 +25,10 @@ ODD = [
     '"9**9**9**9"', '"c**c**c"', '"(" * 9', "1979-05-27", '"\\u0000"', "\ud7ff", "a.b.c", "=",
     '"x**1000**1000"', '"__import__(\'os\')"', "harmonics = 10000000", "dof = 999999999", "harmonic = 1000000000",
     'type = "PolynomialSpring"', "coefficients = { 1000000 = 1.0 }", "coefficients = [1.0, 2.0]", 'start = "response"',
+    "{ mapping = [1] }", '{ array = [1], dtype = "V99999999", shape = [9999999999] }', "{ sparse = { shape = 1 } }",
+    '{ float = "nan" }',
+    '{ callable = "os:getcwd" }', '{ stored = "a" }', '{ expression = "c" }', '{ type = "Gravity" }',
+    'equations = ["x\'\' + x**9**9 = cos(omega*t)"]', 'type = "Expression"', 'expression = "x**999999999"',
 ]  # fmt: skip
 QUICK = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 SOON = 5.0  # seconds that no answer may take
@@ -135,6 +139,17 @@ def evaluated(text):
     assert said.strip()
 
 
+def stated(text):
+    """An equation of motion with a random force in it."""
+    with soon():
+        try:
+            so.System.from_equations([f"x'' + 0.1*x' + x + {text} = cos(omega*t)"], {"c": 0.3, "alpha": 0.5})
+            said = "a system"
+        except so.InputError as refusal:
+            said = str(refusal)
+    assert said.strip()
+
+
 def the_tests(profile):
     @profile
     @given(text=changed())
@@ -151,10 +166,20 @@ def the_tests(profile):
     def expression(text):
         evaluated(text)
 
-    return study, study_values, expression
+    @profile
+    @given(text=st.one_of(expressions, st.text(max_size=30)))
+    def equation(text):
+        stated(text)
+
+    return study, study_values, expression, equation
 
 
-test_a_study_file_at_random, test_values_at_random, test_an_expression_at_random = the_tests(QUICK)
+(
+    test_a_study_file_at_random,
+    test_values_at_random,
+    test_an_expression_at_random,
+    test_an_equation_at_random,
+) = the_tests(QUICK)
 
 
 @pytest.mark.slow
@@ -164,9 +189,10 @@ def test_five_minutes_at_random(tmp_path_factory):
     rounds = 0
     while time.monotonic() < end:
         profile = settings(max_examples=300, deadline=None, database=None, suppress_health_check=list(HealthCheck))
-        study, study_values, expression = the_tests(profile)
+        study, study_values, expression, equation = the_tests(profile)
         study(tmp_path_factory)
         study_values(tmp_path_factory)
         expression()
+        equation()
         rounds += 1
     assert rounds > 0

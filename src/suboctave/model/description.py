@@ -31,6 +31,9 @@ __all__ = ["build", "build_part", "describe", "describe_part", "plain_value"]
 Arrays = MutableMapping[str, np.ndarray]
 #: entries from which on an array is kept outside the description, where there is an outside
 _LARGE = 64
+#: keys that say what a mapping stands for
+_MARKS = frozenset({"float", "expression", "array", "stored", "sparse", "mapping", "callable", "type"})
+_DTYPES = ("|b1", *(f"{order}{kind}{size}" for order in "<>|" for kind in "iuf" for size in (1, 2, 4, 8)))
 _MATRICES = ("mass", "damping", "stiffness")
 _NO_CODE = "it names Python code, which is used only if you allow it (allow_code=True, or --allow-code)"
 
@@ -79,7 +82,9 @@ def build(
         )
         parameters, name = description["parameters"], str(description["name"])
         dof_names = _read_dof_names(description["dof_names"], mass.n)
-    except (KeyError, TypeError, AttributeError) as error:
+    except InputError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
     if not mass.n == damping.n == stiffness.n:
         raise InputError("this is not the description of a system: its matrices have different sizes")
@@ -108,12 +113,11 @@ def build_part(
     for name in given:
         if name not in known:
             raise InputError(f"{kind.__name__} has no argument {name!r}{suggest(str(name), known)}")
-    values = {name: from_plain(value, arrays or {}, allow_code) for name, value in given.items()}
     try:
-        return kind(**values)
-    except (TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
+        return kind(**{name: from_plain(value, arrays or {}, allow_code) for name, value in given.items()})
+    except InputError:
+        raise
+    except (TypeError, ValueError, ArithmeticError, RecursionError) as error:
         raise InputError(f"{kind.__name__}: {error}") from None
 
 
@@ -162,7 +166,8 @@ def plain_value(value: Any, arrays: Arrays | None = None) -> Any:
     if isinstance(value, Mapping):
         if not all(isinstance(name, str | int) for name in value):
             raise InputError(f"cannot be written down: the keys of {value!r} are neither texts nor whole numbers")
-        return {str(name): plain_value(item, arrays) for name, item in value.items()}
+        pairs = {str(name): plain_value(item, arrays) for name, item in value.items()}
+        return {"mapping": [list(pair) for pair in pairs.items()]} if pairs.keys() & _MARKS else pairs
     if isinstance(value, Recorded):
         return describe_part(value, arrays)
     if callable(value):
@@ -177,14 +182,16 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
     if not isinstance(value, Mapping):
         return value
     match dict(value):
-        case {"float": str() as text}:
+        case {"float": "inf" | "-inf" | "nan" as text}:
             return float(text)
-        case {"expression": text}:
+        case {"expression": str()}:
             return _expression(value)
-        case {"array": _} | {"stored": _}:
+        case {"array": _, "dtype": _, "shape": _} | {"stored": str()}:
             return _read_array(value, arrays)
-        case {"sparse": _}:
+        case {"sparse": Mapping()}:
             return _read_sparse(value, arrays)
+        case {"mapping": list() as pairs}:
+            return {name: from_plain(item, arrays, allow_code) for name, item in pairs}
         case {"callable": str() as place}:
             return _callable(place, allow_code)
         case {"type": str() as name}:
@@ -266,8 +273,10 @@ def _read_array(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> n
             raise InputError(f"the array {value['stored']!r} that the description refers to is missing")
         return np.array(arrays[value["stored"]])
     try:
-        return np.array(value["array"], dtype=np.dtype(value["dtype"])).reshape(value["shape"])
-    except (KeyError, TypeError, ValueError) as error:
+        if value["dtype"] not in _DTYPES:
+            raise ValueError(f"no array of {value['dtype']!r}")
+        return np.array(value["array"], dtype=value["dtype"]).reshape(value["shape"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"this is not an array: {error}") from None
 
 
@@ -284,7 +293,7 @@ def _read_sparse(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> 
     try:
         parts = tuple(_read_array(inside[name], arrays) for name in ("data", "indices", "indptr"))
         return scipy.sparse.csr_array(parts, shape=tuple(inside["shape"]))
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"this is not a sparse matrix: {error}") from None
