@@ -80,6 +80,24 @@ def changed(draw):
     return text
 
 
+leaves = st.one_of(
+    st.sampled_from(["c", "alpha", "omega", "pi", "t", "x", "9", "1e308", "0", "-1", "99999999999", "sin", "''"]),
+    st.floats(allow_nan=True).map(repr),
+)
+inner: st.SearchStrategy[str] = st.deferred(lambda: expressions)
+expressions = st.one_of(
+    leaves,
+    st.tuples(inner, st.sampled_from(["+", "-", "*", "/", "**", "//", "%", "^", "@", ",", "."]), inner).map(" ".join),
+    inner.map(lambda e: f"({e})"),
+    st.tuples(st.sampled_from(["sin", "exp", "log", "sqrt", "abs", "eval", "c", "tan", "max"]), inner).map(
+        lambda pair: f"{pair[0]}({pair[1]})"
+    ),
+    inner.map(lambda e: f"-{e}"),
+    inner.map(lambda e: f"lambda: {e}"),
+    inner.map(lambda e: f"[{e}][0]"),
+)
+
+
 @st.composite
 def values(draw):
     """The Duffing study with whole values replaced: it stays TOML far more often."""
@@ -101,27 +119,6 @@ def values(draw):
         )
         lines[i] = f"{key} = {new}"
     return "\n".join(lines)
-
-
-expressions = st.recursive(
-    st.one_of(
-        st.sampled_from(["c", "alpha", "omega", "pi", "t", "x", "9", "1e308", "0", "-1", "99999999999", "sin", "''"]),
-        st.floats(allow_nan=True).map(repr),
-    ),
-    lambda inner: st.one_of(
-        st.tuples(inner, st.sampled_from(["+", "-", "*", "/", "**", "//", "%", "^", "@", ",", "."]), inner).map(
-            " ".join
-        ),
-        inner.map(lambda e: f"({e})"),
-        st.tuples(st.sampled_from(["sin", "exp", "log", "sqrt", "abs", "eval", "c", "tan"]), inner).map(
-            lambda pair: f"{pair[0]}({pair[1]})"
-        ),
-        inner.map(lambda e: f"-{e}"),
-        inner.map(lambda e: f"lambda: {e}"),
-        inner.map(lambda e: f"[{e}][0]"),
-    ),
-    max_leaves=12,
-)
 
 
 def evaluated(text):

@@ -22,7 +22,6 @@ from suboctave.study.file import read_study
 from suboctave.study.runner import JOURNAL, run_study
 
 DUFFING = (Path(__file__).parent / "duffing.toml").read_text(encoding="utf-8")
-HAS_EQUATIONS = hasattr(so.System, "from_equations")
 
 
 def equal(a, b):
@@ -162,7 +161,7 @@ def test_a_kill_in_the_middle_loses_no_finished_analysis(study_file, by_script):
     folder = path.parent / "study_results"
     process = subprocess.Popen([sys.executable, "-m", "suboctave", "run", str(path)], stdout=subprocess.DEVNULL)
     journal = folder / JOURNAL
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 400  # with kernels to compile; seconds without
     while time.monotonic() < deadline and process.poll() is None:
         kinds = [r.kind for r in read_journal(journal)[0]] if journal.exists() else []
         if "analysis" in kinds and "points" in kinds[kinds.index("analysis") :]:
@@ -276,8 +275,6 @@ every = 50
 
 @pytest.mark.parametrize("name", sorted(examples()))
 def test_every_example_is_in_order(name, tmp_path, suboctave):
-    if name == "mathieu_duffing" and not HAS_EQUATIONS:
-        pytest.skip("needs System.from_equations")
     path = tmp_path / "mine.toml"
     assert suboctave("new", path, "--example", name)[0] == 0
     if name == "matrices":
@@ -309,6 +306,39 @@ def test_the_reference_oscillator_from_its_study_file(tmp_path, suboctave):
         so.load(tmp_path / "mine_results" / "results.nc")["response"],
         so.frequency_response(so.library.reference_oscillator(), (4.5, 1.3)),
     )
+
+
+def test_the_tongue_of_the_mathieu_oscillator(tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    suboctave("new", path, "--example", "mathieu_duffing")
+    path.write_text(path.read_text().replace("p = 0.01", "p = 1e-5"))
+    assert suboctave("run", path)[0] == 0
+    branch = so.load(tmp_path / "mine_results" / "results.nc")["response"]
+    # averaging at omega = 2: unstable within omega = 2 +- 2 sqrt(delta^2 / 16 - zeta^2), up to O(delta^2)
+    half = 2.0 * np.sqrt(0.15**2 / 16.0 - 0.02**2)
+    found = [b.omega for b in branch.bifurcations["PD"]]
+    np.testing.assert_allclose(found, [2.0 + half, 2.0 - half], atol=2e-3)
+    # the tip: at delta = 4 zeta both meet
+    path.write_text(path.read_text().replace("delta = 0.15", "delta = 0.0799"))
+    assert suboctave("run", path, "--overwrite")[0] == 0
+    assert not list(so.load(tmp_path / "mine_results" / "results.nc")["response"].bifurcations)
+    path.write_text(path.read_text().replace("delta = 0.0799", "delta = 0.0805"))
+    assert suboctave("run", path, "--overwrite")[0] == 0
+    tip = so.load(tmp_path / "mine_results" / "results.nc")["response"].bifurcations["PD"]
+    np.testing.assert_allclose([b.omega for b in tip], 2.0, atol=6e-3)
+    assert len(tip) == 2
+
+
+def test_the_unbalance_response_before_contact(tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    suboctave("new", path, "--example", "unbalance")
+    path.write_text(path.read_text().replace("omega = [0.5, 2.0]", "omega = [0.5, 0.8]"))
+    assert suboctave("run", path)[0] == 0
+    branch = so.load(tmp_path / "mine_results" / "results.nc")["run-up"]
+    w = branch.omega
+    linear = 0.06 * w**2 / np.abs(1.0 - w**2 + 0.08j * w)
+    assert linear.max() < 0.5  # the play is never used up
+    np.testing.assert_allclose(branch.amplitude, linear, rtol=1e-9)
 
 
 def test_matrices_come_from_files(tmp_path, suboctave):
