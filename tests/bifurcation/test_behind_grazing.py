@@ -7,13 +7,15 @@ the stiffer the stop, the closer the fold lies to the grazing.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import suboctave as so
 from suboctave.bifurcation.kinds import LimitPoint
 from suboctave.bifurcation.layer import behind_grazing
-from suboctave.bifurcation.solve import Guess
+from suboctave.bifurcation.solve import Extra, Guess, newton
 from suboctave.errors import ConvergenceError
 from suboctave.timedomain import locate_by_shooting, shoot
 
@@ -122,16 +124,41 @@ def guess_at(orbit, name="omega", span=0.35):
     return Guess(orbit.balance, orbit.coefficients, orbit.omega, orbit.values, name, span)
 
 
-def test_newton_starts_right_behind_the_grazing():
-    """From before the grazing no gradient leads to the fold; from right behind it Newton's method finds it."""
-    curve, fold = first_fold(oscillator(1000.0, 0.01, 0.5), harmonics=9)
-    before = guess_at(curve.grazings[0].orbit)
-    before = Guess(before.balance, before.x * (1.0 - 1e-6), before.omega, before.values, "omega", 0.35)
+@pytest.mark.parametrize(("Kc", "zeta", "share"), [(1000.0, 0.01, 0.5), (30.0, 0.05, 0.5), (200.0, 0.01, 0.999)])
+def test_newton_starts_right_behind_the_grazing(Kc, zeta, share):
+    """From before the grazing no gradient leads to the fold; from right behind it Newton's method finds it.
+
+    With the stiffest stop the fold lies 2e-11 behind its grazing, where the last digit of omega decides.
+    """
+    curve, fold = first_fold(oscillator(Kc, zeta, share), harmonics=9)
+    orbit = curve.grazings[0].orbit
+    for size in 10.0 ** -np.arange(4, 10):
+        for sign in (1.0, -1.0):
+            start = replace(guess_at(orbit), x=orbit.coefficients * (1.0 - sign * size))
+            if sign > 0.0:
+                with pytest.raises(ConvergenceError):
+                    LimitPoint().solve(start)
+            found = behind_grazing(LimitPoint(), start)
+            assert found is not None, (size, sign)
+            assert found.state.omega == pytest.approx(fold.omega, abs=1e-12)
+            assert abs(found.state.omega - fold.omega) < 0.01 * abs(behind(fold))
+            assert found.residual < 1e-9
+
+
+def test_newton_does_not_take_any_standstill_for_convergence():
+    """A system whose residual cannot vanish (an extremum that misses its gap) is refused, not rounded."""
+    curve, _ = first_fold(oscillator(30.0, 0.05, 0.5), harmonics=9)
+    orbit = curve.orbits[0]
+    low = np.abs(orbit.coefficients).max()
+
+    def out_of_reach(state, extra):
+        value = float(state.x[1, 0] ** 2 + low**2)
+        gradient = np.zeros(state.x.size)
+        gradient[1] = 2.0 * state.x[1, 0]
+        return [Extra.of(value, gradient, 0.0, (), low**2)], None, []
+
     with pytest.raises(ConvergenceError):
-        LimitPoint().solve(before)
-    found = behind_grazing(LimitPoint(), before)
-    assert found is not None
-    assert found.state.omega == pytest.approx(fold.omega, abs=1e-12)
+        newton(guess_at(orbit), np.zeros(0), np.zeros(0), out_of_reach)
 
 
 def test_what_cannot_be_solved_is_bracketed_and_says_so(monkeypatch):

@@ -58,13 +58,19 @@ def test_truncations_cancel_in_hills_method(fifty, distances):
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 @pytest.mark.parametrize("harmonics", [15, 31])
 def test_coverage_on_the_reference_curves(draw, distances, method, harmonics):
-    """Ninety-five percent of all multipliers lie within their error estimates."""
-    covered = []
-    for item in draw(harmonics, 12, seed=harmonics):
+    """Ninety-five percent of all motions, half of them unstable, lie within their error estimates; verdicts agree."""
+    covered, whole, motions = [], [], draw(harmonics, 12, seed=harmonics)
+    assert sum(not item.stable for item in motions) == len(motions) // 2
+    for item in motions:
         result = so.stability(item.orbit, method)
-        covered += list(distances(result.multipliers, item.exact) <= result.errors + SHOOTING)
+        inside = distances(result.multipliers, item.exact) <= result.errors + SHOOTING
+        covered += list(inside)
+        whole.append(inside.all())
+        assert result.stable == item.stable, (item.name, result)
+        assert harmonics < 31 or result.errors.max() <= 1e-3, (item.name, result)
     assert len(covered) > 400
     assert np.mean(covered) >= 0.95
+    assert np.mean(whole) >= 0.95
 
 
 @pytest.mark.slow

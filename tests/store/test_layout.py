@@ -21,6 +21,8 @@ def event(kind, arclength, multipliers, critical, p=1.0):
         parameters={"p": p, "k": 3.0},
         multipliers=np.array(multipliers, dtype=complex),
         critical_multiplier=lambda: complex(critical),
+        critical_error=1e-7,
+        stability_method="monodromy",
     )
 
 
@@ -38,6 +40,8 @@ def branch(stable, bifurcations, events=()):
         harmonics=np.full(count, 15),
         truncation=np.zeros(count),
         multipliers=np.zeros((count, 4), dtype=complex),
+        multiplier_errors=np.full((count, 4), 1e-7),
+        stability_methods=["monodromy"] * count,
         arclength=np.arange(float(count)),
         bifurcations=bifurcations,
         grazings=(),

@@ -131,6 +131,16 @@ class Branch:
         return np.array([p.floquet.multipliers for p in self.points])
 
     @cached_property
+    def multiplier_errors(self) -> Array:
+        """Estimated errors of the multipliers, shape (len, 2 n)."""
+        return np.array([p.floquet.errors for p in self.points])
+
+    @cached_property
+    def stability_methods(self) -> list[str]:
+        """Where each point's multipliers come from, in words."""
+        return [p.floquet.method for p in self.points]
+
+    @cached_property
     def arclength(self) -> Array:
         """Distance along the branch in scaled arclength, shape (len,)."""
         return np.array([p.arclength for p in self.points])

@@ -15,6 +15,7 @@ from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import InputError, suggest
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.system import System
+from suboctave.stability import StabilityMethod, method_of
 
 #: DOFs up to which the stiffness is examined for motions that nothing holds
 _MOST_EXAMINED = 400
@@ -27,6 +28,7 @@ def make_settings(
     events: Sequence[Event],
     newton: NewtonOptions | None,
     stepping: SteppingOptions | None,
+    stability: StabilityMethod | str | None,
 ) -> Settings:
     """The options of a verb, checked; raises InputError."""
     events = tuple(events) if isinstance(events, Iterable) and not isinstance(events, Event) else (events,)
@@ -51,7 +53,7 @@ def make_settings(
     dof = system.observed_dof if observe is None else observe
     if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
         raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
-    return Settings(newton or NewtonOptions(), stepping, events, int(dof))
+    return Settings(newton or NewtonOptions(), stepping, method_of(stability), events, int(dof))
 
 
 def check_system(system: System, omega: tuple[float, ...] = ()) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import insort
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
-from suboctave.analysis.guard import CountCheck, StepGuard
+from suboctave.analysis.guard import CountCheck, Passage, StepGuard
+from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
@@ -23,6 +25,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.march import make_point, point_between
 from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.stability import StabilityMethod
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point
 _APART = 1e-5
@@ -39,6 +42,7 @@ class Settings:
 
     newton: NewtonOptions
     stepping: SteppingOptions
+    stability: StabilityMethod
     events: Sequence[Event] = ()
     observe: int = 0
     report: Callable[[float, str], None] | None = None
@@ -46,9 +50,10 @@ class Settings:
 
 @dataclass
 class Trace:
-    """What following a curve in one direction gave."""
+    """What following a curve in one direction gave; `open`: motions between its points whose verdict is open."""
 
     points: list[BranchPoint] = field(default_factory=list)
+    open: list[BranchPoint] = field(default_factory=list)
     bifurcations: list[Bifurcation] = field(default_factory=list)
     events: list[Bifurcation] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -60,15 +65,18 @@ class Trace:
     def reversed_before(self, other: Trace) -> Trace:
         """This trace walked backwards, then `other`, which started from the same point."""
         whole = self.points[-1].arclength
-        back = [replace(p, arclength=whole - p.arclength) for p in reversed(self.points)]
-        on = [replace(p, arclength=whole + p.arclength) for p in other.points[1:]]
+
+        def walked(first: list[BranchPoint], second: list[BranchPoint]) -> list[BranchPoint]:
+            back = [replace(p, arclength=whole - p.arclength) for p in reversed(first)]
+            return back + [replace(p, arclength=whole + p.arclength) for p in second]
 
         def joined(first: list[Bifurcation], second: list[Bifurcation]) -> list[Bifurcation]:
             flipped = [b.seen_backwards(whole - b.arclength) for b in reversed(first)]
             return flipped + [replace(b, arclength=whole + b.arclength) for b in second]
 
         return Trace(
-            back + on,
+            walked(self.points, other.points[1:]),
+            walked(self.open, other.open),
             joined(self.bifurcations, other.bifurcations),
             joined(self.events, other.events),
             self.warnings + other.warnings,
@@ -95,6 +103,7 @@ class _Follower:
         self._guard = StepGuard(self._between, lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
         self._again: tuple[Sample, ResponseCurve, Sample] | None = None
         self._count = CountCheck()
+        self._hidden = HiddenDoublings()
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._done = 0.0
         #: somebody who keeps what has been found (`progress.reporting`)
@@ -124,7 +133,7 @@ class _Follower:
         if candidate is not None and candidate.point is point:
             return candidate
         assert isinstance(point.evaluation, ResponseEvaluation)
-        return Sample(point, point.evaluation.state)
+        return Sample(point, point.evaluation.state, self.settings.stability)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at."""
@@ -160,22 +169,26 @@ class _Follower:
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
-        passed = [sample]
+        passed, passage = [sample], None
         if self.previous is not None:
             if _at_rest(self.previous) or _at_rest(sample):
                 self._guard.forget()
+                self._hidden.forget()
             else:
                 again = self._solved_again(self.previous, sample)
                 if again is not self.previous:
                     self._search_here(self.previous, again)
                     self.previous = again
-                passed = self._guard.passage(again, sample).samples
+                passage = self._guard.passage(again, sample)
+                passed = passage.samples
         for new in passed:
             if self.previous is not None:
                 self._search(self.previous, new)
             where = new.point
             self.trace.points.append(BranchPoint(orbit_of(new), new.floquet, where.arclength, where.iterations))
             self.previous = new
+        if passage is not None:
+            self._look_behind(passage)
         report = self.settings.report
         if report is not None:
             low, high = self.bounds
@@ -188,6 +201,23 @@ class _Follower:
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
         return bifurcation_at(located, a, b, self.settings.observe, self.trace.warnings)
+
+    def _look_behind(self, passage: Passage) -> None:
+        """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
+        for stretch in self._hidden.passed(passage.inside):
+            found = pair_in(stretch, self.settings.newton, self._sample)
+            for located, a, b in found:
+                item = self._bifurcation(located, a, b)
+                if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
+                    insort(self.trace.bifurcations, item, key=lambda known: known.arclength)
+                    self._count.noted(item)
+            if len(found) < 2:
+                self._guard.doubt(stretch.before, stretch.behind, REASON)
+        self.trace.open += [
+            BranchPoint(orbit_of(s), s.floquet, s.point.arclength, s.point.iterations)
+            for s in passage.inside[1:-1]
+            if not s.floquet.decided
+        ]
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""

@@ -26,6 +26,7 @@ from numba import njit
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import first_doubtful
+from suboctave.analysis.nearing import nears_grazing
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Bifurcation, Sample
 from suboctave.bifurcation.grazing import touches
@@ -57,9 +58,12 @@ _NEAR_CIRCLE = 0.02
 
 @dataclass
 class Passage:
-    """An examined step: the samples that separate its events, its end included, and what stayed in doubt."""
+    """An examined step: the samples that separate its events, its end included, all that were looked at, both ends
+    included, and what stayed in doubt.
+    """
 
     samples: list[Sample]
+    inside: list[Sample]
     unsettled: list[Unsettled] = field(default_factory=list)
 
 
@@ -110,7 +114,7 @@ class StepGuard:
         self._behind = step.samples[-4:]
         kept = set(self._behind)
         self._touching = {pair: known for pair, known in self._touching.items() if kept.issuperset(pair)}
-        return Passage(_separating(step.inside), step.unsettled)
+        return Passage(_separating(step.inside), step.inside, step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""
@@ -173,8 +177,8 @@ class _Step:
             share, reason = doubt
             if _place(q) - _place(p) <= least:
                 self.settled.append(_place(q) - _place(p))
-                if not changes(p, q):
-                    # no event, but too close to one to tell it from two
+                if not changes(p, q) and not (reason in _REASONS[1:] and _open(p, q)):
+                    # no event, but too close to one to tell it from two; open verdicts are stated as such
                     self.unsettled.append(_unsettled(p, q, reason))
                 continue
             halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
@@ -218,6 +222,8 @@ class _Step:
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
         if self.grazes(p, q):
             return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
+        if h > _LAYER and nears_grazing(p, q):
+            return 0.5, "a contact that is about to begin or cease changes everything like a square root"
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
@@ -279,6 +285,11 @@ _REASONS = (
 )
 
 
+def _open(p: Sample, q: Sample) -> bool:
+    """Whether a multiplier lies within its error of the unit circle at either of two samples."""
+    return not (p.floquet.decided and q.floquet.decided)
+
+
 def _place(sample: Sample) -> float:
     return sample.point.arclength
 
@@ -327,7 +338,7 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
     change = abs(p.floquet.unstable - q.floquet.unstable)
-    if not (p.floquet.decided and q.floquet.decided):
+    if _open(p, q):
         return True
     changed = {kind.name for kind in changes(p, q)}
     if {"LP", "BP"} <= changed:

@@ -14,6 +14,7 @@ from suboctave.analysis.follow import Settings, Trace, follow
 from suboctave.analysis.progress import reporting
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
+from suboctave.analysis.verdicts import with_verdicts
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
@@ -24,6 +25,8 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
+from suboctave.stability import StabilityMethod
+from suboctave.stability.arbitration import METHODS
 
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
@@ -43,6 +46,7 @@ def frequency_response(
     progress: Any = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
+    stability: StabilityMethod | str | None = None,
     linear: LinearPart | None = None,
 ) -> Branch:
     """The periodic response over a range of frequencies, with stability and located bifurcations.
@@ -67,6 +71,11 @@ def frequency_response(
         User's events, located along the branch.
     progress
         None, True (a bar), or a callable taking (share done, text).
+    stability
+        How the multipliers of points and bifurcations are found: `Monodromy()`, `Hill()`, `KoopmanHill()`, or their
+        names "monodromy", "hill", "koopman-hill". Default: the monodromy matrix, and where a verdict is open the others
+        as witnesses (`Arbitration()`). Where the method is not applicable the monodromy matrix stands in, and the
+        branch says so.
     linear
         Another linear part with this system's elements and loads, for example one condensed onto the DOFs that
         elements touch.
@@ -80,7 +89,7 @@ def frequency_response(
     """
     first, last = check_range("omega", omega, positive=True)
     check_system(system, (first, last))
-    settings = make_settings(system, max_step, observe, events, newton, stepping)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
@@ -111,6 +120,7 @@ def continue_branch(
     progress: Any = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
+    stability: StabilityMethod | str | None = None,
 ) -> Branch:
     """A curve of periodic motions along any one parameter: amplitude sweeps, S-curves, or omega from a given motion.
 
@@ -133,7 +143,7 @@ def continue_branch(
         start = start.orbit
     if isinstance(start, System):
         return _from_system(
-            start, parameter, bounds, omega, harmonics, max_step, observe, events, progress, newton, stepping
+            start, parameter, bounds, omega, harmonics, max_step, observe, events, progress, newton, stepping, stability
         )
     if not isinstance(start, PeriodicOrbit):
         raise InputError(
@@ -151,7 +161,7 @@ def continue_branch(
         raise InputError(f"the motion has {parameter}={value:.6g}, outside the bounds ({low:g}, {high:g})")
     if omega is not None and not (is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
         raise InputError(f"omega={omega!r} differs from the motion's {orbit.omega:g}: leave it out")
-    settings = make_settings(system, max_step, observe, events, newton, stepping)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, _own_linear_part(orbit))
@@ -203,6 +213,7 @@ def _from_system(
     progress: Any,
     newton: NewtonOptions | None,
     stepping: SteppingOptions | None,
+    stability: StabilityMethod | str | None,
 ) -> Branch:
     wanted: Harmonics = "adaptive" if harmonics is None else harmonics
     if parameter == "omega":
@@ -218,13 +229,14 @@ def _from_system(
             progress=progress,
             newton=newton,
             stepping=stepping,
+            stability=stability,
         )
     check_system(system)
     check_parameter(system, parameter)
     first, last = check_bounds(system, parameter, bounds)
     if omega is None or not (is_number(omega) and omega > 0.0):
         raise InputError(f"continue_branch from a system along {parameter!r} needs a positive omega=, got {omega!r}")
-    settings = make_settings(system, max_step, observe, events, newton, stepping)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
     curve = _curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
     # a size of the motion to scale with, should the branch begin at rest
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
@@ -269,11 +281,19 @@ def _options(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[f
         "harmonics": asdict(harmonics) if isinstance(harmonics, AdaptiveHarmonics) else harmonics,
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
+        "stability": _written(settings.stability),
         "observe": settings.observe,
     }
 
 
+def _written(method: StabilityMethod) -> str:
+    """A stability method by the name that gives it again, or in full."""
+    return method.name if METHODS.get(method.name) == method else repr(method)
+
+
 def _branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
+    with one_thread():
+        trace = with_verdicts(trace, settings.stability, name)
     context = {"system": system, "parameter": name, **options}
     bifurcations, events = (
         [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)

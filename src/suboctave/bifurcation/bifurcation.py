@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, overload
 
+import numpy as np
+
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
@@ -114,6 +116,17 @@ class Bifurcation:
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers over the motion's own period, shape (2 n,)."""
         return self.floquet.multipliers
+
+    @property
+    def critical_error(self) -> float:
+        """Estimated error of the critical multiplier."""
+        at = int(np.argmin(np.abs(self.multipliers - self.critical_multiplier())))
+        return float(self.floquet.errors[at])
+
+    @property
+    def stability_method(self) -> str:
+        """Where the multipliers come from, in words."""
+        return self.floquet.method
 
     def parameter(self, name: str) -> float:
         """omega or a parameter by name."""

@@ -30,7 +30,9 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
-from suboctave.stability import FloquetResult, floquet_multipliers
+from suboctave.stability import FloquetResult, Monodromy, StabilityMethod
+
+_MONODROMY = Monodromy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +41,12 @@ class Sample:
 
     point: CurvePoint
     state: BalanceState
+    method: StabilityMethod = _MONODROMY
 
     @lazy
     def floquet(self) -> FloquetResult:
         """Multipliers and their errors."""
-        return floquet_multipliers(self.state)
+        return self.method.along(self.state)
 
     @lazy
     def half_sign(self) -> float:

@@ -122,7 +122,8 @@ def newton(
     Raises
     ------
     ConvergenceError
-        If the iteration leaves the neighbourhood of the guess or does not converge.
+        If the iteration leaves the neighbourhood of the guess or does not converge. An iteration that stands still with
+        a residual that rounding of its unknowns explains has converged.
     """
     balance, n = guess.balance, guess.balance.dimension
     x, parameter, extra = guess.x.ravel().copy(), guess.parameter, unknowns.astype(float).copy()
@@ -130,7 +131,8 @@ def newton(
     state = guess.state() if start is None else start
     rows = residual_scale(state)
     previous, contraction = np.inf, 0.0
-    linear: tuple[Factor, Array, Array, list[float]] | None = None
+    nearest: tuple[BalanceState, Array, float, int] | None = None
+    linear: tuple[Factor, Array, Array, list[float], float] | None = None
     for iteration in range(iterations + 1):
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
@@ -154,7 +156,10 @@ def newton(
         # after a short step that contracts, the old factors take the next one as far
         if linear is None or previous > _SHORT or contraction > 0.1:
             linear = _linearised(state, guess, equations, columns, spans, weight, rows, force)
-        factor, scale_x, scale_rows, sizes = linear
+        factor, scale_x, scale_rows, sizes, steepest = linear
+        # right behind a grazing the equations are so steep that the last digit of an unknown is more than tolerated
+        if previous <= _STEP and error <= np.finfo(float).eps * steepest and (nearest is None or error < nearest[2]):
+            nearest = state, extra.copy(), error, iteration
         rhs = np.empty(n + 1 + len(extra))
         rhs[:n] = residual * scale_rows
         rhs[n:] = [e.value / e_size for e, e_size in zip(equations, sizes, strict=True)]
@@ -172,6 +177,8 @@ def newton(
         if length <= 1e-12 and error <= _TOLERANCE:
             return state, extra, error, iteration
         previous = length
+    if nearest is not None:
+        return nearest
     raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
 
 
@@ -184,9 +191,10 @@ def _linearised(
     weight: Array,
     rows: Array,
     force: float,
-) -> tuple[Factor, Array, Array, list[float]]:
+) -> tuple[Factor, Array, Array, list[float], float]:
     """The factorised matrix of the augmented system in dimensionless unknowns and equations, the units of the
-    coefficients, the factors of the residual's entries, and the sizes of the other equations.
+    coefficients, the factors of the residual's entries, the sizes of the other equations, and by how much the
+    steepest equation changes at most with its unknowns.
     """
     n, q = len(rows), len(spans)
     matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
@@ -202,10 +210,11 @@ def _linearised(
         matrix[n + i, n] = by_parameter * guess.span / e.size
         for j, value in enumerate(by_unknowns):
             matrix[n + i, n + 1 + j] = value * spans[j] / e.size
+    steepest = float(np.abs(matrix).sum(axis=1).max())
     factor = Factor.of(matrix, overwrite=True)
     if factor.singular:
         raise ConvergenceError("the bordered system is singular")
-    return factor, scale_x, scale_rows, [e.size for e in equations]
+    return factor, scale_x, scale_rows, [e.size for e in equations], steepest
 
 
 def locate_singular(guess: Guess, kind: Kind) -> Singular:

@@ -24,8 +24,6 @@ from suboctave.stability.result import FloquetResult, written
 
 #: least radius of a joint estimate in units of the better single one
 _BELIEVED = 0.5
-#: logarithm of the product of all multipliers below which a motion counts as undamped
-_UNDAMPED = 1e-9
 #: rows of a witness's matrix up to which it is asked along a curve, where nobody waits for this one point
 _UNBIDDEN = 700
 
@@ -40,6 +38,7 @@ class Arbitration(StabilityMethod):
 
     witnesses: tuple[StabilityMethod, ...] = (Hill(), KoopmanHill())
     name: ClassVar[str] = "arbitration"
+    follows_monodromy: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         for witness in self.witnesses:
@@ -61,7 +60,7 @@ class Arbitration(StabilityMethod):
     def _weighed(self, state: BalanceState, found: FloquetResult, limit: float) -> FloquetResult:
         if found.decided:
             return found
-        if abs(float(np.log(np.maximum(np.abs(found.multipliers), 1e-300)).sum())) < _UNDAMPED:
+        if found.undamped:
             return replace(found, note="Undamped: multipliers stay on the unit circle, and nothing settles the verdict")
         size = len(found.multipliers) * (2 * state.basis.harmonics + 1)
         if size > limit:

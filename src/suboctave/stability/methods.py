@@ -25,6 +25,8 @@ class StabilityMethod(ABC):
     """One way to the multipliers of a motion."""
 
     name: ClassVar[str]
+    #: whether `along` gives the multipliers of the monodromy matrix
+    follows_monodromy: ClassVar[bool] = False
 
     @abstractmethod
     def multipliers(self, state: BalanceState) -> FloquetResult:
@@ -36,7 +38,7 @@ class StabilityMethod(ABC):
         if found.applicable:
             return found
         instead = floquet_multipliers(state)
-        return replace(instead, note=f"{found.note}; multipliers of the monodromy matrix instead")
+        return replace(instead, note=f"{found.note}; multipliers of the monodromy matrix instead", stands_in=True)
 
     def settled(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
         """The verdict on a point of a curve, from what `along` found there."""
@@ -48,6 +50,7 @@ class Monodromy(StabilityMethod):
     """Multipliers as eigenvalues of the monodromy matrix, a product of matrix exponentials over one period."""
 
     name: ClassVar[str] = "monodromy"
+    follows_monodromy: ClassVar[bool] = True
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
         """See `StabilityMethod.multipliers`."""

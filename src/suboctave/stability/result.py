@@ -12,6 +12,9 @@ from numba import njit
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
 
+#: logarithm of the product of all multipliers below which a motion counts as undamped
+_UNDAMPED = 1e-9
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FloquetResult:
@@ -30,6 +33,8 @@ class FloquetResult:
         What the method found when it checked itself, by name.
     witnesses
         The results that were weighed against each other, in the order asked; empty if one method was enough.
+    stands_in
+        True where the method asked for was not applicable on a curve and the monodromy matrix stands in for it.
     """
 
     multipliers: ComplexArray
@@ -38,6 +43,7 @@ class FloquetResult:
     note: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
     witnesses: tuple[FloquetResult, ...] = ()
+    stands_in: bool = False
 
     @classmethod
     def inapplicable(
@@ -76,6 +82,11 @@ class FloquetResult:
     def decided(self) -> bool:
         """True if no multiplier is closer to the unit circle than its error estimate."""
         return self._verdict[1]
+
+    @property
+    def undamped(self) -> bool:
+        """True if the product of all multipliers is one to rounding: pairs then stay on the unit circle."""
+        return abs(float(np.log(np.maximum(np.abs(self.multipliers), 1e-300)).sum())) < _UNDAMPED
 
     @property
     def unstable(self) -> int:

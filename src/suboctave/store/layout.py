@@ -8,11 +8,12 @@ Dimensions
     multiplier   the Floquet multipliers over the response period
 
 Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, `error`, `residual`, `multipliers`,
-`parameters` (point x parameter). A free parameter other than omega is a coordinate under its own name as well, unless
-the layout already uses that name. Variables on `event` carry the prefix `event_`; `event_after` is the index of the
-point after which the event lies, so that the curve with its events is one line: point `i`, the events with
-`event_after == i` in their order, point `i + 1`. `event_contact` names the contact that grazes at an event (empty at a
-smooth bifurcation), `event_contact_at` is the value of the free parameter at which it does.
+`multiplier_errors`, `stability_method`, `parameters` (point x parameter). A free parameter other than omega is a
+coordinate under its own name as well, unless the layout already uses that name. Variables on `event` carry the prefix
+`event_`; `event_after` is the index of the point after which the event lies, so that the curve with its events is one
+line: point `i`, the events with `event_after == i` in their order, point `i + 1`. `event_contact` names the contact
+that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which
+it does.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below
 UNKNOWN = -1  # in event_stable_after
 RESERVED = frozenset(
     {"point", "event", "parameter", "multiplier", "omega", "amplitude", "stable", "harmonics", "error", "residual"}
-    | {"multipliers", "parameters"}
+    | {"multipliers", "multiplier_errors", "stability_method", "parameters"}
 )
 
 
@@ -50,7 +51,8 @@ class EventRow:
     `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
     the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
     `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at
-    a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does.
+    a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does;
+    `multiplier_error` is the estimated error of `multiplier`, `stability_method` where it comes from.
     """
 
     kind: str
@@ -59,6 +61,8 @@ class EventRow:
     amplitude: float
     residual: float = np.nan
     multiplier: complex = complex(np.nan, np.nan)
+    multiplier_error: float = np.nan
+    stability_method: str = ""
     criticality: str | None = None
     stable_after: bool | None = None
     uncertainty: float = 0.0
@@ -98,6 +102,10 @@ class EventLike(Protocol):
     def parameters(self) -> Mapping[str, float]: ...
     @property
     def multipliers(self) -> np.ndarray: ...
+    @property
+    def critical_error(self) -> float: ...
+    @property
+    def stability_method(self) -> str: ...
     def critical_multiplier(self) -> complex: ...
 
 
@@ -122,6 +130,10 @@ class BranchLike(Protocol):
     def truncation(self) -> np.ndarray: ...
     @property
     def multipliers(self) -> np.ndarray: ...
+    @property
+    def multiplier_errors(self) -> np.ndarray: ...
+    @property
+    def stability_methods(self) -> Sequence[str]: ...
     @property
     def arclength(self) -> np.ndarray: ...
     @property
@@ -152,6 +164,8 @@ def curve_dataset(
     error: ArrayLike | None = None,
     residual: ArrayLike | None = None,
     multipliers: ArrayLike | None = None,
+    multiplier_errors: ArrayLike | None = None,
+    stability_method: Sequence[str] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     free: str = "omega",
     events: Sequence[EventRow] = (),
@@ -166,10 +180,11 @@ def curve_dataset(
     """A curve of periodic motions as a labelled dataset; the layout is described at the top of this module.
 
     Shapes: `omega`, `amplitude`, `stable`, `harmonics`, `error`, `residual` (points,); `multipliers` (points, m),
-    complex; each of `parameters` a number, or (points,) where it varies along the curve. `omega` is in rad per unit
-    time, `amplitude` is max |x| over one response period at `observed_dof`, in the system's unit of length; `period`
-    counts the forcing periods in one response period; `free` names the parameter that the curve was followed in.
-    `options` are further numbers or texts that tell how the curve was computed.
+    complex, `multiplier_errors` their estimated errors, `stability_method` (points,) where they come from; each of
+    `parameters` a number, or (points,) where it varies along the curve. `omega` is in rad per unit time, `amplitude` is
+    max |x| over one response period at `observed_dof`, in the system's unit of length; `period` counts the forcing
+    periods in one response period; `free` names the parameter that the curve was followed in. `options` are further
+    numbers or texts that tell how the curve was computed.
 
     Raises InputError where lengths disagree or `free` is not a parameter.
     """
@@ -201,15 +216,17 @@ def curve_dataset(
         ("point", "parameter"),
         np.column_stack([values[name] for name in names]) if names else np.empty((count, 0)),
     )
-    if multipliers is not None:
-        table = np.asarray(multipliers, dtype=complex)
+    for name, rows, kind, meaning in (
+        ("multipliers", multipliers, complex, "Floquet multipliers over the response period"),
+        ("multiplier_errors", multiplier_errors, float, "estimated errors of the multipliers"),
+    ):
+        if rows is None:
+            continue
+        table = np.asarray(rows, dtype=kind)
         if table.ndim != 2 or table.shape[0] != count:
-            raise InputError(f"multipliers: expected one row for each of the {count} points, got shape {table.shape}")
-        variables["multipliers"] = (
-            ("point", "multiplier"),
-            table,
-            {"long_name": "Floquet multipliers over the response period"},
-        )
+            raise InputError(f"{name}: expected one row for each of the {count} points, got shape {table.shape}")
+        variables[name] = (("point", "multiplier"), table, {"long_name": meaning})
+    described.add("stability_method", stability_method, "where the multipliers come from", object)
     variables |= _event_variables(events, names, values)
 
     coords: dict[str, Any] = {
@@ -248,6 +265,8 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
         error=branch.truncation,
         residual=[orbit.residual for orbit in branch.orbits],
         multipliers=branch.multipliers,
+        multiplier_errors=branch.multiplier_errors,
+        stability_method=branch.stability_methods,
         parameters={name: branch.parameter(name) for name in names},
         free=branch.name,
         events=_event_rows(branch, arclength),
@@ -284,6 +303,8 @@ def _event_rows(branch: BranchLike, arclength: np.ndarray) -> list[EventRow]:
                 event.amplitude,
                 residual=event.residual,
                 multiplier=critical,
+                multiplier_error=event.critical_error,
+                stability_method=event.stability_method,
                 criticality=event.criticality,
                 stable_after=(
                     before if id(event) in own else not before and not _others_unstable(event.multipliers, critical)
@@ -383,6 +404,12 @@ def _event_variables(
             np.array([row.multiplier for row in events], dtype=complex),
             {"long_name": "the multiplier that crosses the unit circle"},
         ),
+        "event_multiplier_error": (
+            "event",
+            np.array([row.multiplier_error for row in events], dtype=float),
+            {"long_name": "its estimated error"},
+        ),
+        "event_stability_method": ("event", np.array([row.stability_method for row in events], dtype=object)),
         "event_criticality": ("event", np.array([row.criticality or "" for row in events], dtype=object)),
         "event_stable_after": (
             "event",

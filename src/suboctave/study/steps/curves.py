@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
@@ -98,8 +97,7 @@ class CurveStep(Step):
             "stepping": as_stepping(self.stepping),
             "stability": as_stability(self.stability),
         }
-        takes = inspect.signature(make_settings).parameters
-        yield from tried("", lambda: make_settings(around.system, **{k: v for k, v in given.items() if k in takes}))
+        yield from tried("", lambda: make_settings(around.system, **given))
 
     def _events(self, allow_code: bool) -> list[Event]:
         return [Event(e.name, from_plain({"callable": e.function}, {}, allow_code)) for e in self.events]

@@ -1,0 +1,54 @@
+"""Whether a contact is about to begin or cease just beyond an interval of a curve.
+
+On the side of a grazing on which the contact exists everything changes like a square root of the way to it, up to the
+grazing itself. No polynomial through places on that side foretells it, unless they lie the closer together the nearer
+it is: an interval is too long if an excursion across a gap shrinks to less than SHRINKS of itself in it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from suboctave.bifurcation import Sample
+
+#: excursions across a gap, in units of the largest relative displacement, that may end soon
+YOUNG = 0.05
+#: share to which an excursion may shrink in an interval
+SHRINKS = 0.3
+
+
+def nears_grazing(p: Sample, q: Sample) -> bool:
+    """Whether an excursion across a gap shrinks so much between two samples that it may end just beyond one."""
+    return any(
+        _shrinks(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        or _shrinks(b.tau, b.value, b.curve, b.level, a.tau, a.value, a.curve, a.level)
+        for a, b in zip(p.gaps, q.gaps, strict=True)
+    )
+
+
+@njit(cache=True)
+def _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
+    """Whether an excursion of one motion is a small part of the same excursion of another."""
+    size = 0.0
+    for i in range(value.shape[0]):
+        size = max(size, abs(value[i]))
+    for i in range(value.shape[0]):
+        # a maximum above the gap, or a minimum below it
+        sign = -1.0 if curve[i] > 0.0 else 1.0
+        here = sign * (value[i] - level)
+        if not 0.0 < here < YOUNG * size:
+            continue
+        best, there = -2.0, 0.0
+        for j in range(other_value.shape[0]):
+            if (other_curve[j] > 0.0) == (curve[i] > 0.0):
+                near = math.cos(other_tau[j] - tau[i])
+                if near > best:
+                    best, there = near, sign * (other_value[j] - other_level)
+        if here < SHRINKS * there:
+            return True
+    return False
+
+
+__all__ = ["nears_grazing"]
