@@ -73,6 +73,17 @@ def test_corners_follow_the_parameters():
     assert places == CornerSampling((0.3,), (-3.0,))
 
 
+def test_directions_and_inputs():
+    def places(*args, n=2, **kwargs):
+        element = so.Expression(*args, **kwargs)
+        return element.direction(n).tolist(), element.inputs(n).tolist()
+
+    assert places(expression="x**3", direction=[1, 0]) == ([1.0, 0.0], [[1.0, 0.0]])
+    assert places((0, 1), "x**3") == ([1.0, -1.0], [[1.0, -1.0]])
+    assert places(0, "x*y", {"x": 1, "y": [1, 0]}) == ([1.0, 0.0], [[0.0, 1.0], [-1.0, 1.0]])
+    assert places(0, "x*y", {"x": 1, "y": [1.0, 2.0]}) == ([1.0, 0.0], [[0.0, 1.0], [1.0, 2.0]])
+
+
 def test_an_expression_survives_pickling():
     element = so.Expression((0, 1), "k*max(x - j, 0)*v")
     element.tangent(np.ones((2, 1)), np.zeros(1), np.ones(2))

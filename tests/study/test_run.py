@@ -93,6 +93,28 @@ def test_parameters_may_differ_for_one_analysis(study_file, by_script):
     ]
 
 
+def test_every_option_of_a_verb_reaches_it(study_file):
+    options = (
+        'max_step = 0.3\nharmonics = { minimum = 7, tolerance = 1e-6 }\nstability = "hill"\n'
+        "newton = { iterations = 9 }\nstepping = { deviation = 0.02 }\nobserve = 0\nstart = [0.05, 0.0]\n"
+    )
+    text = DUFFING.split('[[analyses]]\nname = "up"')[0].replace("max_step = 0.2\n", options)
+    study = read_study(study_file(text))
+    by_script = so.frequency_response(
+        study.system,
+        (3.0, 0.5),
+        so.AdaptiveHarmonics(minimum=7, tolerance=1e-6),
+        start=[0.05, 0.0],
+        max_step=0.3,
+        newton=so.NewtonOptions(iterations=9),
+        stability="hill",
+        stepping=so.SteppingOptions(deviation=0.02),
+        observe=0,
+    )
+    equal(run_study(study).finished[0].result, by_script)
+    assert {p.floquet.method for p in by_script.points} == {"hill"}
+
+
 def test_steps_choose_their_motions(study_file, by_script):
     response = by_script[0]
     text = (

@@ -81,7 +81,7 @@ def start_point(
     ways: list[tuple[str, Callable[[ResponseCurve, float], Array], ResponseCurve]] = []
     for finer in _with_more_harmonics(curve):
         ways.append(("linear response", linear_response, finer))
-        if curve.balance.elements:
+        if curve.balance.system.elements:
             ways.append(("homotopy in the element forces", partial(_homotopy, newton=newton), finer))
     ways.append(("time integration from rest", partial(_integrated, state=None), finer))
     for name, guess_by, finer in ways:

@@ -316,17 +316,19 @@ def _between(corners: Array, longest: float) -> Nodes:
 
     Next to a corner instants run like the square of the variable, in which powers of one half are analytic too.
     """
-    ends = np.append(corners, corners[0] + 2.0 * math.pi)
-    begin, length, side = [], [], []
-    for low, gap in zip(ends[:-1], np.diff(ends), strict=True):
-        pieces = max(2, math.ceil(gap / longest))
-        begin.append(low + gap / pieces * np.arange(pieces))
-        length.append(np.full(pieces, gap / pieces))
-        side.append([1] + [0] * (pieces - 2) + [-1])
-    low, whole, sides = np.concatenate(begin)[:, None], np.concatenate(length)[:, None], np.concatenate(side)[:, None]
+    gaps = np.append(np.diff(corners), corners[0] + 2.0 * math.pi - corners[-1])
+    pieces = np.maximum(2, np.ceil(gaps / longest)).astype(np.int64)
+    first = np.cumsum(pieces) - pieces
+    whole = np.repeat(gaps / pieces, pieces)
+    number = np.arange(len(whole)) - np.repeat(first, pieces)
+    low = np.repeat(corners, pieces) + number * whole
     y, share = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
-    at = np.where(sides == 1, y * y, np.where(sides == -1, 1.0 - (1.0 - y) ** 2, y))
-    weights = whole * share * np.where(sides == 1, 2.0 * y, np.where(sides == -1, 2.0 * (1.0 - y), 1.0))
+    low, whole = low[:, None], whole[:, None]
+    at, weights = np.tile(y, (len(whole), 1)), whole * share
+    last = first + pieces - 1
+    at[first], at[last] = y * y, 1.0 - (1.0 - y) ** 2
+    weights[first] *= 2.0 * y
+    weights[last] *= 2.0 * (1.0 - y)
     tau = low + whole * at
     return Nodes(np.cos(tau).ravel(), np.sin(tau).ravel(), weights.ravel())
 

@@ -25,10 +25,10 @@ __all__ = ["CoupledElement", "as_coupled"]
 class CoupledElement(BaseElement):
     """A nonlinear force along one direction that depends on several displacements and velocities, or on time.
 
-    `inputs`: one entry per displacement that the force reads: a DOF, a pair `(i, j)` for `x_i - x_j`, or a vector. A
-    subclass provides the laws below as pure functions of q (Q, N), theta (N,) and c (nc,); Q is m, or 2 m for a law
-    that `depends_on_velocity`. `time_harmonic` is the highest multiple of the load's frequency in a law that
-    `depends_on_time`.
+    `inputs`: one entry per displacement that the force reads: a DOF, a pair `(i, j)` for `x_i - x_j`, or a vector (with
+    decimal points or as an array: two whole numbers are a pair). A subclass provides the laws below as pure functions
+    of q (Q, N), theta (N,) and c (nc,); Q is m, or 2 m for a law that `depends_on_velocity`. `time_harmonic` is the
+    highest multiple of the load's frequency in a law that `depends_on_time`.
     """
 
     own_nodes = True

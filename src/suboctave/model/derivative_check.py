@@ -202,9 +202,11 @@ class _Check:
 
             return shifted
 
+        own = type(self.element).third is not Element.third  # else they are differences already
         bent = self.element.curvature
-        self._compare("f_uuu", third[0], law(0, "u", bent), self.steps["u"])
-        if moving:
+        if own:
+            self._compare("f_uuu", third[0], law(0, "u", bent), self.steps["u"])
+        if moving and own:
             for i, name in enumerate(("f_uuv", "f_uvv", "f_vvv")):
                 self._compare(name, third[i + 1], law(i, "v", bent), self.steps["v"])
 

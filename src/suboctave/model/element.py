@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.errors import InputError
 from suboctave.model.expression import Coefficient, coefficient
 from suboctave.model.recorded import Recorded
-from suboctave.model.sampling import Sampling
+from suboctave.model.sampling import Sampling, SharpSampling, SharpVelocitySampling
 
 __all__ = ["Array", "BaseElement", "Dof", "Element", "Place"]
 
@@ -178,17 +178,19 @@ class Element(BaseElement):
 
         Unless a subclass knows better: differences of `curvature`, good for about eight digits of smooth laws.
         """
-        moving = self.depends_on_velocity
-        f_uuu = _difference(lambda h: self.curvature(u + h, v, c)[0], u)
-        if not moving:
+        kind = self.sampling(c)
+        narrow = min(kind.widths, default=np.inf) if isinstance(kind, SharpSampling) else np.inf
+        f_uuu = _difference(lambda h: self.curvature(u + h, v, c)[0], u, narrow)
+        if not self.depends_on_velocity:
             return f_uuu, None, None, None
-        by_v = _difference(lambda h: np.array(self.curvature(u, v + h, c)), v)
+        slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
+        by_v = _difference(lambda h: np.array(self.curvature(u, v + h, c)), v, slow)
         return f_uuu, by_v[0], by_v[1], by_v[2]
 
 
-def _difference(law: Callable[[float], Any], at: Array) -> Array:
-    """Central differences of fourth order; the step is a share of the size of the argument."""
-    h = 2e-3 * (float(np.max(np.abs(at), initial=0.0)) or 1.0)
+def _difference(law: Callable[[float], Any], at: Array, width: float) -> Array:
+    """Central differences of fourth order; the step is a share of the argument's size, or of the law's width."""
+    h = 2e-3 * min(float(np.max(np.abs(at), initial=0.0)) or 1.0, width)
     result: Array = (8.0 * (law(h) - law(-h)) - (law(2.0 * h) - law(-2.0 * h))) / (12.0 * h)
     return result
 

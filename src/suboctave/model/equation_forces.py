@@ -32,7 +32,7 @@ class Forces:
         self.n = len(names)
         self.x = [symbol(name) for name in names]
         self.v = [symbol(name + PRIME) for name in names]
-        self.u, self.rate = symbol("input_"), symbol("input_" + PRIME)
+        self.u, self.rate = symbol("(input)"), symbol("(input)" + PRIME)
         #: law in u and its rate, direction: in which equations it stands
         self.along: dict[tuple[Any, tuple[float, ...]], np.ndarray] = {}
         self.several: list[tuple[int, Any]] = []

@@ -6,6 +6,7 @@ import functools
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
@@ -43,7 +44,7 @@ class Expression(CoupledElement):
         if not isinstance(expression, str):
             raise InputError(f"Expression: the force must be a text such as 'alpha*x**3', not {expression!r}")
         self.expression = expression
-        places: dict[str, Any] = {"x": dof if direction is None else direction}
+        places: dict[str, Any] = {"x": dof if direction is None else np.asarray(direction, dtype=float)}
         if inputs is not None:
             if not isinstance(inputs, Mapping) or not inputs:
                 raise InputError("Expression: inputs must be a mapping such as {'x': 0, 'y': 1}")

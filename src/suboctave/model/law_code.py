@@ -24,7 +24,7 @@ from suboctave.model.sampling import AdaptiveSampling, CornerSampling, Polynomia
 __all__ = ["Law", "expanded_size", "harmonic_of", "law_of"]
 
 #: symbol of the phase omega t of the load
-_THETA = "theta_"
+_THETA = "omega*t"  # no identifier, so that no parameter can have this name
 _HIGHEST_DEGREE = 30
 _OPERATIONS = 5000
 
@@ -178,7 +178,7 @@ class Law:
 
         names = {state.name: f"q{i}" for i, state in enumerate(self.q)}
         names |= {one.name: f"c{i}" for i, one in enumerate(self.c)} | {_THETA: "theta"}
-        fresh = sympy.numbered_symbols("common_")
+        fresh = sympy.numbered_symbols("(common)")
         common, reduced = sympy.cse(parts, symbols=fresh)
         lines = ["def law(q, theta, c):"]
         used = set().union(*(part.free_symbols for part in parts)) if parts else set()

@@ -265,7 +265,8 @@ class System:
 
     def __repr__(self) -> str:
         title = f"System {self.name!r}" if self.name else "System"
-        lines = [f"{title}: {self.n} {'degree' if self.n == 1 else 'degrees'} of freedom"]
+        names = f" ({', '.join(self.dof_names[:8])}{', ...' * (self.n > 8)})" if self.dof_names else ""
+        lines = [f"{title}: {self.n} {'degree' if self.n == 1 else 'degrees'} of freedom{names}"]
         for kind, items in (("elements", self.elements), ("loads", self.loads)):
             shown = [repr(item) for item in items[:6]] + (["..."] if len(items) > 6 else [])
             lines += [f"  {kind if not i else '':<10} {text}" for i, text in enumerate(shown)]
