@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import AbstractContextManager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -225,15 +226,19 @@ def _written(value: Any) -> str:
 
 
 def _show_journal(path: Path, as_json: bool) -> None:
-    rows, torn = recovered(path)
+    found, torn = recovered(path)
     if as_json:
-        listed = [dict(zip(("name", "state", "points", "bifurcations"), row, strict=True)) for row in rows]
-        _print_json({"ok": True, "analyses": listed, "torn": torn})
+        _print_json({"ok": True, "analyses": [asdict(item) for item in found], "torn": torn})
         return
     screen = console()
     screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
-    names = ("analysis", "state", "points", "bifurcations")
-    print_texts(screen, names, [[str(entry) for entry in row] for row in rows], left=("analysis", "state"))
+    rows = [[item.name, item.state, str(item.points), str(item.bifurcations)] for item in found]
+    print_texts(screen, ("analysis", "state", "points", "bifurcations"), rows, left=("analysis", "state"))
+    for item in found:
+        if item.events:
+            screen.print(f"{item.name}, so far", style="bold", markup=False)
+            lines = [[kind, f"{omega:.8f}", f"{amplitude:.7f}"] for kind, omega, amplitude in item.events]
+            print_texts(screen, ("kind", "omega", "max |x|"), lines, left=("kind",))
     if torn:
         screen.print("its last record is torn and is left out", markup=False)
 

@@ -22,7 +22,7 @@ from suboctave.study.file import Study
 from suboctave.study.outputs import places, write_outputs
 from suboctave.study.steps import Context, Step
 
-__all__ = ["JOURNAL", "Finished", "Outcome", "recovered", "run_study"]
+__all__ = ["JOURNAL", "Finished", "Outcome", "Recovered", "recovered", "run_study"]
 
 JOURNAL = "unfinished.journal"
 #: seconds between records of points of an analysis that is under way
@@ -273,17 +273,32 @@ class _Noting:
         self.journal.append("points", said, sync=False)
 
 
-def recovered(path: str | Path) -> tuple[list[tuple[str, str, int, int]], bool]:
-    """What a journal holds: (analysis, state, points, bifurcations) each, and whether its end was torn."""
+@dataclass
+class Recovered:
+    """What a journal holds of one analysis; `events` are (kind, omega, amplitude) of one that had not finished."""
+
+    name: str
+    state: str = "begun"
+    points: int = 0
+    bifurcations: int = 0
+    events: list[tuple[str, float, float]] = field(default_factory=list)
+
+
+def recovered(path: str | Path) -> tuple[list[Recovered], bool]:
+    """What a journal holds, analysis by analysis, and whether its end was torn."""
     records, _, torn = read_journal(path)
-    rows: dict[str, tuple[str, str, int, int]] = {}
+    found: dict[str, Recovered] = {}
     for record in records:
         name = str(record.said.get("name", ""))
         if record.kind == "points":
-            _, _, points, events = rows.get(name, (name, "", 0, 0)) if record.said["from"] else (name, "", 0, 0)
-            points += len(record.said["omega"])
-            rows[name] = (name, "begun", points, events + len(record.said["bifurcations"]))
+            if not record.said["from"]:
+                found[name] = Recovered(name)
+            item = found.setdefault(name, Recovered(name))
+            item.points += len(record.said["omega"])
+            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.said["bifurcations"]]
+            item.bifurcations = len(item.events)
         elif record.kind == "analysis":
             sizes = record.dataset.sizes
-            rows[name] = (name, "finished", int(sizes.get("point", sizes.get("row", 0))), int(sizes.get("event", 0)))
-    return list(rows.values()), torn
+            count = int(sizes.get("point", sizes.get("row", 0)))
+            found[name] = Recovered(name, "finished", count, int(sizes.get("event", 0)))
+    return list(found.values()), torn
