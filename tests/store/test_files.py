@@ -74,6 +74,7 @@ def test_a_branch_read_back_is_the_same(curve, saved):
     assert len(curve.events) >= 1
     again = so.load(saved)
     branches_equal(curve, again)
+    assert again.seconds == curve.seconds > 0.0
     assert repr(curve) == repr(again)
     xr.testing.assert_identical(curve.to_xarray(), again.to_xarray())
 

@@ -50,6 +50,8 @@ class Branch:
         Whether the curve closed on itself, and a sentence saying why it ended.
     options
         Everything it was computed with.
+    seconds
+        How long that took; nan where nobody measured.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Branch:
         self.options = dict(options)
         self.warnings = warnings
         self.audit = audit or Audit()
+        self.seconds = float("nan")
 
     def __len__(self) -> int:
         return len(self.points)

@@ -37,6 +37,14 @@ if TYPE_CHECKING:
 __all__ = ["branch_from_dataset", "branch_to_dataset"]
 
 _CLASSES = {c.__name__: c for c in (Audit, Unsettled, GrazingContact, AdaptiveHarmonics, FloquetResult)}
+_MEANINGS = {
+    "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
+    "event_coefficients": "the same of the motions at events",
+    "arclength": "distance along the branch in scaled arclength",
+    "iterations": "Newton iterations",
+    "multiplier_errors": "estimated errors of the multipliers",
+    "record": "system, options, warnings, audit and what motions share, as JSON",
+}
 _PLACES = {"bifurcations": 0, "events": 1}
 
 
@@ -72,6 +80,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "closed": bool(branch.closed),
         "ended": branch.ended,
         "observe": int(branch.observe),
+        "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
         "tables": writer.tables(),
     }
@@ -82,7 +91,11 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
     result = dataset.drop_vars(clash)
     result.attrs.pop("warnings", None)  # attributes of a file are short; `record` has them
     result = xarray.Dataset(result.variables).set_coords(list(result.coords)).assign_attrs(result.attrs)
-    return _flat(result.assign(new))
+    result = _flat(result.assign(new))
+    for name, meaning in _MEANINGS.items():
+        if name in result:
+            result[name].attrs["long_name"] = meaning
+    return result.assign_attrs({"seconds": float(branch.seconds)} if branch.seconds == branch.seconds else {})
 
 
 def branch_from_dataset(dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None) -> Branch:
@@ -289,7 +302,7 @@ class _Reader:
         for (place, index), event in zip(record["event_list"], events, strict=True):
             lists[place][index] = event
         bifurcations, own = ([found[i] for i in range(len(found))] for found in lists)
-        return Branch(
+        branch = Branch(
             self.system,
             record["name"],
             points,
@@ -302,6 +315,8 @@ class _Reader:
             record["warnings"],
             record["audit"],
         )
+        branch.seconds = record["seconds"]
+        return branch
 
     def _points(self) -> list[BranchPoint]:
         names = [str(name) for name in self.array("parameter")]

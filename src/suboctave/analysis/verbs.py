@@ -11,7 +11,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, check_system, is_number, make_settings
 from suboctave.analysis.follow import Settings, Trace, follow
-from suboctave.analysis.progress import reporting
+from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.verdicts import with_verdicts
@@ -34,6 +34,7 @@ _DENSE_UNKNOWNS = 8000
 Harmonics = int | str | AdaptiveHarmonics
 
 
+@timed
 def frequency_response(
     system: System,
     omega: tuple[float, float],
@@ -107,6 +108,7 @@ def frequency_response(
     return _branch(system, "omega", trace, settings, options)
 
 
+@timed
 def continue_branch(
     start: System | PeriodicOrbit | BranchPoint | Bifurcation,
     parameter: str,
