@@ -94,7 +94,7 @@ def test_saved_twice_is_the_same(curve, saved, tmp_path):
     branches_equal(curve, so.load(again))
 
 
-@pytest.mark.parametrize("parameter", ["arclength", "amplitude", "coefficients", "record"])
+@pytest.mark.parametrize("parameter", ["arclength", "amplitude"])
 def test_a_parameter_may_have_a_name_of_the_layout(parameter, tmp_path):
     system = so.System(1.0, 0.1, 1.0, so.CubicSpring(0, "c"), so.HarmonicLoad(0, parameter), {parameter: 0.3, "c": 1.0})
     branch = so.continue_branch(system, parameter, (0.3, 0.4), omega=1.2, max_step=0.3)
@@ -211,12 +211,13 @@ def test_a_file_cut_short_is_named(saved, tmp_path, share):
     assert "run the study again" in refused(path)
 
 
-def test_flipped_bits_never_give_another_branch(curve, saved, tmp_path):
+@pytest.mark.parametrize("count", [12, pytest.param(400, marks=pytest.mark.slow)])
+def test_flipped_bits_never_give_another_branch(curve, saved, tmp_path, count):
     whole = saved.read_bytes()
     rng = np.random.default_rng(11)
     path = tmp_path / "flipped.nc"
     noticed = 0
-    for _ in range(40):
+    for _ in range(count):
         damaged = bytearray(whole)
         damaged[int(rng.integers(8, len(whole)))] ^= 1 << int(rng.integers(8))
         path.write_bytes(damaged)
@@ -226,4 +227,4 @@ def test_flipped_bits_never_give_another_branch(curve, saved, tmp_path):
             noticed += 1
         else:  # a byte that nothing rests on
             assert read.omega.tobytes() == curve.omega.tobytes()
-    assert noticed > 10
+    assert noticed > count // 4

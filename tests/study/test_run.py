@@ -351,6 +351,7 @@ def test_the_tongue_of_the_mathieu_oscillator(tmp_path, suboctave):
     assert len(tip) == 2
 
 
+@pytest.mark.slow
 def test_the_detached_branch_of_the_absorber(tmp_path, suboctave):
     path = tmp_path / "mine.toml"
     suboctave("new", path, "--example", "nltva")

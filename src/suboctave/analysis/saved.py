@@ -8,7 +8,7 @@ per point nor per event is JSON in the variable `record`. docs/results.md descri
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +57,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
 
     writer = _Writer()
     dataset = branch_dataset(branch)
-    new: dict[str, tuple[tuple[str, ...], Any]] = {
+    new: dict[str, Any] = {
         "arclength": (("point",), branch.arclength),
         "iterations": (("point",), np.array([p.iterations for p in branch.points], dtype=int)),
     }
@@ -87,15 +87,15 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
     new["record"] = ((), np.array(to_json(record), dtype=object))
     for name, array in writer.arrays.items():
         new[name] = (tuple(f"{name}_{axis}" for axis in range(array.ndim)), array)
-    clash = [name for name in dataset.coords if name in new]  # a parameter of that name is in `parameters` all the same
-    result = dataset.drop_vars(clash)
-    result.attrs.pop("warnings", None)  # attributes of a file are short; `record` has them
-    result = xarray.Dataset(result.variables).set_coords(list(result.coords)).assign_attrs(result.attrs)
-    result = _flat(result.assign(new))
     for name, meaning in _MEANINGS.items():
-        if name in result:
-            result[name].attrs["long_name"] = meaning
-    return result.assign_attrs({"seconds": float(branch.seconds)} if branch.seconds == branch.seconds else {})
+        new[name] = (*new[name][:2], {"long_name": meaning})
+    # a parameter that bears the name of a variable is in `parameters` all the same
+    coords = [name for name in dataset.coords if name not in new]
+    variables = {name: (v.dims, v.values, v.attrs) for name, v in dataset.variables.items() if name not in new} | new
+    attributes = {name: value for name, value in dataset.attrs.items() if name != "warnings"}  # they are in `record`
+    if branch.seconds == branch.seconds:
+        attributes["seconds"] = float(branch.seconds)
+    return xarray.Dataset(dict(_flat(variables)), attrs=attributes).set_coords(coords)
 
 
 def branch_from_dataset(dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None) -> Branch:
@@ -144,16 +144,15 @@ def _padded(rows: Sequence[Any], kind: type) -> np.ndarray:
     return table
 
 
-def _flat(dataset: xarray.Dataset) -> xarray.Dataset:
+def _flat(variables: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
     """Complex variables as pairs of real ones, texts as texts whatever their number."""
-    for name, variable in list(dataset.variables.items()):
-        array = np.asarray(variable.values)
+    for name, (dims, values, *attributes) in variables.items():
+        array = np.asarray(values)
         if array.dtype.kind == "c":
-            pair = {f"{name}_{part}": (variable.dims, getattr(array, part), variable.attrs) for part in _PARTS}
-            dataset = dataset.drop_vars([name]).assign(pair)
-        elif array.dtype.kind == "O":
-            dataset = dataset.assign({name: (variable.dims, array.astype(str), variable.attrs)})
-    return dataset
+            for part in _PARTS:
+                yield f"{name}_{part}", (dims, getattr(array, part), *attributes)
+        else:
+            yield str(name), (dims, array.astype(str) if array.dtype.kind == "O" else array, *attributes)
 
 
 _PARTS = ("real", "imag")
