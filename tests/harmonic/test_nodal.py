@@ -153,6 +153,17 @@ def test_a_law_that_cannot_be_sampled_is_no_false_result():
         state_of(Hidden(0), wave(5, c1=0.7, s3=0.123))
 
 
+def test_corners_are_integrated_as_exactly_as_contacts():
+    """The same stop as a text and as an element in closed form: force and Jacobian to rounding."""
+    x = wave(7, c0=0.1, c1=0.8, s2=0.3, c5=0.1)
+    told, exact = (
+        state_of(element, x) for element in (so.Expression(0, "4.7*max(x - 0.2, 0)"), so.ElasticStop(0, 4.7, 0.2))
+    )
+    np.testing.assert_allclose(told.force, exact.force, atol=1e-12)
+    np.testing.assert_allclose(told.jacobian, exact.jacobian, atol=1e-11)
+    np.testing.assert_allclose(told.half_jacobian, exact.half_jacobian, atol=1e-11)
+
+
 def test_rest_is_no_trouble():
     for element in (so.QuadraticDamper(0, 1.0), so.TanhFriction(0, 1.0, 0.1), so.Expression(0, "max(x - 1, 0)*v")):
         state = state_of(element, np.zeros((7, 1)))

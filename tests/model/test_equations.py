@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,23 @@ def test_everything_at_once_against_the_text_in_numbers():
     first -= 1.5 * np.sin(theta)
     second -= 1.5 * np.cos(theta) ** 2 + 3
     np.testing.assert_allclose(total, [first, second], atol=1e-12)
+
+
+def test_the_modulus_of_a_displacement_is_a_stop_and_a_spring():
+    system = make("x'' + 0.1*x' + k*abs(x - a) + c*abs(x')*x' = cos(omega*t)", {"k": 2.0, "a": 0.3, "c": 0.2})
+    assert sorted(type(e).__name__ for e in system.elements) == ["ElasticStop", "Expression"]
+    (x,), (v,), theta, total = forces(system)
+    expected = 0.1 * v + 2.0 * np.abs(x - 0.3) + 0.2 * np.abs(v) * v - np.cos(theta)
+    np.testing.assert_allclose(total[0], expected, atol=1e-13)
+
+
+def test_names_of_the_degrees_of_freedom_last():
+    system = make(["x'' + k*(x - y) = 0", "y'' + k*(y - x) + y**3 = cos(omega*t)"], {"k": 2.0})
+    for copy in (pickle.loads(pickle.dumps(system)), system.with_parameters(k=3.0)):
+        assert copy.dof_names == ("x", "y")
+    assert "2 degrees of freedom (x, y)" in repr(system)
+    with pytest.raises(InputError, match="different names"):
+        so.System(1.0, 0.1, 1.0, loads=[so.HarmonicLoad(0, 1.0)], dof_names=("x", "y"))
 
 
 def test_equations_in_any_order_and_names_in_order_of_appearance():

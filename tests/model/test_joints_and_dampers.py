@@ -160,3 +160,9 @@ def test_a_law_with_corners_must_have_nodes_of_its_own():
 
     with pytest.raises(InputError, match="own_nodes = True"):
         system_with(Careless(0, 1.0))
+
+    class Needless(so.ElasticStop):
+        own_nodes = True
+
+    with pytest.raises(InputError, match="own_nodes must be False"):
+        system_with(Needless(0, 1.0, 1.0))

@@ -18,6 +18,15 @@ SYSTEMS = {
         (0.7, 1.4),
         (1.0, 1.25),
     ),
+    "contact after Hertz, one-way damper": (
+        lambda: so.System(
+            1.0, 0.05, 1.0,
+            elements=[so.Expression(0, "5*max(x - 0.3, 0)**1.5*(1 + 0.5*v)"), so.Expression(0, "0.1*max(-v, 0)")],
+            loads=[so.HarmonicLoad(0, 0.5)],
+        ),
+        (0.9, 1.5),
+        (1.2, 1.4),
+    ),
     "two DOFs, not symmetric, parametric": (
         lambda: so.System.from_equations(
             [

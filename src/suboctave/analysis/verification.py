@@ -14,6 +14,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.coupled import reads
 from suboctave.stability import FloquetResult, StabilityMethod, method_of
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 
@@ -140,7 +141,7 @@ def _missed(what: Bifurcation, solution: PeriodicSolution) -> float:
     system, contact = what.orbit.system, what.contact
     path = integrate(system, solution.state, (0.0, solution.period), solution.omega)
     window = 0.5 * solution.period / (what.orbit.basis.harmonics + 1)
-    direction = system.elements[contact.element].direction(system.n)
+    direction = reads(system.elements[contact.element], system.n)
     grid, centre = np.linspace(-1.0, 1.0, 201), contact.time
     for _ in range(3):  # the window closes on the extremum
         u = path.at(np.mod(centre + window * grid, solution.period))[0] @ direction

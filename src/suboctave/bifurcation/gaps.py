@@ -16,7 +16,9 @@ from suboctave.harmonic.local_force import LocalMotion
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.state import BalanceState
-from suboctave.model.sampling import PiecewiseLinear, Sampling, SharpSampling
+from suboctave.model.coupled import CoupledElement, as_coupled, reads
+from suboctave.model.element import BaseElement
+from suboctave.model.sampling import CornerSampling, PiecewiseLinear, Sampling, SharpSampling
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,12 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
                     grid = search_grid(motion.shape[0] - 1)
                     turns = extrema(motion, grid.zr, grid.zi)
                 found.append(GapExtrema(i, index, level, *turns))
+    for nodal in state.nodal:
+        places = _levels(nodal.kind, nodal.c)
+        if places:
+            grid = search_grid(nodal.motions[0].shape[0] - 1)
+            turns = extrema(nodal.motions[0], grid.zr, grid.zi)
+            found += [GapExtrema(nodal.own.index, index, level, *turns) for index, level in enumerate(places)]
     return tuple(found)
 
 
@@ -58,14 +66,14 @@ def levels(local: LocalMotion) -> tuple[float, ...]:
 def _levels(kind: Sampling, coefficients: Array) -> tuple[float, ...]:
     if isinstance(kind, PiecewiseLinear):
         return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
-    return kind.points if isinstance(kind, SharpSampling) else ()
+    return kind.points if isinstance(kind, SharpSampling | CornerSampling) else ()
 
 
 def level_rate(state: BalanceState, element: int, index: int, name: str) -> float:
     """Derivative of a gap by "omega" or a parameter."""
     if name == "omega":
         return 0.0
-    local = state.local_motions[element]
+    local = state.local(element)
     rates = coefficient_rates(local.element, state.values, {name: 1.0})
     if not rates.any():
         return 0.0
@@ -74,7 +82,7 @@ def level_rate(state: BalanceState, element: int, index: int, name: str) -> floa
         return float(rates[kind.pieces[index].gap])
     # what a sharp law tells of itself is the point alone: by differences, which are exact where a gap is a coefficient
     ends = [local.element.sampling(local.coefficients + s * rates) for s in (-1e-3, 1e-3)]
-    points = [end.points[index] for end in ends if isinstance(end, SharpSampling)]
+    points = [end.points[index] for end in ends if isinstance(end, SharpSampling | CornerSampling)]
     return 500.0 * (points[1] - points[0]) if len(points) == 2 else 0.0
 
 
@@ -84,5 +92,26 @@ def contact_side(local: LocalMotion, index: int) -> int:
     if isinstance(kind, PiecewiseLinear):
         piece = kind.pieces[index]
         return piece.side if local.coefficients[piece.stiffness] >= 0.0 else -piece.side
+    if isinstance(kind, CornerSampling):
+        return _stiffer_side(local, levels(local)[index])
     point = np.array([levels(local)[index]])
     return -1 if float(local.element.curvature(point, np.zeros(1), local.coefficients)[0][0]) < 0.0 else 1
+
+
+def _stiffer_side(local: LocalMotion, level: float) -> int:
+    """The side of a corner on which the force is stiffer, all other states at rest."""
+    law = as_coupled(local.element)
+    near = 1e-3 * (float(np.abs(local.motion).max()) or 1.0)
+    q = np.zeros((2 * law.count if local.element.depends_on_velocity else law.count, 2))
+    q[0] = level - near, level + near
+    below, above = law.tangent(q, np.zeros(2), local.coefficients)[1][0]
+    return -1 if _along(local.element) * (above - below) < 0.0 else 1
+
+
+def _along(element: BaseElement) -> float:
+    """Whether an element acts along the displacement that it reads, or against it."""
+    if not isinstance(element, CoupledElement):
+        return 1.0
+    places = (element.place, *element.input_places)
+    n = max(len(place.vector) if place.vector is not None else 1 + max(place.dofs) for place in places)
+    return float(element.direction(n) @ reads(element, n)) or 1.0

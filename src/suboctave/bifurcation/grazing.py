@@ -37,6 +37,7 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.grazing_instants import passages
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
+from suboctave.model.coupled import reads
 
 #: halvings of a step after which a grazing is left with its bracket
 _BISECTIONS = 30
@@ -89,7 +90,7 @@ class Touch(BifurcationKind):
         """What grazes."""
         assert isinstance(found, Grazing)
         state = found.state
-        local = state.local_motions[self.element]
+        local = state.local(self.element)
         side = contact_side(local, self.index)
         verb = "touch" if self.maximum == (side > 0) else "lift off"
         # a touching extremum is in contact afterwards if it begins, a lifting one is not
@@ -113,7 +114,7 @@ class Touch(BifurcationKind):
         """
         start = guess.state()
         tau = np.array([self._nearest(start)])
-        direction = start.linear.retain(start.balance.elements[self.element].direction(start.balance.system.n))
+        direction = _direction(start, self.element)
         high = start.basis.harmonics
         column = np.zeros(start.balance.dimension)
 
@@ -121,7 +122,7 @@ class Touch(BifurcationKind):
             rows = _rows(high, float(extra[0]))
             u = state.x @ direction
             value, slope, curve = (float(row @ u) for row in rows)
-            level = levels(state.local_motions[self.element])[self.index]
+            level = levels(state.local(self.element))[self.index]
             rate = level_rate(state, self.element, self.index, guess.name)
             size = float(np.linalg.norm(u))
             gradients = [np.multiply.outer(row, direction).ravel() for row in rows[:2]]
@@ -141,7 +142,7 @@ class Touch(BifurcationKind):
         """Gradient of the extremum's height over the gap by coefficients and free parameter, shape (dimension + 1,)."""
         state = found.state
         value = _rows(state.basis.harmonics, found.tau)[0]
-        direction = state.linear.retain(state.balance.elements[self.element].direction(state.balance.system.n))
+        direction = _direction(state, self.element)
         return np.append(np.multiply.outer(value, direction), -level_rate(state, self.element, self.index, name))
 
     def _nearest(self, state: BalanceState) -> float:
@@ -152,6 +153,12 @@ class Touch(BifurcationKind):
                 if candidates.size:
                     return float(candidates[np.argmin(1.0 - np.cos(candidates - self.tau))])
         raise ConvergenceError("the motion has no extremum here")
+
+
+def _direction(state: BalanceState, element: int) -> Array:
+    """The displacement that an element's gaps are places of, in the unknown DOFs."""
+    system = state.balance.system
+    return state.linear.retain(reads(system.elements[element], system.n))
 
 
 def _rows(high: int, tau: float) -> tuple[Array, Array, Array]:

@@ -184,7 +184,7 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
     """Grazings of exact contacts beside a motion, with the way there; `young`: only of contacts that are, and young."""
     mass = state.linear.equation_of_motion()[0]
     for gap in gap_extrema(state):
-        local = state.local_motions[gap.element]
+        local = state.local(gap.element)
         kind = local.kind
         if not isinstance(kind, PiecewiseLinear):
             continue

@@ -15,13 +15,13 @@ Piecewise-linear laws are integrated in closed form over the contact intervals: 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import Nodes, nodes_for, sampled_spectra, search_grid
-from suboctave.model.element import Element
 from suboctave.model.sampling import Piece, PiecewiseLinear, Sampling
 
 _NONE = np.zeros(0, dtype=complex)
@@ -65,7 +65,7 @@ class LocalMotion:
     numbers.
     """
 
-    element: Element
+    element: Any
     motion: ComplexArray
     rate: float
     coefficients: Array

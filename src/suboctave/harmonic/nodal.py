@@ -139,11 +139,13 @@ class NodalForce:
             return graded_nodes(velocity, np.array(kind.velocities), np.array(kind.widths), self.top)
         if isinstance(kind, SharpSampling):
             return graded_nodes(motion, np.array(kind.points), np.array(kind.widths), self.top)
-        count = max(self.samples or FEWEST, 1 << math.ceil(math.log2(2 * self.top + 2 + 2 * varying)))
+        fewest = 1 << math.ceil(math.log2(2 * self.top + 2 + 2 * varying))
+        count = max(self.samples or FEWEST, fewest)
         corners = self.corners
         if not len(corners):
             return uniform_nodes(count)
-        return _between(corners, 2.0 * math.pi * _ORDER / count)
+        # twice as many nodes are so between all corners: else those of one interval might seem to have settled
+        return _between(corners, 2.0 * math.pi * _ORDER / fewest, count // fewest)
 
     @lazy
     def _corner_rows(self) -> list[tuple[int, float, Array]]:
@@ -311,13 +313,13 @@ class NodalForce:
         )
 
 
-def _between(corners: Array, longest: float) -> Nodes:
-    """Gauss-Legendre panels of at most `longest` between neighbouring corners.
+def _between(corners: Array, longest: float, parts: int) -> Nodes:
+    """Gauss-Legendre panels between neighbouring corners, `parts` for every one that is no longer than `longest`.
 
     Next to a corner instants run like the square of the variable, in which powers of one half are analytic too.
     """
     gaps = np.append(np.diff(corners), corners[0] + 2.0 * math.pi - corners[-1])
-    pieces = np.maximum(2, np.ceil(gaps / longest)).astype(np.int64)
+    pieces = parts * np.maximum(2, np.ceil(gaps / longest)).astype(np.int64)
     first = np.cumsum(pieces) - pieces
     whole = np.repeat(gaps / pieces, pieces)
     number = np.arange(len(whole)) - np.repeat(first, pieces)

@@ -78,6 +78,14 @@ class BalanceState:
             for i, element in enumerate(balance.elements)
         ]
 
+    def local(self, index: int) -> LocalMotion:
+        """The relative displacement of one of the system's elements (the first input, where it has several)."""
+        if index < len(self.balance.elements):
+            return self.local_motions[index]
+        nodal = next(nodal for nodal in self.nodal if nodal.own.index == index)
+        element, top = nodal.own.element, self.balance.top
+        return LocalMotion(element, nodal.motions[0], self.rate, nodal.c, top, nodal.samples, nodal.kind)
+
     @lazy
     def nodal(self) -> list[NodalForce]:
         """The elements with nodes of their own, along the motion."""

@@ -19,7 +19,7 @@ from suboctave.errors import InputError
 from suboctave.model.element import Array, BaseElement, Dof, Element, Place
 from suboctave.model.expression import Coefficient
 
-__all__ = ["CoupledElement", "as_coupled"]
+__all__ = ["CoupledElement", "as_coupled", "reads"]
 
 
 class CoupledElement(BaseElement):
@@ -45,6 +45,7 @@ class CoupledElement(BaseElement):
         super().__init__(dof, coefficients, direction=direction)
         if not len(inputs):
             raise InputError(f"{self.label} needs inputs: the displacements that its force depends on")
+        self.count = len(inputs)
         self.input_places = tuple(_input_place(self.label, given) for given in inputs)
 
     def inputs(self, n: int) -> Array:
@@ -86,28 +87,34 @@ class _OneInput:
 
     def __init__(self, element: Element) -> None:
         self.element = element
-        self.count = 2 if element.depends_on_velocity else 1
+        self.count = 1
+        self._moving = element.depends_on_velocity
 
     def inputs(self, n: int) -> Array:
         return self.element.direction(n)[None]
 
     def _state(self, q: Array) -> tuple[Array, Array]:
-        return q[0], q[1] if self.count == 2 else np.zeros_like(q[0])
+        return q[0], q[1] if self._moving else np.zeros_like(q[0])
 
     def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         f, *rest = self.element.tangent(*self._state(q), c)
-        return f, np.array(rest[: self.count])
+        return f, np.array(rest[: 1 + self._moving])
 
     def curvature(self, q: Array, theta: Array, c: Array) -> Array:
         f_uu, f_uv, f_vv = self.element.curvature(*self._state(q), c)
-        return np.array([[f_uu]]) if self.count == 1 else np.array([[f_uu, f_uv], [f_uv, f_vv]])
+        return np.array([[f_uu, f_uv], [f_uv, f_vv]]) if self._moving else np.array([[f_uu]])
 
     def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         f_c, *rest = self.element.coefficient_tangent(*self._state(q), c)
-        return f_c, np.stack([np.asarray(part) for part in rest[: self.count]], axis=1)
+        return f_c, np.stack([np.asarray(part) for part in rest[: 1 + self._moving]], axis=1)
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         return self.element.coefficient_curvature(*self._state(q), c)
+
+
+def reads(element: BaseElement, n: int) -> Array:
+    """The direction (n,) of the displacement that an element's gaps and corners are places of."""
+    return element.inputs(n)[0] if isinstance(element, CoupledElement) else element.direction(n)
 
 
 def as_coupled(element: BaseElement) -> CoupledElement | _OneInput:

@@ -163,24 +163,32 @@ class Forces:
         return Expression(expression=as_text(law), inputs={name: read}, **self._place(acting))
 
     def _coupled(self, taken: set[str]) -> list[BaseElement]:
-        """Forces that depend on several displacements: one element per equation, and one per force with corners."""
-        made: list[BaseElement] = []
-        smooth: dict[int, Any] = {}
+        """Forces that depend on several displacements, along the direction in which each acts."""
+        cores: dict[Any, np.ndarray] = {}
         for i, term in self.several:
-            if self._has_corner(term):
-                made.append(self._with_corner(i, term, taken))
+            factor, core = term.as_coeff_Mul()
+            cores.setdefault(core, np.zeros(self.n))[i] += float(factor)
+        made: list[BaseElement] = []
+        smooth: dict[tuple[float, ...], Any] = {}
+        for core, places in cores.items():
+            if not np.any(places):
+                continue  # terms that cancel
+            scale = places[np.flatnonzero(places)[0]]
+            acting, law = tuple(float(place) for place in places / scale), core * _number(scale)
+            if self._has_corner(law):
+                made.append(self._with_corner(acting, law, taken))
             else:
-                smooth[i] = smooth.get(i, 0) + term
-        for i, law in smooth.items():
-            if law == 0:
-                continue
-            made.append(Expression(i, as_text(law), inputs={self.names[j]: j for j in self._inside(law)}))
+                smooth[acting] = smooth.get(acting, 0) + law
+        for acting, law in smooth.items():
+            if law != 0:
+                inputs = {self.names[j]: j for j in self._inside(law)}
+                made.append(Expression(expression=as_text(law), inputs=inputs, **self._place(acting)))
         return made
 
     def _inside(self, law: Any) -> list[int]:
         return [j for j in range(self.n) if law.free_symbols & {self.x[j], self.v[j]}]
 
-    def _with_corner(self, i: int, law: Any, taken: set[str]) -> BaseElement:
+    def _with_corner(self, acting: tuple[float, ...], law: Any, taken: set[str]) -> BaseElement:
         """The displacement that the corner depends on is made the first input, a combination of several if need be."""
         corner = corner_functions()
         arguments = {a.args[0] for a in law.atoms(corner.Ramp, corner.Step, corner.Modulus, corner.Sign)}
@@ -191,14 +199,14 @@ class Forces:
             slopes = [argument.diff(self.x[j]) for j in inside]
             rates = [argument.diff(self.v[j]) for j in inside]
             if any(rates) and any(slopes):
-                return Expression(i, as_text(law), inputs=plain)
+                return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
             used = slopes if any(slopes) else rates
             if not all(slope.is_number for slope in used) or not any(used):
-                return Expression(i, as_text(law), inputs=plain)
+                return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
             first = next(slope for slope in used if slope)
             forms.add(tuple(float(slope / first) for slope in used))
         if len(forms) != 1:
-            return Expression(i, as_text(law), inputs=plain)
+            return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
         form = forms.pop()
         lead = next(k for k, entry in enumerate(form) if entry)
         name = _fresh("u", taken)
@@ -214,7 +222,8 @@ class Forces:
         inputs: dict[str, Any] = {name: next(iter(self._place(tuple(direction)).values()))}
         inputs |= {self.names[j]: j for k, j in enumerate(inside) if k != lead}
         left = {state.name.rstrip(PRIME) for state in changed.free_symbols}
-        return Expression(i, as_text(changed), inputs={n: p for n, p in inputs.items() if n in left or n == name})
+        inputs = {n: p for n, p in inputs.items() if n in left or n == name}
+        return Expression(expression=as_text(changed), inputs=inputs, **self._place(acting))
 
 
 def _fresh(name: str, taken: set[str]) -> str:

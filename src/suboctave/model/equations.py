@@ -172,7 +172,12 @@ class _Equations:
             self._load(i, term)
             return
         if not self._affine(term):
-            self.forces.add(i, term)
+            straight = self._without_modulus(term)
+            for part in (term,) if straight is None else straight:
+                if self._affine(part):
+                    self._sort(i, part)
+                else:
+                    self.forces.add(i, part)
             return
         varying = 0
         for state in inside:
@@ -192,6 +197,18 @@ class _Equations:
         rest = term.xreplace(dict.fromkeys(inside, 0 * self.t))
         if rest != 0:
             self._load(i, rest)
+
+    def _without_modulus(self, term: Any) -> tuple[Any, Any] | None:
+        """`k |a|` as `2 k max(a, 0) - k a` where `a` is linear in the displacements: a stop and a spring."""
+        corner = corner_functions()
+        atoms = [atom for atom in term.atoms(corner.Modulus) if atom.free_symbols & self.states]
+        if len(atoms) != 1:
+            return None
+        argument = atoms[0].args[0]
+        factor = term / atoms[0]
+        if factor.free_symbols & {*self.states, self.t} or argument.free_symbols & {*self.v, self.t}:
+            return None
+        return (2 * factor * corner.Ramp(argument), -factor * argument) if self._affine(argument) else None
 
     # -------------------------------------------------------------------------------------------------------- loads
     def _load(self, i: int, term: Any, reduced: bool = False) -> None:

@@ -54,6 +54,11 @@ class Expression(CoupledElement):
                 raise InputError(f"Expression: {name!r} cannot name a displacement")
         self._short = inputs is None
         self.states = tuple(places)
+        first = self._law.corner_input
+        if first:  # what has the corners comes first
+            self.states = (self.states[first], *self.states[:first], *self.states[first + 1 :])
+            del self._law
+        places = {name: places[name] for name in self.states}
         law = self._law
         self.coefficient_names = law.coefficients
         self.depends_on_velocity = law.depends_on_velocity

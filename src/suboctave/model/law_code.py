@@ -45,6 +45,8 @@ class Law:
     ----------
     coefficients
         Names that are neither states nor time, sorted.
+    corner_input
+        Which of the displacements has the corners; they are known as such if it is the first.
     depends_on_velocity, time_harmonic
         Whether a velocity occurs; the highest multiple of the load's frequency, 0 without time.
     """
@@ -67,7 +69,11 @@ class Law:
             raise InputError(f"{where}: more than {_OPERATIONS} operations; split it into several elements")
         self.c: list[Any] = sorted(self.expression.free_symbols - taken, key=str)
         self.coefficients = tuple(found.name for found in self.c)
+        self.corner_input = 0
         self._degree, self._corner_places = self._smoothness()
+        corner = corner_functions()
+        powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
+        self._rough = any(power.base.has(corner.Ramp, corner.Modulus, corner.Step) for power in powers)
 
     # ------------------------------------------------------------------------------------------------ smoothness
     def _smoothness(self) -> tuple[int | None, list[tuple[int, Any]] | None]:
@@ -84,11 +90,15 @@ class Law:
         for argument in sorted({atom.args[0] for atom in atoms}, key=str):
             place = self._place(argument)
             self._check_continuous(argument, place)
-            if place is None or place[0] not in (0, self.count) or places is None:
+            if place is None or places is None:
                 places = None
             else:
                 places.append(place)
-        return None, places
+        inputs = {row % self.count for row, _ in places or ()}
+        if places is None or len(inputs) > 1:
+            return None, None
+        self.corner_input = inputs.pop()
+        return None, places if self.corner_input == 0 else None
 
     def _place(self, argument: Any) -> tuple[int, Any] | None:
         """Row of q and its value at which an argument vanishes, if it depends on that one alone, and linearly."""
@@ -160,7 +170,7 @@ class Law:
         rows = [row for row, _ in self._corner_places]
         points = sorted({float(v) for row, v in zip(rows, values, strict=True) if row == 0})
         velocities = sorted({float(v) for row, v in zip(rows, values, strict=True) if row})
-        return CornerSampling(tuple(points), tuple(velocities))
+        return CornerSampling(tuple(points), tuple(velocities), self._rough)
 
     # ------------------------------------------------------------------------------------------------ derivatives
     @functools.cached_property

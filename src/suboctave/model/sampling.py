@@ -92,11 +92,12 @@ class CornerSampling:
 
     Only its derivatives may jump there. It is integrated between the instants at which a motion reaches these places,
     with as many nodes as force and tangent need to settle. For elements with `own_nodes`; of a coupled element, the
-    places are those of its first input.
+    places are those of its first input. `rough`: powers of a half begin at a corner (contact after Hertz).
     """
 
     points: tuple[float, ...] = ()
     velocities: tuple[float, ...] = ()
+    rough: bool = False
 
 
 @dataclass(frozen=True)

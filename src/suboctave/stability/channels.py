@@ -23,6 +23,8 @@ from suboctave.stability.nodes import NODES, ORDER
 _BLIND, _TANGENT = 48.0, 7.0
 #: width of the slices that are cut out around corners, in units of the motion
 _SLICE = 1e-9
+#: how close to a corner where powers of a half begin panels are graded, in units of the motion
+_ROUGH = 1e-6
 _NONE, _NO_PIECES = np.zeros(0), np.zeros((0, 3))
 
 
@@ -53,9 +55,10 @@ class Channels:
         self.degree, self.finest, self.blind = 0, math.inf, False
         self._elements: list[tuple[NodalForce, int, Array]] = []
         self._tangents: list[Array] = []
-        #: channels with marks of corners, by the first channel of their element; panels between marks, by channel
+        #: channels with marks of corners, by the first channel of their element; first and last panel between marks,
+        #: by channel
         self._sliced: dict[int, list[tuple[int, int]]] = {}
-        self._slices: dict[int, list[int]] = {}
+        self._slices: dict[int, list[tuple[int, int]]] = {}
         for nodal in state.nodal:
             self._add(nodal)
         self._clock = -1
@@ -86,14 +89,16 @@ class Channels:
             if len(d) == 1:
                 # one unknown DOF: channels have one direction there
                 scale[i], left = own.out[0] / d[0], d
-            self._channel(motion, left, d, _marks(corners.points if i == 0 else (), motion))
+            points = corners.points if i == 0 else ()
+            self._channel(motion, left, d, _marks(points, motion), _grading(corners, points, motion))
             if i == 0 and corners.points:
                 self._sliced.setdefault(self.first + begin, []).append((self.first + begin, 0))
         self.forces[begin] = scale[0] * nodal.force
         self._elements.append((nodal, self.first + begin, scale))
         velocity = 1j * nodal.rate * np.arange(len(nodal.motions[0])) * nodal.motions[0]
         if corners.velocities and velocity.any():
-            probe = self._channel(velocity, None, None, _marks(corners.velocities, velocity))
+            marks, grading = _marks(corners.velocities, velocity), _grading(corners, corners.velocities, velocity)
+            probe = self._channel(velocity, None, None, marks, grading)
             self._sliced.setdefault(self.first + begin, []).append((probe, 1))
         if isinstance(kind, SharpVelocitySampling) and velocity.any():
             self._channel(velocity, None, None, singular=(np.array(kind.velocities), np.array(kind.widths)))
@@ -136,23 +141,22 @@ class Channels:
     def changed(self, path: Array, change: Array, law: Array, stretch: Array) -> None:
         """Add stiffness and damping along the path changed by `change` to `law` (G, 2, N).
 
-        Laws with corners are continued to first order from where they were, and for the time by which the motion
-        reaches a corner later the law before it stays: an impulse, put into the slice that was cut out there.
+        Of laws with corners every node keeps its side. For the time by which the motion reaches a corner later the law
+        before it stays: an impulse, put into the slice that was cut out there.
         """
         for (nodal, begin, scale), f_q in zip(self._elements, self._tangents, strict=True):
             q, theta = self._state(nodal, begin, path)
             rows = change[begin : begin + nodal.own.count]
             d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.own.moving else rows[:, 0]
-            if isinstance(nodal.kind, SharpVelocitySampling | CornerSampling):
+            if isinstance(nodal.kind, SharpVelocitySampling):
                 new = f_q + np.einsum("rsn,sn->rn", nodal.own.law.curvature(q, theta, nodal.c), d)
             else:
-                new = nodal.own.law.tangent(q + d, theta, nodal.c)[1]
+                new = nodal.own.law.tangent(_moved(nodal, q, d), theta, nodal.c)[1]
             self._put(nodal, begin, scale, new, law)
             for channel, order in self._sliced.get(begin, ()):
                 row = order * nodal.own.count
-                for p in self._slices.get(channel, ()):
-                    i = p * (ORDER - 1)
-                    j = i + ORDER - 1
+                for p, last in self._slices.get(channel, ()):
+                    i, j = p * (ORDER - 1), (last + 1) * (ORDER - 1)
                     # of the displacement, or of the velocity
                     slope = path[channel, 1, i] + (change[begin, 1, i] if order == 0 else 0.0)
                     jump = f_q[row, j] - f_q[row, i]
@@ -160,25 +164,51 @@ class Channels:
                         continue
                     later = -change[begin, order, i] / slope
                     length = 2.0 * stretch[p, 0] / nodal.rate
-                    law[begin, order, i : j + 1] -= scale[0] * 1.5 * jump * later / length * (1.0 - NODES**2)
+                    bump = 1.5 * scale[0] * jump * later / length * (1.0 - NODES**2)
+                    law[begin, order, i : i + ORDER] -= bump
 
-    def locate(self, events: Array, start: np.ndarray, counts: np.ndarray) -> None:
+    def locate(self, events: Array, start: np.ndarray, counts: np.ndarray, panels: int) -> None:
         """Find the slices around corners: panels between the two marks of one corner.
 
-        events, start: see `panels.lay_out`; counts: how many pieces every channel has.
+        events, start: see `panels.lay_out`; counts: how many pieces every channel has; panels: how many there are.
         """
+        if not self._sliced:
+            return
         owner = np.repeat(np.arange(len(counts)), counts)
         first = np.concatenate(([0], np.cumsum(counts)))
         pieces = events[:, 5].astype(int)
         for i, piece in enumerate(pieces):
             follow = (i + 1) % len(pieces)
+            if pieces[follow] < 0:  # a passage between the marks
+                follow = (follow + 1) % len(pieces)
             if piece < 0 or owner[piece] < self.first or pieces[follow] < 0 or follow == i:
                 continue
             channel = int(owner[piece])
             own, other = piece - first[channel], pieces[follow] - first[channel]
             apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
             if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
-                self._slices.setdefault(channel, []).append(int(start[i]))
+                last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
+                self._slices.setdefault(channel, []).append((int(start[i]), last))
+
+
+def _moved(nodal: NodalForce, q: Array, d: Array) -> Array:
+    """The states `q + d`, which stay on their sides of all corners."""
+    moved = q + d
+    kind = nodal.kind
+    if isinstance(kind, CornerSampling):
+        for row, levels in ((0, kind.points), (nodal.own.count, kind.velocities)):
+            for level in levels:
+                near = _SLICE * max(float(np.abs(q[row]).max()), np.finfo(float).tiny)
+                above = np.maximum(moved[row], level + near)
+                moved[row] = np.where(q[row] > level, above, np.minimum(moved[row], level - near))
+    return moved
+
+
+def _grading(corners: CornerSampling, levels: tuple[float, ...], motion: ComplexArray) -> tuple[Array, Array]:
+    """Where panels are graded towards corners, as towards a law that is sharp there."""
+    if not corners.rough or not levels:
+        return _NONE, _NONE
+    return np.array(levels, dtype=float), np.full(len(levels), _ROUGH * float(np.abs(motion).max()))
 
 
 def _marks(levels: tuple[float, ...], motion: ComplexArray) -> Array:

@@ -93,7 +93,7 @@ class Linearisation:
                     if f_v is not None:
                         self.law[g, 2] += f_v
                     self._asked.append((g, element, a, sharp, f_u, f_v))
-        own.locate(self._events, self._start, self._laws.counts[:, 0])
+        own.locate(self._events, self._start, self._laws.counts[:, 0], len(self.stretch))
         own.ask(self.path, self.law)
 
     def changed(self, change: Array) -> tuple[Array, Array]:
