@@ -44,7 +44,7 @@ def pack(dataset: xarray.Dataset) -> bytes:
             bodies.append(plain.tobytes())
         variables.append(entry)
     head["variables"] = variables
-    text = json.dumps(head, ensure_ascii=False, separators=(",", ":")).encode()
+    text = json.dumps(head, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "surrogatepass")
     return b"".join([len(text).to_bytes(8, "little"), text, *bodies])
 
 
@@ -54,7 +54,7 @@ def unpack(block: bytes) -> xarray.Dataset:
 
     try:
         end = 8 + int.from_bytes(block[:8], "little")
-        head = json.loads(block[8:end])
+        head = json.loads(block[8:end].decode("utf-8", "surrogatepass"))
         variables: dict[str, Any] = {}
         coordinates: dict[str, Any] = {}
         for entry in head["variables"]:

@@ -160,8 +160,8 @@ def _check(source: Path, name: str, dataset: xarray.Dataset) -> None:
         raise InputError(f"{part} has no digest: it was changed by another program; {_AGAIN}")
     try:
         found = digest(dataset)
-    except InputError as error:
-        raise InputError(f"{part} is damaged ({error}): {_AGAIN}") from None
+    except Exception as error:  # attributes and texts that no writer of ours has made
+        raise InputError(f"{part} is damaged ({_first_line(error)}): {_AGAIN}") from None
     if found != stated:
         raise InputError(f"{part} is damaged: its content is not what was written; {_AGAIN}")
 
