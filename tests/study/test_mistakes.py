@@ -152,6 +152,8 @@ ROWS = [
     ("figure twice", None, FIGURE + '[[outputs.figures]]\nfile = "a.png"\n', ["twice"], 'file = "a.png"'),
     ("results of another form", None, '\n[outputs]\nresults = "a.csv"\n', [".nc"], "results ="),
     ("outputs misspelt", None, '\n[outputs]\nfoldr = "a"\n', ["did you mean 'folder'"], "foldr ="),
+    ("tables of one name", None, '\n[[analyses]]\nname = "response_bifurcations"\ntype = "verify"\nbranch = "up"\n'
+     "[outputs]\ncsv = true\n", ["same table"], "csv ="),
     ("csv no truth value", None, '\n[outputs]\ncsv = "yes"\n', ["csv", "boolean"], "csv ="),
 ]  # fmt: skip
 

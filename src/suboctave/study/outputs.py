@@ -78,6 +78,8 @@ def check_outputs(
         if min(figure.size) <= 0.2 or max(figure.size) > 100.0:
             yield (*key, "size"), f"width and height in inches, from 0.2 to 100, not {figure.size}"
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
+    if outputs.csv and len(seen) < len(csv_names(steps)):
+        yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
     for place, name in names:
         if PurePath(name).name != name or name in (".", ".."):
             yield place, f"{name!r} is a name inside the folder of the outputs, without slashes"

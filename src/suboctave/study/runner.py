@@ -92,6 +92,8 @@ def run_study(
         return _complete(study, targets[0])
     _prepare(place, targets, journal_at, overwrite, resume)
     journal = Journal.reopen(journal_at) if resume and journal_at.exists() else Journal.create(journal_at)
+    for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
+        torn.unlink(missing_ok=True)
     try:
         return _run(study, place, targets, journal, watch, said)
     except BaseException:
