@@ -105,7 +105,7 @@ class Results(Mapping[str, "Branch | Table"]):
         wrong = [name for name in self if not name or "/" in name or name == "."]
         if wrong:
             raise InputError(
-                f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, without slashes"
+                f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, no slashes"
             )
         groups = {name: to_dataset(item, self.details.get(name, {})) for name, item in self.items()}
         files.write(target, groups, {"contents": "study", **provenance(), **self.attributes})
