@@ -1,16 +1,116 @@
 """All elements along one direction at once, against each element by itself and against other quadratures."""
 
+import math
+from functools import lru_cache
+
 import numpy as np
 import pytest
+from numba import njit
 
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis, instants
+from suboctave.harmonic.instants import _jet
 from suboctave.harmonic.local_force import curvature, local_force
-from suboctave.harmonic.quadrature import graded_nodes, panel_tables
+from suboctave.harmonic.quadrature import graded_nodes
 from suboctave.model import CubicSpring, ElasticStop, PolynomialSpring, System
 from suboctave.model.derivative_check import check_derivatives
 from suboctave.model.element import Element
 from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling
+
+#: halvings of a panel at most
+_DEPTH = 40
+
+
+@lru_cache(maxsize=64)
+def panel_tables(panels: int, order: int) -> tuple[np.ndarray, ...]:
+    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `halved_panels`
+    asks for.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    half = math.pi / panels * 0.5 ** np.arange(_DEPTH + 1)
+    angles = np.multiply.outer(half, nodes)
+    return np.cos(angles), np.sin(angles), np.cos(0.5 * half), np.sin(0.5 * half), weights
+
+
+@njit
+def _nearest(x, d, s, point, width):
+    """Distance from here to the nearest complex time at which the motion (value x, derivatives d, s) equals point +-
+    i width.
+    """
+    target = complex(x - point, -width)
+    if abs(s) * abs(target) < 1e-6 * d * d:
+        return abs(target) / abs(d)
+    root = np.sqrt(d * d - 2.0 * s * target)
+    q = -(d + root) if (root.real * d >= 0.0) else -(d - root)
+    if abs(q) == 0.0:
+        return math.sqrt(2.0 * abs(target) / abs(s)) if s != 0.0 else np.inf
+    first = abs(q / s) if s != 0.0 else np.inf
+    return min(first, abs(2.0 * target / q))
+
+
+@njit
+def halved_panels(c, points, widths, cr, ci, hr, hi, weights, ratio):
+    """Composite Gauss-Legendre nodes on a period, graded towards the instants at which a sharp law is passed.
+
+    A panel is halved until the nearest complex instant at which the motion meets a singularity of the law (point +- i
+    width) lies at least `ratio` half-lengths from its centre; the rule then converges geometrically on it. Tables
+    (`quadrature.panel_tables`): cr, ci (levels, order) hold the nodes of a panel of every level, relative to its
+    centre, as points on the circle; hr, hi (levels,) half its half-length; `weights` those of the rule on (-1, 1).
+    Level 0 covers the period with equal panels. Returns z (real, imaginary part) and weights, which add up to 2 pi.
+    """
+    order = weights.shape[0]
+    depth = hr.shape[0] - 1
+    half = 2.0 * math.atan2(hi[0], hr[0])
+    panels = round(math.pi / half)
+    capacity = order * panels * 4
+    zr = np.empty(capacity)
+    zi = np.empty(capacity)
+    w = np.empty(capacity)
+    count = 0
+    stack_r = np.empty(depth + 2)
+    stack_i = np.empty(depth + 2)
+    stack_level = np.empty(depth + 2, dtype=np.int64)
+    for p in range(panels):
+        centre = (2 * p + 1) * half
+        stack_r[0] = math.cos(centre)
+        stack_i[0] = math.sin(centre)
+        stack_level[0] = 0
+        size = 1
+        while size > 0:
+            size -= 1
+            ar = stack_r[size]
+            ai = stack_i[size]
+            level = stack_level[size]
+            h = half * 0.5**level
+            split = False
+            if level < depth:
+                x, d, s = _jet(c, ar, ai)
+                for m in range(points.shape[0]):
+                    if _nearest(x, d, s, points[m], widths[m]) < ratio * h:
+                        split = True
+                        break
+            if split:
+                br = hr[level]
+                bi = hi[level]
+                stack_r[size] = ar * br - ai * bi
+                stack_i[size] = ar * bi + ai * br
+                stack_level[size] = level + 1
+                stack_r[size + 1] = ar * br + ai * bi
+                stack_i[size + 1] = ai * br - ar * bi
+                stack_level[size + 1] = level + 1
+                size += 2
+                continue
+            if count + order > capacity:
+                capacity *= 2
+                zr = np.concatenate((zr, np.empty(capacity - zr.shape[0])))
+                zi = np.concatenate((zi, np.empty(capacity - zi.shape[0])))
+                w = np.concatenate((w, np.empty(capacity - w.shape[0])))
+            for j in range(order):
+                zr[count] = ar * cr[level, j] - ai * ci[level, j]
+                zi[count] = ar * ci[level, j] + ai * cr[level, j]
+                w[count] = h * weights[j]
+                count += 1
+    return zr[:count], zi[:count], w[:count]
 
 
 class Damper(Element):
@@ -127,7 +227,7 @@ def test_graded_nodes_integrate_sharp_laws_as_dyadic_panels_do(seed):
     top = 2 * high + 1
     nodes = graded_nodes(c, points, widths, top)
     assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
-    other = instants.sharp_nodes(c, points, widths, *panel_tables(40 + 4 * high, 20), 1.6)
+    other = halved_panels(c, points, widths, *panel_tables(40 + 4 * high, 20), 1.6)
 
     def spectrum(zr, zi, weights):
         z = zr + 1j * zi

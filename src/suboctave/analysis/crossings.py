@@ -22,8 +22,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from suboctave.compiled import kernel
 
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
@@ -58,7 +59,7 @@ def first_doubtful(places: Sequence[float], tests: Sequence[NDArray[np.float64]]
     return None if which < 0 else (which, min(0.6, max(0.4, share)))
 
 
-@njit(cache=True)
+@kernel()
 def _rate(places, first, last, size, s):
     """The distance between the cubic and what is foretold from one side, without its factor (s - p) or (q - s)."""
     for i in range(first, last):
@@ -66,7 +67,7 @@ def _rate(places, first, last, size, s):
     return size
 
 
-@njit(cache=True)
+@kernel()
 def _looks(chord, second, third, shift, h):
     """The grid of fractions with those at which `chord s + s (s - h) (second + third (s - shift))` is extreme."""
     # derivative a s^2 + b s + c
@@ -96,7 +97,7 @@ def _looks(chord, second, third, shift, h):
     return out[:count]
 
 
-@njit(cache=True)
+@kernel()
 def _doubtful(places, values, at):
     """`doubtful`; -1 for nowhere."""
     p, q = places[at], places[at + 1]
@@ -177,7 +178,7 @@ def _doubtful(places, values, at):
     return -1.0
 
 
-@njit(cache=True)
+@kernel()
 def _first_doubtful(places, tests, at):
     count, _, functions = tests.shape
     values = np.empty(count)

@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import first_doubtful
@@ -31,6 +30,7 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Bifurcation, Sample
 from suboctave.bifurcation.grazing import touches
 from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
+from suboctave.compiled import kernel
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between
@@ -398,7 +398,7 @@ class CountCheck:
         )
 
 
-@njit(cache=True)
+@kernel()
 def _movement(old, new):
     """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
     largest = 0.0

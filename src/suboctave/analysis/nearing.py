@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from suboctave.bifurcation import Sample
+from suboctave.compiled import kernel
 
 #: excursions across a gap, in units of the largest relative displacement, that may end soon
 YOUNG = 0.05
@@ -28,7 +27,7 @@ def nears_grazing(p: Sample, q: Sample) -> bool:
     )
 
 
-@njit(cache=True)
+@kernel()
 def _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
     """Whether an excursion of one motion is a small part of the same excursion of another."""
     size = 0.0

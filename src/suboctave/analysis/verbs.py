@@ -16,6 +16,7 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.verdicts import with_verdicts
 from suboctave.bifurcation import Bifurcation
+from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
@@ -95,6 +96,7 @@ def frequency_response(
         start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
     curve = _curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
+    computation_begins()
     with one_thread(), reporting(progress, "frequency response") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, first, start, settings.newton)
@@ -167,6 +169,7 @@ def continue_branch(
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, _own_linear_part(orbit))
+    computation_begins()
     with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
@@ -242,6 +245,7 @@ def _from_system(
     curve = _curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
     # a size of the motion to scale with, should the branch begin at rest
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
+    computation_begins()
     with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
         point = start_point(curve, first, None, settings.newton)

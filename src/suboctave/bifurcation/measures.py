@@ -20,8 +20,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
@@ -39,7 +39,7 @@ def measured(turn: float, mu: ComplexArray) -> Array:
     return out
 
 
-@njit(cache=True)
+@kernel()
 def _measure(turn, mu, sign, log):
     """Complex factors come in conjugate pairs: the sign is that of the real ones."""
     n = mu.shape[0]

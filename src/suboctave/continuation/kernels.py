@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from suboctave.compiled import kernel
 
 
-@njit(cache=True)
+@kernel()
 def bordered_transposed(jacobian, row, weights):
     """Transpose of `[F_u / weights; row]`, so that its transpose lies in memory as LAPACK wants it; (N + 1, N + 1)."""
     rows, cols = jacobian.shape
@@ -21,7 +22,7 @@ def bordered_transposed(jacobian, row, weights):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def right_hand_side(residual, row, weights, u, guess):
     """`[F; row . (weights (u - guess))]`, shape (N + 1,)."""
     n = u.shape[0]
@@ -33,7 +34,7 @@ def right_hand_side(residual, row, weights, u, guess):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def moved(u, step, weights, share):
     """`u - share step / weights`, and the length of the step."""
     out = np.empty(u.shape[0])
@@ -44,7 +45,7 @@ def moved(u, step, weights, share):
     return out, math.sqrt(total)
 
 
-@njit(cache=True)
+@kernel()
 def distance(u, v, weights):
     """`|weights (u - v)|`."""
     total = 0.0
@@ -54,7 +55,7 @@ def distance(u, v, weights):
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@kernel()
 def normalised(direction, weights):
     """A direction in scaled variables as a vector in u of unit length in scaled arclength."""
     total = 0.0
@@ -67,7 +68,7 @@ def normalised(direction, weights):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def cosine(a, b, weights):
     """Cosine of the angle between two vectors in scaled variables."""
     ab = 0.0
@@ -81,7 +82,7 @@ def cosine(a, b, weights):
     return ab / math.sqrt(aa * bb)
 
 
-@njit(cache=True)
+@kernel()
 def predict(points, tangents, weights, step, out):
     """The Hermite polynomial through points and tangents (m, n) taken `step` further in scaled arclength, into `out`.
 
@@ -121,7 +122,7 @@ def predict(points, tangents, weights, step, out):
             out[i] += value * points[j, i] + slope * tangents[j, i]
 
 
-@njit(cache=True)
+@kernel()
 def between(u, tangent, v, heading, weights, s):
     """Cubic Hermite interpolation at the share s of the way from u to v, with tangents of any length."""
     n = u.shape[0]
@@ -142,7 +143,7 @@ def between(u, tangent, v, heading, weights, s):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def disagreement(u, tangent, v, heading, weights):
     """Distance between the unit chord from u to v and the mean of the unit tangents there; 0 without a chord."""
     n = u.shape[0]
@@ -163,7 +164,7 @@ def disagreement(u, tangent, v, heading, weights):
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@kernel()
 def determinant_sign(lu, pivots):
     """Sign of the determinant of a factorised matrix (`lapack.dgetrf`, pivots counted from 0)."""
     sign = 1.0

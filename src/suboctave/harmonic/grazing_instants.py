@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.instants import _jet
 from suboctave.harmonic.kernels import motion
 
 
-@njit(cache=True)
+@kernel()
 def _turn(c, lo, hi, rises, first):
     """The extremum in (lo, hi), before which the motion rises or falls: tau, value, second derivative."""
     t = first
@@ -37,7 +37,7 @@ def _turn(c, lo, hi, rises, first):
     return t, x, -abs(s) if rises else abs(s)
 
 
-@njit(cache=True)
+@kernel()
 def extrema(c, zr, zi):
     """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative; ascending in tau.
 
@@ -79,7 +79,7 @@ def extrema(c, zr, zi):
     return tau[:count].copy(), value[:count].copy(), curve[:count].copy()
 
 
-@njit(cache=True)
+@kernel()
 def _level_count(x, level):
     """How often the motion crosses a level, from its extrema."""
     crossed = 0
@@ -89,7 +89,7 @@ def _level_count(x, level):
     return crossed
 
 
-@njit(cache=True)
+@kernel()
 def _smoothed(x, wanted):
     """Indices of `wanted` extrema: neighbouring pairs are dropped, the least different first, ripples that have just
     come or are about to go.
@@ -116,7 +116,7 @@ def _smoothed(x, wanted):
     return index
 
 
-@njit(cache=True)
+@kernel()
 def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
 
-@njit(cache=True)
+@kernel()
 def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
     """Add the Fourier coefficients of piecewise-linear laws to force and stiffness (top + 1,), in place.
 
@@ -51,7 +51,7 @@ def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
             stiffness[q] += slope[q]
 
 
-@njit(cache=True)
+@kernel()
 def add_polynomial(c, polynomial, zr, zi, force, stiffness):
     """Add the Fourier coefficients of `sum_p polynomial_p u^p` to force and stiffness (top + 1,), in place.
 
@@ -74,7 +74,7 @@ def add_polynomial(c, polynomial, zr, zi, force, stiffness):
         stiffness[q] += found[1, q]
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(fastmath=_FAST)
 def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
     """Add `1/(2 pi) sum_j weights_j g_j z_j^-q`, q = 0 .. top, of the sampled f, f_u and f_v (empty if there is none)
     to the spectra of force, stiffness and damping, in place.
@@ -105,7 +105,7 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
             pr[j] = t
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(fastmath=_FAST)
 def add_smooth_steps(sampled, steps, line, force, stiffness):
     """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.
 
@@ -146,7 +146,7 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         stiffness[q] += complex(sr, -si)
 
 
-@njit(cache=True)
+@kernel()
 def contact_comb(c, pieces, grid_r, grid_i):
     """Instants at which the gaps of piecewise-linear pieces are crossed: cosines, sines, and the weights of `f_uu`
     there, `side stiffness / |u'|`, with |u'| kept from zero where the motion grazes; how many of the columns count.
@@ -169,7 +169,7 @@ def contact_comb(c, pieces, grid_r, grid_i):
     return out, count
 
 
-@njit(cache=True)
+@kernel()
 def finite(table):
     """Whether the zeroth coefficients of all spectra (R, G, top + 1) are finite."""
     for r in range(table.shape[0]):
@@ -179,7 +179,7 @@ def finite(table):
     return True
 
 
-@njit(cache=True)
+@kernel()
 def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
     """A X, F and `R = A X + F - P`, (3, 2 H + 1, n), and the sizes |R|, |A X|, |F|, |P|.
 
@@ -227,7 +227,7 @@ def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
     return parts, sizes
 
 
-@njit(cache=True)
+@kernel()
 def apply_blocks(blocks, x):
     """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
     rows, n = x.shape
@@ -251,7 +251,7 @@ def apply_blocks(blocks, x):
     return out
 
 
-@njit(cache=True)
+@kernel(patience=QUICK)
 def tangent_matrix(out, stiffness, damping, moving, rate, mean, starts, dofs, shape, n):
     """Add the Galerkin matrices `T(f_x) + T(f_v) d/dt` of all directions to `out`, in the integer (mean) or half-odd
     basis.
@@ -304,7 +304,7 @@ def tangent_matrix(out, stiffness, damping, moving, rate, mean, starts, dofs, sh
                                 out[r + n, q + n] += v * d
 
 
-@njit(cache=True)
+@kernel()
 def dynamic_stiffness(mass, damping, stiffness, frequency, order):
     """`K - Omega^2 M + i Omega C` at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
     n = mass.shape[0]
@@ -322,7 +322,7 @@ def dynamic_stiffness(mass, damping, stiffness, frequency, order):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def local_amplitudes(x, dofs, shape):
     """Complex coefficients (H + 1,) of the displacement along a direction with entries `shape` at `dofs`."""
     high = x.shape[0] // 2
@@ -340,7 +340,7 @@ def local_amplitudes(x, dofs, shape):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def tails(x, neglected, weight):
     """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size.
 
@@ -368,7 +368,7 @@ def tails(x, neglected, weight):
     return out, size
 
 
-@njit(cache=True)
+@kernel()
 def apply_scaled(blocks, scale, x):
     """`apply_blocks` with every harmonic's block multiplied by a number."""
     out = apply_blocks(blocks, x)

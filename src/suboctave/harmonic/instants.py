@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.kernels import motion
 
 
-@njit(cache=True)
+@kernel(patience=QUICK)
 def _jet(c, zr, zi):
     """Value, first and second derivative of `Re sum_k c_k z^k` with respect to tau at one point."""
     pr = pi = dr = di = sr = 0.0
@@ -33,88 +33,7 @@ def _jet(c, zr, zi):
     return pr, -di, -sr
 
 
-@njit(cache=True)
-def _nearest(x, d, s, point, width):
-    """Distance from here to the nearest complex time at which the motion (value x, derivatives d, s) equals point +-
-    i width.
-    """
-    target = complex(x - point, -width)
-    if abs(s) * abs(target) < 1e-6 * d * d:
-        return abs(target) / abs(d)
-    root = np.sqrt(d * d - 2.0 * s * target)
-    q = -(d + root) if (root.real * d >= 0.0) else -(d - root)
-    if abs(q) == 0.0:
-        return math.sqrt(2.0 * abs(target) / abs(s)) if s != 0.0 else np.inf
-    first = abs(q / s) if s != 0.0 else np.inf
-    return min(first, abs(2.0 * target / q))
-
-
-@njit(cache=True)
-def sharp_nodes(c, points, widths, cr, ci, hr, hi, weights, ratio):
-    """Composite Gauss-Legendre nodes on a period, graded towards the instants at which a sharp law is passed.
-
-    A panel is halved until the nearest complex instant at which the motion meets a singularity of the law (point +- i
-    width) lies at least `ratio` half-lengths from its centre; the rule then converges geometrically on it. Tables
-    (`quadrature.panel_tables`): cr, ci (levels, order) hold the nodes of a panel of every level, relative to its
-    centre, as points on the circle; hr, hi (levels,) half its half-length; `weights` those of the rule on (-1, 1).
-    Level 0 covers the period with equal panels. Returns z (real, imaginary part) and weights, which add up to 2 pi.
-    """
-    order = weights.shape[0]
-    depth = hr.shape[0] - 1
-    half = 2.0 * math.atan2(hi[0], hr[0])
-    panels = round(math.pi / half)
-    capacity = order * panels * 4
-    zr = np.empty(capacity)
-    zi = np.empty(capacity)
-    w = np.empty(capacity)
-    count = 0
-    stack_r = np.empty(depth + 2)
-    stack_i = np.empty(depth + 2)
-    stack_level = np.empty(depth + 2, dtype=np.int64)
-    for p in range(panels):
-        centre = (2 * p + 1) * half
-        stack_r[0] = math.cos(centre)
-        stack_i[0] = math.sin(centre)
-        stack_level[0] = 0
-        size = 1
-        while size > 0:
-            size -= 1
-            ar = stack_r[size]
-            ai = stack_i[size]
-            level = stack_level[size]
-            h = half * 0.5**level
-            split = False
-            if level < depth:
-                x, d, s = _jet(c, ar, ai)
-                for m in range(points.shape[0]):
-                    if _nearest(x, d, s, points[m], widths[m]) < ratio * h:
-                        split = True
-                        break
-            if split:
-                br = hr[level]
-                bi = hi[level]
-                stack_r[size] = ar * br - ai * bi
-                stack_i[size] = ar * bi + ai * br
-                stack_level[size] = level + 1
-                stack_r[size + 1] = ar * br + ai * bi
-                stack_i[size + 1] = ai * br - ar * bi
-                stack_level[size + 1] = level + 1
-                size += 2
-                continue
-            if count + order > capacity:
-                capacity *= 2
-                zr = np.concatenate((zr, np.empty(capacity - zr.shape[0])))
-                zi = np.concatenate((zi, np.empty(capacity - zi.shape[0])))
-                w = np.concatenate((w, np.empty(capacity - w.shape[0])))
-            for j in range(order):
-                zr[count] = ar * cr[level, j] - ai * ci[level, j]
-                zi[count] = ar * ci[level, j] + ai * cr[level, j]
-                w[count] = h * weights[j]
-                count += 1
-    return zr[:count], zi[:count], w[:count]
-
-
-@njit(cache=True)
+@kernel()
 def _refine(c, lo, hi, flo, level):
     """A root of the motion minus `level` in the bracket (lo, hi), by Newton's method kept inside the bracket."""
     tau = 0.5 * (lo + hi)
@@ -146,7 +65,7 @@ def _refine(c, lo, hi, flo, level):
     return tau
 
 
-@njit(cache=True)
+@kernel()
 def _search(c, level, lo, hi, f0, d0, f1, d1, found, count):
     """Append the crossings of `level` in (lo, hi), an interval with one extremum at most; returns the new count.
 
@@ -184,7 +103,7 @@ def _search(c, level, lo, hi, f0, d0, f1, d1, found, count):
     return count
 
 
-@njit(cache=True)
+@kernel()
 def crossings(c, level, zr, zi):
     """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
 
@@ -195,13 +114,14 @@ def crossings(c, level, zr, zi):
     return crossings_of(c, level, motion(c, zr, zi))
 
 
-@njit(cache=True)
+@kernel()
 def crossings_of(c, level, values):
     """`crossings`, from value and derivative of the motion (2, N) on a uniform grid that starts at tau = 0."""
     n = values.shape[1]
     h = 2.0 * math.pi / n
     found = np.empty(4 * n)
-    count = 0
+    # not a literal, for which the search would be compiled twice
+    count = np.int64(0)
     for j in range(n):
         f0 = values[0, j] - level
         f1 = values[0, (j + 1) % n] - level
@@ -231,7 +151,7 @@ def crossings_of(c, level, values):
     return found[:count], values[0, 0] - level > 0.0
 
 
-@njit(cache=True)
+@kernel()
 def peak(c, samples):
     """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
 

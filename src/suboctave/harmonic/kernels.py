@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from suboctave.compiled import QUICK, kernel
 
 _FAST = {"reassoc", "contract", "nsz"}
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(patience=QUICK, fastmath=_FAST)
 def motion(c, zr, zi):
     """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
     n = zr.shape[0]
@@ -45,7 +46,7 @@ def motion(c, zr, zi):
     return out
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(patience=QUICK, fastmath=_FAST)
 def spectra(values, zr, zi, top):
     """Fourier coefficients `1/(2 pi) sum_j values[r, j] z_j^-q`, q = 0 .. top (weights already in `values`); shape
     (R, top + 1).
@@ -71,7 +72,7 @@ def spectra(values, zr, zi, top):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def contact_spectrum(tau, above, side, top):
     """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
 
@@ -104,7 +105,7 @@ def contact_spectrum(tau, above, side, top):
     return out
 
 
-@njit(cache=True)
+@kernel(patience=QUICK)
 def product_spectrum(c, shift, chi, top):
     """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
     H.
@@ -122,7 +123,7 @@ def product_spectrum(c, shift, chi, top):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def galerkin(stiffness, damping, rate, rows, cols, rows_mean, cols_mean):
     """Galerkin matrix `T(f_x) + T(f_v) d/dt` between two real bases.
 
@@ -171,7 +172,7 @@ def galerkin(stiffness, damping, rate, rows, cols, rows_mean, cols_mean):
     return out
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(patience=QUICK, fastmath=_FAST)
 def polynomial(coefficients, zr, zi):
     """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
     rows, count = coefficients.shape
@@ -194,7 +195,7 @@ def polynomial(coefficients, zr, zi):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def add_linear(out, blocks, mean):
     """Add complex blocks (h, n, n), one per harmonic, to the block diagonal of a real matrix of the sine/cosine basis.
 
@@ -218,7 +219,7 @@ def add_linear(out, blocks, mean):
                 out[at + n + i, at + j] -= q
 
 
-@njit(cache=True)
+@kernel()
 def add_element(out, matrix, rows, row_values, cols, col_values, n):
     """Add `matrix` (per basis function) times the outer product of two sparse shapes over the DOFs to a real or
     complex matrix.
@@ -230,7 +231,7 @@ def add_element(out, matrix, rows, row_values, cols, col_values, n):
                     out[i * n + rows[p], j * n + cols[q]] += matrix[i, j] * row_values[p] * col_values[q]
 
 
-@njit(cache=True)
+@kernel()
 def form(left, blocks, right):
     """`sum_f left_f^H blocks_f right_f`; left, right (F, n), blocks (F, n, n)."""
     total = 0.0 + 0.0j

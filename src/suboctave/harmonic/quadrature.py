@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import instants, kernels
+from suboctave.harmonic import kernels
 from suboctave.harmonic import sharp_nodes as graded
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.element import Element
@@ -32,7 +32,6 @@ from suboctave.model.sampling import AdaptiveSampling, PolynomialSampling, Sampl
 #: nodes the error of a panel is about (1.4 + sqrt(0.96))^-24 = 7e-10 at worst, and typically the square of that.
 _ORDER = 12
 _RATIO = 1.4
-_DEPTH = 40
 FEWEST, _MOST = 32, 1 << 15
 #: relative change of force and tangent coefficients below which adaptive sampling is content
 _SETTLED = 1e-11
@@ -57,27 +56,6 @@ def uniform_nodes(count: int) -> Nodes:
     """`count` equidistant instants from tau = 0."""
     tau = 2.0 * math.pi * np.arange(count) / count
     return Nodes(np.cos(tau), np.sin(tau), np.full(count, 2.0 * math.pi / count))
-
-
-@lru_cache(maxsize=64)
-def panel_tables(panels: int, order: int) -> tuple[Array, ...]:
-    """Gauss-Legendre nodes on panels that halve level by level, as points on the circle: what `instants.sharp_nodes`
-    asks for.
-    """
-    nodes, weights = np.polynomial.legendre.leggauss(order)
-    half = math.pi / panels * 0.5 ** np.arange(_DEPTH + 1)
-    angles = np.multiply.outer(half, nodes)
-    return np.cos(angles), np.sin(angles), np.cos(0.5 * half), np.sin(0.5 * half), weights
-
-
-def sharp_nodes(
-    motion: ComplexArray, kind: SharpSampling, panels: int, order: int, ratio: float
-) -> tuple[Array, Array, Array]:
-    """z (real, imaginary part) and weights of composite Gauss-Legendre panels graded towards the passages of a sharp
-    law.
-    """
-    points, widths = singularities(kind)
-    return instants.sharp_nodes(motion, points, widths, *panel_tables(panels, order), ratio)
 
 
 @lru_cache(maxsize=256)

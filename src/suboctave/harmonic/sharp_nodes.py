@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.instants import _jet
 from suboctave.harmonic.kernels import motion
 
@@ -42,7 +42,7 @@ def tables() -> tuple[np.ndarray, np.ndarray]:
     return nodes, weights
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(fastmath=_FAST)
 def _jets(c, zr, zi):
     """Value, first and second derivative of the motion at the points z, shape (3, N)."""
     n = zr.shape[0]
@@ -76,7 +76,7 @@ def _jets(c, zr, zi):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def _roots(x, d, s, point, width):
     """Both complex offsets at which the parabola (x, d, s) equals point + i width."""
     target = complex(x - point, -width)
@@ -88,7 +88,7 @@ def _roots(x, d, s, point, width):
     return 2.0 * target / q, far
 
 
-@njit(cache=True)
+@kernel()
 def singular_instants(c, points, widths, reach, zr, zi):
     """Complex instants `s + i d`, d > 0 and below `reach`, at which the motion meets point +- i width; ascending in s.
 
@@ -156,7 +156,7 @@ def singular_instants(c, points, widths, reach, zr, zi):
     return out
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(fastmath=_FAST)
 def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, nodes, weights, offset):
     """Append the nodes of one piece, offsets (first, last) from `centre` in the direction `sign`; returns the count."""
     if plain:
@@ -207,7 +207,7 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
     return count + orders
 
 
-@njit(cache=True)
+@kernel()
 def _with_motion(c, zr, zi, w):
     """The result of `sharp_nodes`: one array, since handing arrays over costs more than filling them."""
     out = np.empty((5, zr.shape[0]))
@@ -221,7 +221,7 @@ def _with_motion(c, zr, zi, w):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
     """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion and its derivative by
     tau there; (5, N).

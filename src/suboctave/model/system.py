@@ -190,6 +190,8 @@ class System:
                 raise InputError(
                     f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class"
                 )
+            if isinstance(kind, PiecewiseLinear) and element.own_nodes:
+                raise InputError(f"{element.label}: a piecewise-linear law needs no nodes, own_nodes must be False")
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
             check_mass(mass)

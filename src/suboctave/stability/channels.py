@@ -167,15 +167,14 @@ class Channels:
                     bump = 1.5 * scale[0] * jump * later / length * (1.0 - NODES**2)
                     law[begin, order, i : i + ORDER] -= bump
 
-    def locate(self, events: Array, start: np.ndarray, counts: np.ndarray, panels: int) -> None:
+    def locate(self, events: Array, start: np.ndarray, owner: np.ndarray, panels: int) -> None:
         """Find the slices around corners: panels between the two marks of one corner.
 
-        events, start: see `panels.lay_out`; counts: how many pieces every channel has; panels: how many there are.
+        events, start, owner: see `panels.lay_out`; panels: how many there are.
         """
         if not self._sliced:
             return
-        owner = np.repeat(np.arange(len(counts)), counts)
-        first = np.concatenate(([0], np.cumsum(counts)))
+        first = np.searchsorted(owner, np.arange(self.first + len(self.motions)))
         pieces = events[:, 5].astype(int)
         for i, piece in enumerate(pieces):
             follow = (i + 1) % len(pieces)

@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.group_force import GroupLaw
 from suboctave.harmonic.quadrature import FEWEST, search_grid
+from suboctave.harmonic.sharp_nodes import singular_instants
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.sampling import AdaptiveSampling
 from suboctave.stability.channels import Channels
 from suboctave.stability.nodes import NODES
-from suboctave.stability.panels import closed_changes, lay_out
+from suboctave.stability.panels import closed_changes, lay_out, longest_panel
 
 #: a law that tells nothing of itself and needs this many samples per period is smooth over one radian
 _BLIND = 48.0
-_NO_PIECES, _NO_POINTS = np.zeros((0, 3)), np.zeros((0, 2))
+_NO_PIECES, _NONE = np.zeros((0, 3)), np.zeros((2, 0))
 
 
 class Linearisation:
@@ -70,13 +71,37 @@ class Linearisation:
         forces = np.concatenate((state.spectra_table[0], own.forces)) if own.forces else state.spectra_table[0]
         high = state.basis.harmonics
         grid = search_grid(high)
+        c = motions[0][None] if len(motions) == 1 else np.array(motions, dtype=complex).reshape(-1, high + 1)
+        longest = min(longest_panel(c, degree), finest)
+        passed = _NONE
+        # singularities further away than that do not disturb a panel
+        found = [
+            singular_instants(motion, law.points, law.widths, longest, grid.zr, grid.zi)
+            for law, motion in zip(laws, motions, strict=True)
+            if len(law.points)
+        ]
+        found += [
+            singular_instants(
+                motion, law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy(), longest, grid.zr, grid.zi
+            )
+            for law, motion in zip(laws, motions, strict=True)
+            if len(law.smooth_steps)
+        ]
+        if found:
+            passed = found[0] if len(found) == 1 else np.concatenate(found, axis=1)
+        told = self._laws
         self.stretch, self.path, self.law, self.base, self._events, self._start = lay_out(
-            motions[0][None] if len(motions) == 1 else np.array(motions, dtype=complex).reshape(-1, high + 1),
+            c,
             forces,
             state.rate,
-            *self._laws,
-            degree,
-            finest,
+            told.pieces,
+            told.owner,
+            told.polynomial,
+            told.steps,
+            told.step_owner,
+            told.line,
+            passed,
+            longest,
             grid.zr,
             grid.zi,
             NODES,
@@ -93,7 +118,7 @@ class Linearisation:
                     if f_v is not None:
                         self.law[g, 2] += f_v
                     self._asked.append((g, element, a, sharp, f_u, f_v))
-        own.locate(self._events, self._start, self._laws.counts[:, 0], len(self.stretch))
+        own.locate(self._events, self._start, told.owner, len(self.stretch))
         own.ask(self.path, self.law)
 
     def changed(self, change: Array) -> tuple[Array, Array]:
@@ -109,9 +134,10 @@ class Linearisation:
             change,
             self.state.rate,
             laws.pieces,
+            laws.owner,
             laws.polynomial,
             laws.steps,
-            laws.counts,
+            laws.step_owner,
             self._events,
             self._start,
             len(self.stretch),
@@ -138,33 +164,29 @@ class _Laws(NamedTuple):
     """The laws of all directions as arrays: what `panels.lay_out` is told of them."""
 
     pieces: Array
+    owner: NDArray[np.int64]
     polynomial: Array
     steps: Array
+    step_owner: NDArray[np.int64]
     line: Array
-    singular: Array
-    counts: NDArray[np.int64]
 
 
 def _gathered(laws: list[GroupLaw]) -> _Laws:
-    counts = np.array([[len(law.pieces), len(law.smooth_steps), len(law.points)] for law in laws], dtype=np.int64)
-    counts = counts.reshape(-1, 3)
-    singular = [np.stack((law.points, law.widths), axis=1) for law in laws if len(law.points)]
-    where = np.concatenate(singular) if singular else _NO_POINTS
     if len(laws) == 1:
         law = laws[0]
-        return _Laws(law.pieces, law.polynomial[None], law.smooth_steps, law.line[None], where, counts)
+        owners = (np.zeros(len(part), dtype=np.int64) for part in (law.pieces, law.smooth_steps))
+        return _Laws(law.pieces, next(owners), law.polynomial[None], law.smooth_steps, next(owners), law.line[None])
     polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
     line = np.zeros((len(laws), 2))
     for g, law in enumerate(laws):
         polynomial[g, : len(law.polynomial)] = law.polynomial
         line[g] = law.line
-    pieces = [law.pieces for law in laws if len(law.pieces)]
-    steps = [law.smooth_steps for law in laws if len(law.smooth_steps)]
+    number = np.arange(len(laws))
     return _Laws(
-        np.concatenate(pieces) if pieces else _NO_PIECES,
+        np.concatenate([_NO_PIECES] + [law.pieces for law in laws]),
+        np.repeat(number, [len(law.pieces) for law in laws]),
         polynomial,
-        np.concatenate(steps) if steps else _NO_PIECES,
+        np.concatenate([_NO_PIECES] + [law.smooth_steps for law in laws]),
+        np.repeat(number, [len(law.smooth_steps) for law in laws]),
         line,
-        where,
-        counts,
     )

@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from suboctave.stability.passages import depths, events_along
+from suboctave.compiled import QUICK, kernel
+from suboctave.stability.passages import depths, events_along, grown
 
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
 #: period that it covers
@@ -29,7 +29,7 @@ _TANGENT, _MOTION = 7.0, 5.5
 _RELEVANT = 1e-3
 
 
-@njit(cache=True)
+@kernel()
 def _panels(events, longest):
     """Panels from the first event over one period, rows (from, to, centre, depth), and where each event's begin.
 
@@ -40,11 +40,12 @@ def _panels(events, longest):
     start = np.zeros(n, dtype=np.int64)
     out = np.empty((64, 4))
     count = 0
+    reach = np.zeros(2)
+    deep = np.zeros(2)
     for i in range(max(n, 1)):
         low = events[i, 0] if n > 0 else 0.0
         high = low + 2.0 * math.pi
-        reach = np.zeros(2)
-        deep = np.zeros(2)
+        reach[0] = reach[1] = deep[0] = deep[1] = 0.0
         if n > 0:
             start[i] = count
             follow = i + 1 if i + 1 < n else 0
@@ -64,7 +65,7 @@ def _panels(events, longest):
             elif reach[1] < 0.5 * gap:
                 reach[0] = gap - reach[1]
             else:
-                reach[:] = 0.5 * gap
+                reach[0] = reach[1] = 0.5 * gap
         rest = gap - reach[0] - reach[1]
         if rest < 0.05 * longest and rest < gap:
             # not worth a panel of its own
@@ -92,7 +93,7 @@ def _panels(events, longest):
                 continue
             pieces = max(1, pieces)
             while count + pieces > out.shape[0]:
-                out = np.concatenate((out, np.empty_like(out)))
+                out = grown(out)
             for p in range(pieces):
                 # from the left end of what is covered, or from the singularity outwards
                 begin, end = p / pieces, (p + 1) / pieces
@@ -110,10 +111,14 @@ def _panels(events, longest):
                 out[count, 2] = centre
                 out[count, 3] = d
                 count += 1
-    return out[:count], start % max(count, 1)
+    for i in range(n):
+        if start[i] >= count > 0:
+            # an event without a panel of its own at the period's end
+            start[i] -= count
+    return out, count, start
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@kernel(patience=QUICK, fastmath={"reassoc", "contract", "nsz"})
 def _series(c, f, zr, zi, scale, u, v, r):
     """`u = Re sum c_k z^k`, `v = scale du/dtau` and `r = -Re(f_0 + 2 sum f_k z^k)` at the points z; (N,) each."""
     n = zr.shape[0]
@@ -148,8 +153,8 @@ def _series(c, f, zr, zi, scale, u, v, r):
         r[j] *= -2.0
 
 
-@njit(cache=True)
-def _longest(c, degree):
+@kernel()
+def longest_panel(c, degree):
     """Longest panel in tau for a tangent that is a polynomial of this degree in the motion."""
     top = 1
     for g in range(c.shape[0]):
@@ -164,8 +169,8 @@ def _longest(c, degree):
     return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
 
 
-@njit(cache=True)
-def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degree, finest, zr, zi, nodes):
+@kernel()
+def lay_out(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, passed, longest, zr, zi, nodes):
     """Panels along a motion, the motion at their nodes, and the laws that are known in closed form.
 
     Parameters
@@ -175,19 +180,15 @@ def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degre
     rate
         Base frequency.
     pieces
-        Stiffness, gap, side of the pieces of piecewise-linear laws (Q, 3), direction by direction.
+        Stiffness, gap, side of the pieces of piecewise-linear laws (Q, 3), direction by direction; `owner` (Q,): which.
     polynomial
         Coefficients of u^0, u^1, ... along every direction (G, D).
     steps, line
-        Gap, width, stiffness of arctan steps (S, 3), direction by direction; constant and slope of the laws that they
-        belong to (G, 2).
-    singular
-        Where other sharp laws are singular: point, width (R, 2), direction by direction.
-    counts
-        How many pieces, steps, singularities every direction has, (G, 3).
-    degree
-        Of the tangents as polynomials in the motion, 0 if they are constant between events.
-    finest
+        Gap, width, stiffness of arctan steps (S, 3), direction by direction (`step_owner`, (S,)); constant and slope of
+        the laws that they belong to (G, 2).
+    passed
+        Passages of sharp laws, steps among them: instants and distances of their complex singularities, (2, K).
+    longest
         Upper bound of the panels' lengths.
     zr, zi
         Uniform grid on the circle, for searches.
@@ -206,18 +207,11 @@ def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degre
     base
         Stiffness of the pieces on every panel, (G, P).
     events, start
-        See `_events`; the panel that begins at each.
+        See `passages.events_along`; the panel that begins at each.
     """
     groups = c.shape[0]
-    owner = np.repeat(np.arange(groups), counts[:, 0])
-    step_owner = np.repeat(np.arange(groups), counts[:, 1])
-    where = np.concatenate((steps[:, :2], singular))
-    where_owner = np.concatenate((step_owner, np.repeat(np.arange(groups), counts[:, 2])))
-    longest = min(_longest(c, degree), finest)
-    # singularities further away than this do not disturb a panel
-    events = events_along(c, pieces, owner, where, where_owner, zr, zi, longest)
-    panels, start = _panels(events, longest)
-    count = panels.shape[0]
+    events = events_along(c, pieces, owner, passed, zr, zi)
+    panels, count, start = _panels(events, longest)
     m = nodes.shape[0]
     total = count * (m - 1) + 1
     tau = np.empty(total)
@@ -239,8 +233,11 @@ def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degre
     path = np.empty((groups, 2, total))
     law = np.zeros((groups, 4, total))
     base = np.zeros((groups, count))
-    cos = np.cos(tau)
-    sin = np.sin(tau)
+    cos = np.empty(total)
+    sin = np.empty(total)
+    for j in range(total):
+        cos[j] = math.cos(tau[j])
+        sin[j] = math.sin(tau[j])
     for g in range(groups):
         _series(c[g], f[g], cos, sin, rate, path[g, 0], path[g, 1], law[g, 0])
         add_polynomial(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
@@ -272,7 +269,7 @@ def lay_out(c, f, rate, pieces, polynomial, steps, line, singular, counts, degre
     return stretch, path, law, base, events, start
 
 
-@njit(cache=True)
+@kernel()
 def add_polynomial(coefficients, u, force, stiffness):
     """Add `sum c_p u^p` and its derivative to force and stiffness (N,), in place."""
     degree = coefficients.shape[0] - 1
@@ -287,8 +284,8 @@ def add_polynomial(coefficients, u, force, stiffness):
         stiffness[j] += slope
 
 
-@njit(cache=True)
-def closed_changes(path, law, change, rate, pieces, polynomial, steps, counts, events, start, panels):
+@kernel()
+def closed_changes(path, law, change, rate, pieces, owner, polynomial, steps, step_owner, events, start, panels):
     """The laws known in closed form along the motion changed by `change` (G, 2, N).
 
     path, law: see `lay_out`. Returns stiffness and damping at the old nodes (G, 2, N), polynomials as they are there,
@@ -298,17 +295,15 @@ def closed_changes(path, law, change, rate, pieces, polynomial, steps, counts, e
     (a root of the parabola where the motion grazes), and a slice of stiffness k that is as thin is an impulse k t.
     """
     groups, _, total = path.shape
-    owner = np.repeat(np.arange(groups), counts[:, 0])
     out = np.zeros((groups, 2, total))
     kick = np.zeros((groups, panels))
-    idle = np.empty(total)
+    idle = np.zeros(total)
+    moved = np.empty(total)
     for g in range(groups):
-        if polynomial.shape[1] > 2:
-            add_polynomial(polynomial[g], path[g, 0] + change[g, 0], idle, out[g, 0])
-        elif polynomial.shape[1] == 2:
-            out[g, 0] += polynomial[g, 1]
-        out[g, 0] += law[g, 3]
-    step_owner = np.repeat(np.arange(groups), counts[:, 1])
+        for j in range(total):
+            moved[j] = path[g, 0, j] + change[g, 0, j]
+            out[g, 0, j] = law[g, 3, j]
+        add_polynomial(polynomial[g], moved, idle, out[g, 0])
     for s in range(steps.shape[0]):
         g = step_owner[s]
         point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi

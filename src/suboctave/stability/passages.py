@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import motion
-from suboctave.harmonic.sharp_nodes import singular_instants
 
 #: extrema that miss a gap by less than this share of the motion are kept in sight: the true motion may touch it
 _MISS = 1e-3
 
 
-@njit(cache=True)
+@kernel()
 def _note(row, tau, depth, slope, bend, miss, piece):
     row[0] = tau
     row[1] = depth
@@ -25,17 +24,44 @@ def _note(row, tau, depth, slope, bend, miss, piece):
     row[5] = piece
 
 
-@njit(cache=True)
-def events_along(c, pieces, owner, where, where_owner, zr, zi, reach):
+@kernel()
+def grown(rows):
+    """Twice as many rows, the first of them copied."""
+    out = np.empty((2 * rows.shape[0], rows.shape[1]))
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            out[i, j] = rows[i, j]
+    return out
+
+
+@kernel()
+def in_order(rows, count):
+    """The first rows, ascending in their first entry: by insertion, they are few and nearly sorted."""
+    width = rows.shape[1]
+    out = np.empty((count, width))
+    for k in range(count):
+        i = k
+        while i > 0 and out[i - 1, 0] > rows[k, 0]:
+            for j in range(width):
+                out[i, j] = out[i - 1, j]
+            i -= 1
+        for j in range(width):
+            out[i, j] = rows[k, j]
+    return out
+
+
+@kernel()
+def events_along(c, pieces, owner, passed, zr, zi):
     """What happens along the motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
 
     A crossing of the gap of a piece has infinite depth; an extremum that falls short of it is kept with the distance
-    `miss`. A passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece.
+    `miss`. A passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece: they are
+    given by `passed` (2, K), instants and depths.
     """
     n = zr.shape[0]
     h = 2.0 * math.pi / n
     found = np.empty((4 * n + 16, 6))
-    count = 0
+    count = np.int64(0)
     last = -1
     size = 0.0
     values = np.empty((2, 0))
@@ -44,11 +70,15 @@ def events_along(c, pieces, owner, where, where_owner, zr, zi, reach):
         gap = pieces[q, 1]
         if g != last:
             values = motion(c[g], zr, zi)
-            size = values[0].max() - values[0].min()
+            low = high = values[0, 0]
+            for j in range(n):
+                low = min(low, values[0, j])
+                high = max(high, values[0, j])
+            size = high - low
             last = g
         at, _above = crossings_of(c[g], gap, values)
         while count + at.shape[0] + n > found.shape[0]:
-            found = np.concatenate((found, np.empty_like(found)))
+            found = grown(found)
         for i in range(at.shape[0]):
             _x, d, s = _jet(c[g], math.cos(at[i]), math.sin(at[i]))
             _note(found[count], at[i], np.inf, d, s, 0.0, q)
@@ -73,19 +103,15 @@ def events_along(c, pieces, owner, where, where_owner, zr, zi, reach):
             if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
                 _note(found[count], tau, np.inf, 0.0, s, x - gap, q)
                 count += 1
-    for g in range(c.shape[0]):
-        own = where_owner == g
-        if own.any():
-            passed = singular_instants(c[g], where[own, 0], where[own, 1], reach, zr, zi)
-            while count + passed.shape[1] > found.shape[0]:
-                found = np.concatenate((found, np.empty_like(found)))
-            for i in range(passed.shape[1]):
-                _note(found[count], passed[0, i], passed[1, i], 0.0, 0.0, 0.0, -1)
-                count += 1
-    return found[np.argsort(found[:count, 0])]
+    while count + passed.shape[1] > found.shape[0]:
+        found = grown(found)
+    for i in range(passed.shape[1]):
+        _note(found[count], passed[0, i], passed[1, i], 0.0, 0.0, 0.0, np.int64(-1))
+        count += 1
+    return in_order(found, count)
 
 
-@njit(cache=True)
+@kernel()
 def depths(events):
     """Distance from every event to the nearest complex singularity, its own or another's."""
     n = events.shape[0]

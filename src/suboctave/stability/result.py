@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
 
@@ -116,7 +116,7 @@ class FloquetResult:
         return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
 
 
-@njit(cache=True)
+@kernel()
 def _judged(multipliers, errors):
     """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
     the distance of the nearest one.

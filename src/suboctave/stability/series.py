@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.stability.nodes import ORDER
 
 #: most terms of a series
@@ -20,7 +20,7 @@ PAST = ORDER - 1
 FAST = {"reassoc", "contract", "nsz"}
 
 
-@njit(cache=True)
+@kernel()
 def shifted(coefficients, origin, length, out):
     """Coefficients of `p(origin + length x)` in powers of x."""
     for i in range(ORDER):
@@ -34,7 +34,7 @@ def shifted(coefficients, origin, length, out):
         f *= length
 
 
-@njit(cache=True)
+@kernel()
 def norm(a):
     """Largest sum of moduli along a row."""
     size = 0.0
@@ -46,7 +46,7 @@ def norm(a):
     return size
 
 
-@njit(cache=True, fastmath=FAST)
+@kernel(fastmath=FAST)
 def series(state, matrix, damping, left, right, local, span, active, moving, graded, enough, y, w, ry, rw):
     """Sum the series of one step into `state` (2 n, cols); returns how many terms it took.
 
@@ -156,7 +156,7 @@ def series(state, matrix, damping, left, right, local, span, active, moving, gra
     return TERMS - 2
 
 
-@njit(cache=True, fastmath=FAST)
+@kernel(fastmath=FAST)
 def evaluate(terms, used, g, cols, x, out):
     """The series of direction g at x into out (cols,)."""
     b = g * cols
@@ -167,7 +167,7 @@ def evaluate(terms, used, g, cols, x, out):
             out[j] = out[j] * x + terms[order, b + j]
 
 
-@njit(cache=True, fastmath=FAST)
+@kernel(fastmath=FAST)
 def through(row, one, local, out):
     """A row of a step's propagator, with its responses to powers of x, applied to the states `one` before the step."""
     size, cols = one.shape
@@ -184,7 +184,7 @@ def through(row, one, local, out):
         out[size] += a
 
 
-@njit(cache=True)
+@kernel()
 def growth(poly, local, span, steps, length, graded, size_k, size_c, shares):
     """Largest length of a step in units of the fastest time scale, as large as the polynomials are on the unit disc."""
     most = 0.0

@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.stability.nodes import NODES, ORDER
 from suboctave.stability.series import FAST, PAST, TERMS, evaluate, growth, norm, series, shifted, through
 
@@ -29,7 +29,7 @@ _REACH, _MOST = 4.0, 10000
 _EXACT, _CLOSE = 1e-15, 1e-11
 
 
-@njit(cache=True)
+@kernel()
 def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force, kick, powers, nodes):
     """Monodromy matrix and, where there is a force, what `_respond` needs.
 
@@ -181,7 +181,7 @@ def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, forc
     return total, alone, rows
 
 
-@njit(cache=True, fastmath=FAST)
+@kernel(fastmath=FAST)
 def _advance(total, one, left, right, kick, p, product):
     """Take the state `total` past the kicks at the beginning of panel p and the panel's own propagator."""
     size = one.shape[0]
@@ -208,7 +208,7 @@ def _advance(total, one, left, right, kick, p, product):
             total[i, j] = product[i, j]
 
 
-@njit(cache=True)
+@kernel()
 def _respond(start, alone, rows):
     """right_g^T d, right_g^T d' at the nodes (G, 2, N) of the response that begins with the state `start` (2 n,)."""
     groups, _, count, m, cols = rows.shape
@@ -232,7 +232,7 @@ def _respond(start, alone, rows):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def _solved(matrix, right):
     """`matrix^-1 right` by elimination; not finite if the matrix is singular."""
     n = matrix.shape[0]
@@ -262,7 +262,7 @@ def _solved(matrix, right):
     return x
 
 
-@njit(cache=True)
+@kernel()
 def weighted(mass, damping, stiffness, shapes):
     """K_0, C_0 (n, n), left, right (G, n) in DOFs weighted by the square roots of their masses; shapes (G, n)."""
     n = mass.shape[0]
@@ -273,7 +273,7 @@ def weighted(mass, damping, stiffness, shapes):
     return inverse @ stiffness / weight, inverse @ damping / weight, shapes @ inverse.T, shapes / weight
 
 
-@njit(cache=True)
+@kernel()
 def standing_several(stretch, scale, path, law, base, moving, varying, matrices, powers, nodes, share, without):
     """Along the motion as it stands: monodromy matrix (2 n, 2 n) and the correction that the motion needs.
 
@@ -310,7 +310,7 @@ def standing_several(stretch, scale, path, law, base, moving, varying, matrices,
     return phi, change, factor, alone
 
 
-@njit(cache=True)
+@kernel()
 def corrected_several(stretch, scale, law, base, kick, moving, varying, matrices, powers, nodes, alone):
     """Monodromy matrix along the corrected motion; law (G, 2, N), kick (G, P): see `panels.closed_changes`.
 
@@ -332,7 +332,7 @@ def corrected_several(stretch, scale, law, base, kick, moving, varying, matrices
     return total
 
 
-@njit(cache=True)
+@kernel()
 def perturbed(real, imaginary, left, right, phi, change):
     """Eigenvalues of phi (N, N), by descending modulus, and their first-order shifts by a change of it and by rounding.
 
@@ -375,7 +375,7 @@ def perturbed(real, imaginary, left, right, phi, change):
     return mu[order], shift[order]
 
 
-@njit(cache=True)
+@kernel()
 def projector(real, imaginary, left, right):
     """On the direction of the real multiplier nearest to +1, (N, N); zero if there is none or it is a double one."""
     n = real.shape[0]

@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import kernel
 from suboctave.stability.magnus import MOST, exponent, waves
 from suboctave.stability.nodes import ORDER
 
@@ -27,8 +27,8 @@ _FINE, _COARSE = 1.0e-9, 6.4e-8
 _FAST = {"reassoc", "contract", "nsz"}
 
 
-@njit(cache=True, fastmath=_FAST)
-def _monodromy(stretch, scale, base, k, damping, c, kick, tables, fine):
+@kernel(fastmath=_FAST)
+def _monodromy(stretch, scale, base, k, damping, c, kick, table, tolerance):
     """Trace of the monodromy matrix, and `int c dt`.
 
     stretch: dtau/ds (P, m); scale: dt/dtau; base (P,): constant part of the stiffness on every panel, k (N,) its
@@ -38,8 +38,6 @@ def _monodromy(stretch, scale, base, k, damping, c, kick, tables, fine):
     count = stretch.shape[0]
     m = ORDER
     varying = c.shape[0] > 0
-    tolerance = _FINE if fine else _COARSE
-    table = tables[0 if fine else 1]
     jj = np.empty(m)
     kk = np.empty(m)
     cc = np.empty(m)
@@ -147,7 +145,7 @@ def _monodromy(stretch, scale, base, k, damping, c, kick, tables, fine):
     return (p11 + p22) * math.exp(-late), 2.0 * total
 
 
-@njit(cache=True, fastmath=_FAST)
+@kernel(fastmath=_FAST)
 def _respond(stretch, scale, base, k, damping, c, force, between, nodes, weight):
     """The periodic solution of `d'' + c d' + k d = -force` at the nodes, d and d' (2, N), and the largest |d|.
 
@@ -251,17 +249,18 @@ def _respond(stretch, scale, base, k, damping, c, force, between, nodes, weight)
     return out, largest
 
 
-@njit(cache=True)
-def _weighted(weights, parts):
-    """`sum_g weights_g parts_g` of arrays (G, N)."""
-    out = np.zeros(parts.shape[1])
+@kernel()
+def _weighted(weights, parts, constant, out):
+    """`constant + sum_g weights_g parts_g` of arrays (G, N), into `out`."""
+    for j in range(out.shape[0]):
+        out[j] = constant
     for g in range(parts.shape[0]):
-        for j in range(parts.shape[1]):
+        for j in range(out.shape[0]):
             out[j] += weights[g] * parts[g, j]
     return out
 
 
-@njit(cache=True)
+@kernel()
 def roots(trace, decay):
     """Roots of `mu^2 - trace mu + exp(-decay)`, the larger one first."""
     out = np.empty(2, dtype=np.complex128)
@@ -278,7 +277,7 @@ def roots(trace, decay):
     return out
 
 
-@njit(cache=True)
+@kernel()
 def standing_single(stretch, scale, path, law, base, moving, shape, matrices, tables, between, nodes, largest, weight):
     """Along the motion as it stands: multipliers (2,), and the correction that it needs.
 
@@ -287,42 +286,57 @@ def standing_single(stretch, scale, path, law, base, moving, shape, matrices, ta
     correction along the directions (G, 2, N) and the factor by which it was cut. Few digits.
     """
     mass, damping, stiffness = matrices
-    square = shape * shape / mass
-    whole = _weighted(square, base) + stiffness / mass
-    k = _weighted(square, law[:, 1])
-    c = _weighted(square, law[:, 2]) if moving else np.zeros(0)
-    none = np.zeros(whole.shape[0])
-    trace, decay = _monodromy(stretch, scale, whole, k, damping / mass, c, none, tables, False)
-    force = _weighted(shape / mass, law[:, 0])
-    change = np.zeros(path.shape)
+    groups, _, total = path.shape
+    count = stretch.shape[0]
+    square = np.empty(groups)
+    once = np.empty(groups)
+    for g in range(groups):
+        once[g] = shape[g] / mass
+        square[g] = shape[g] * once[g]
+    whole = _weighted(square, base, stiffness / mass, np.empty(count))
+    k = _weighted(square, law[:, 1], 0.0, np.empty(total))
+    c = _weighted(square, law[:, 2], 0.0, np.empty(total)) if moving else np.empty(0)
+    trace, decay = _monodromy(stretch, scale, whole, k, damping / mass, c, np.zeros(count), tables[1], _COARSE)
+    force = _weighted(once, law[:, 0], 0.0, np.empty(total))
+    change = np.zeros((groups, 2, total))
     factor = 1.0
-    if path.shape[0] > 0:
+    if groups > 0:
         found, size = _respond(stretch, scale, whole, k, damping / mass, c, force, between, nodes, weight)
-        most = largest * np.abs(path[0, 0]).max() / abs(shape[0])
+        most = 0.0
+        for j in range(total):
+            most = max(most, abs(path[0, 0, j]))
+        most *= largest / abs(shape[0])
         if not size <= most:
             factor = most / size if size < np.inf else 0.0
         if factor > 0.0:
-            for g in range(path.shape[0]):
-                change[g] = factor * shape[g] * found
+            for g in range(groups):
+                for j in range(total):
+                    change[g, 0, j] = factor * shape[g] * found[0, j]
+                    change[g, 1, j] = factor * shape[g] * found[1, j]
     return roots(trace, decay), change, factor
 
 
-@njit(cache=True)
+@kernel()
 def corrected_single(stretch, scale, law, base, kick, moving, shape, matrices, tables, before):
     """Along the corrected motion: multipliers (2,), and their distances from those of the motion as it stands.
 
     law (G, 2, N), kick (G, P): see `panels.closed_changes`; before: the multipliers of `standing_single`.
     """
     mass, damping, stiffness = matrices
-    square = shape * shape / mass
-    whole = _weighted(square, base) + stiffness / mass
-    c = _weighted(square, law[:, 1]) if moving else np.zeros(0)
-    kicks = _weighted(square, kick)
-    trace, decay = _monodromy(
-        stretch, scale, whole, _weighted(square, law[:, 0]), damping / mass, c, kicks, tables, True
-    )
+    groups, _, total = law.shape
+    count = stretch.shape[0]
+    square = np.empty(groups)
+    for g in range(groups):
+        square[g] = shape[g] * shape[g] / mass
+    whole = _weighted(square, base, stiffness / mass, np.empty(count))
+    k = _weighted(square, law[:, 0], 0.0, np.empty(total))
+    c = _weighted(square, law[:, 1], 0.0, np.empty(total)) if moving else np.empty(0)
+    kicks = _weighted(square, kick, 0.0, np.empty(count))
+    trace, decay = _monodromy(stretch, scale, whole, k, damping / mass, c, kicks, tables[0], _FINE)
     mu = roots(trace, decay)
-    shift = np.abs(mu - before)
+    shift = np.empty(2)
+    for i in range(2):
+        shift[i] = abs(mu[i] - before[i])
     # rounding: of the trace, and of a double multiplier like its root
     error = 1e-14 * (1.0 + abs(trace))
     apart = abs(mu[0] - mu[1])

@@ -1,0 +1,107 @@
+"""Numba kernels that are compiled when they are worth it.
+
+Compiling a kernel takes some tenths of a second, the first curve of a fresh installation calls a hundred of them, and
+most cost less there than their compilation would. So a kernel first runs as the Python function that it is:
+
+- kernels marked `QUICK` are compiled almost at once, all others when they have cost `PATIENCE` seconds;
+- within the first computation of a process, compiling may take `BUDGET` seconds in all;
+- from the second computation on everything is compiled when it is called.
+
+What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Results are
+the same up to the order of sums.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numba import njit
+from numba.core.registry import CPUDispatcher
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+#: seconds that a kernel may cost before it is compiled: in general, where others have been compiled before, and if it
+#: is called by the hundred for every motion
+PATIENCE, LESS, QUICK = 1.0, 0.03, 0.02
+#: seconds of compilation in the first computation of a process, but for kernels that have cost `PATIENCE`
+BUDGET = 4.0
+#: entries of a kernel's arguments beyond which it is compiled at once: a single call could take long
+LARGE = 40000
+
+
+class _Ledger:
+    """What compilation has cost so far, and what is known of earlier processes."""
+
+    def __init__(self) -> None:
+        self.runs = 0
+        self.budget = BUDGET
+        #: whether nothing has been found in the cache
+        self.fresh = True
+        #: seconds spent in kernels called by the one that runs
+        self.nested = 0.0
+
+
+_ledger = _Ledger()
+
+
+def computation_begins() -> None:
+    """Tell that a user's computation begins: from the second on, kernels are compiled when they are called."""
+    _ledger.runs += 1
+
+
+class _Patient(CPUDispatcher):
+    """A kernel that has not been compiled yet."""
+
+    patience = PATIENCE
+
+    def __call__(self, *args: Any) -> Any:
+        spent = self.__dict__.get("_spent")
+        if spent is None:
+            signature = tuple(self.typeof_pyval(a) for a in args)
+            if self._cache.load_overload(signature, self.targetctx) is not None:
+                _ledger.fresh = False
+                return compiled(self)(*args)
+            spent = 0.0
+        if self._due(spent) or sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE:
+            start = time.perf_counter()
+            self.compile(tuple(self.typeof_pyval(a) for a in args))
+            _ledger.budget -= time.perf_counter() - start
+            return compiled(self)(*args)
+        before, _ledger.nested = _ledger.nested, 0.0
+        start = time.perf_counter()
+        try:
+            with np.errstate(all="ignore"):
+                return self.py_func(*args)
+        finally:
+            took = time.perf_counter() - start
+            self._spent = spent + took - _ledger.nested
+            _ledger.nested = before + took
+
+    def _due(self, spent: float) -> bool:
+        if _ledger.runs > 1 or spent > PATIENCE:
+            return True
+        patience = self.patience if _ledger.fresh else min(self.patience, LESS)
+        return spent > patience and _ledger.budget > 0.0
+
+
+def compiled(kernel: _Function) -> _Function:
+    """The same kernel, compiled (or loaded) at its next call if it is not yet."""
+    if isinstance(kernel, _Patient):
+        kernel.__class__ = CPUDispatcher
+    return kernel
+
+
+def kernel(patience: float = PATIENCE, **options: Any) -> Callable[[_Function], _Function]:
+    """Decorator of a kernel: `numba.njit` with its cache, and patience. Options are those of `njit`."""
+
+    def decorate(function: _Function) -> _Function:
+        result = njit(cache=True, **options)(function)
+        if isinstance(result, CPUDispatcher):
+            result.__class__ = _Patient
+            result.patience = patience
+        return result
+
+    return decorate
