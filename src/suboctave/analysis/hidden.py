@@ -21,7 +21,8 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.selection import next_harmonics
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, next_harmonics
 
 _DOUBLING = next(kind for kind in ALL_KINDS if kind.name == "PD")
 
@@ -75,9 +76,10 @@ def pair_in(
     samples = (stretch.before, stretch.inside, stretch.behind)
     curve = stretch.inside.point.curve
     assert isinstance(curve, ResponseCurve)
+    found: list[tuple[Located, Sample, Sample]] = []
     while curve.adaptive is not None:
         present = samples[1].state
-        basis = next_harmonics(present, curve.adaptive)
+        basis = _wanted(found, curve.adaptive) if found else next_harmonics(present, curve.adaptive)
         if basis.harmonics <= present.basis.harmonics:
             break
         x = present.basis.resized(present.x, basis)
@@ -87,17 +89,25 @@ def pair_in(
             first, middle, last = (_solved_in(curve, s, newton, make_sample) for s in samples)
         except ConvergenceError:
             break
-        if _DOUBLING.changed(first, middle) and _DOUBLING.changed(middle, last):
-            pairs = [
-                (a, b, locate(_DOUBLING, a, b, newton, make_sample, guess_at))
-                for a, b in ((first, middle), (middle, last))
-            ]
-            return [(item, a, b) for a, b, item in pairs if item is not None]
-        if all(map(_agree, (first, middle, last))):
-            # with more harmonics nobody sees them
-            break
         samples = (first, middle, last)
-    return []
+        if not (_DOUBLING.changed(first, middle) and _DOUBLING.changed(middle, last)):
+            if all(map(_agree, samples)):
+                # with more harmonics nobody sees them
+                return []
+            continue
+        # each between motions of its own: left to itself with still more harmonics, one may run to the other
+        pairs = [
+            (a, b, locate(_DOUBLING, a, b, newton, make_sample, guess_at)) for a, b in ((first, middle), (middle, last))
+        ]
+        found = [(item, a, b) for a, b, item in pairs if item is not None]
+    return found
+
+
+def _wanted(found: list[tuple[Located, Sample, Sample]], options: AdaptiveHarmonics) -> HarmonicBasis:
+    """The harmonics that located bifurcations are to have."""
+    states = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in found]
+    bases = (choose_harmonics(state, options, options.event_tolerance) for state in states)
+    return max(bases, key=lambda basis: basis.harmonics)
 
 
 def _solved_in(
