@@ -184,7 +184,7 @@ def test_outputs_that_exist_are_left_alone(study_file, suboctave):
 
 def test_a_kill_in_the_middle_loses_no_finished_analysis(study_file, by_script):
     slow = DUFFING.replace("max_step = 0.2\n", "max_step = 0.2\n", 1).replace(
-        "bounds = [0.25, 0.4]\nmax_step = 0.2", "bounds = [0.25, 0.4]\nmax_step = 0.0005"
+        "bounds = [0.25, 0.4]\nmax_step = 0.2", "bounds = [0.25, 0.4]\nmax_step = 0.0001"
     )
     path = study_file(slow)
     folder = path.parent / "study_results"
@@ -193,7 +193,7 @@ def test_a_kill_in_the_middle_loses_no_finished_analysis(study_file, by_script):
     deadline = time.monotonic() + 400  # with kernels to compile; seconds without
     while time.monotonic() < deadline and process.poll() is None:
         kinds = [r.kind for r in read_journal(journal)[0]] if journal.exists() else []
-        if "analysis" in kinds and "points" in kinds[kinds.index("analysis") :]:
+        if "analysis" in kinds:  # the first is finished; the second takes much longer than this loop
             break
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
