@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
-    from suboctave.analysis import Branch, continue_branch, frequency_response, stability, verify
+    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, verify
     from suboctave.bifurcation import Bifurcation
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
@@ -90,6 +90,8 @@ _HOME = {
     "Hill": "suboctave.stability",
     "KoopmanHill": "suboctave.stability",
     "verify": "suboctave.analysis",
+    "load": "suboctave.analysis",
+    "Results": "suboctave.analysis",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
@@ -124,6 +126,7 @@ __all__ = [
     "PeriodicOrbit",
     "PolynomialSpring",
     "QuadraticDamper",
+    "Results",
     "RotatingUnbalance",
     "StaticLoad",
     "SteppingOptions",
@@ -135,6 +138,7 @@ __all__ = [
     "continue_branch",
     "frequency_response",
     "library",
+    "load",
     "stability",
     "verify",
 ]

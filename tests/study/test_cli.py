@@ -66,7 +66,7 @@ def test_a_mistyped_command_is_one_message():
 
 def test_a_folder_that_cannot_be_made_is_known_before_the_work(tmp_path):
     (tmp_path / "taken").write_text("a file")
-    done = run("demo", "--out", str(tmp_path / "taken"), check=1)
+    done = run("demo", "--out", str(tmp_path / "taken"), check=2)
     assert done.stderr.startswith("suboctave: ")
     assert "Traceback" not in done.stderr
     assert not done.stdout

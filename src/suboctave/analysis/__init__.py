@@ -1,7 +1,19 @@
 """What a user calls: response curves, curves along any parameter, stability and verification of single motions."""
 
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
-__all__ = ["Branch", "BranchPoint", "Verification", "continue_branch", "frequency_response", "stability", "verify"]
+__all__ = [
+    "Branch",
+    "BranchPoint",
+    "Results",
+    "Table",
+    "Verification",
+    "continue_branch",
+    "frequency_response",
+    "load",
+    "stability",
+    "verify",
+]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,6 +50,8 @@ class Branch:
         Whether the curve closed on itself, and a sentence saying why it ended.
     options
         Everything it was computed with.
+    seconds
+        How long that took; nan where nobody measured.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class Branch:
         self.options = dict(options)
         self.warnings = warnings
         self.audit = audit or Audit()
+        self.seconds = float("nan")
 
     def __len__(self) -> int:
         return len(self.points)
@@ -179,6 +183,52 @@ class Branch:
             "residual": [p.orbit.residual for p in self.points],
         }
         return pd.DataFrame(columns)
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
+
+        Raises
+        ------
+        InputError
+            If the file exists and `overwrite` is not given, or cannot be written there.
+        """
+        from suboctave.analysis.results import save_branch
+
+        return save_branch(self, path, overwrite)
+
+    def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
+        """The points, or the "bifurcations", as comma-separated text (.csv)."""
+        from suboctave.analysis.results import write_csv
+
+        frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
+        if what not in frames:
+            raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
+        return write_csv(frames[what](), path, overwrite)
+
+    def bifurcations_frame(self) -> pandas.DataFrame:
+        """One row per bifurcation, grazing and event, in the order met: place, parameters, multiplier, errors."""
+        import pandas as pd
+
+        rows = []
+        for item in sorted([*self.bifurcations.met, *self.events.met], key=lambda b: b.arclength):
+            mu = item.critical_multiplier()
+            rows.append(
+                {
+                    **item.parameters,
+                    "kind": item.kind,
+                    "omega": item.omega,
+                    "amplitude": item.amplitude,
+                    "multiplier_real": mu.real,
+                    "multiplier_imag": mu.imag,
+                    "residual": item.residual,
+                    "uncertainty": item.uncertainty,
+                    "arclength": item.arclength,
+                    "remark": item.remark(),
+                }
+            )
+        names = ["kind", "omega", *self.system.parameters, "amplitude", "multiplier_real", "multiplier_imag"]
+        names += ["residual", "uncertainty", "arclength", "remark"]
+        return pd.DataFrame(rows, columns=list(dict.fromkeys(names)))  # a parameter may bear one of these names
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given."""

@@ -106,6 +106,8 @@ class _Follower:
         self._hidden = HiddenDoublings()
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._done = 0.0
+        #: somebody who keeps what has been found (`progress.reporting`)
+        self._found: Callable[[Trace], None] | None = getattr(settings.report, "found", None)
 
     def run(self) -> Trace:
         trace = self.trace
@@ -194,6 +196,8 @@ class _Follower:
             # where the branch folds back the share done does not
             self._done = max(self._done, min(1.0, share if self.direction > 0 else 1.0 - share))
             report(self._done, point.curve.where(point.u))
+        if self._found is not None:
+            self._found(self.trace)
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
         return bifurcation_at(located, a, b, self.settings.observe, self.trace.warnings)

@@ -2,13 +2,38 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from time import perf_counter
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from suboctave.errors import InputError
 
 Report = Callable[[float, str], None]
+
+
+Arguments = ParamSpec("Arguments")
+Curve = TypeVar("Curve", bound="Timed")
+
+
+class Timed(Protocol):
+    """Something that knows how long it took."""
+
+    seconds: float
+
+
+def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
+    """A verb whose result says in `seconds` how long it took."""
+
+    @functools.wraps(verb)
+    def measured(*positional: Arguments.args, **named: Arguments.kwargs) -> Curve:
+        begin = perf_counter()
+        result = verb(*positional, **named)
+        result.seconds = perf_counter() - begin
+        return result
+
+    return measured
 
 
 @contextmanager
@@ -16,7 +41,8 @@ def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     """A function (share done, where) to report to, or None.
 
     `progress` is None or False (silent), True (a bar on standard error, silent where that is not a terminal), or a
-    callable that takes the share done, 0 to 1, and a text.
+    callable that takes the share done, 0 to 1, and a text. If that has a method `found`, it is called after each point
+    with the trace so far (points, bifurcations): a journal keeps it.
     """
     if progress is None or progress is False:
         yield None

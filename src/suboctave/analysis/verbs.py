@@ -11,7 +11,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, check_system, is_number, make_settings
 from suboctave.analysis.follow import Settings, Trace, follow
-from suboctave.analysis.progress import reporting
+from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.verdicts import with_verdicts
@@ -35,6 +35,7 @@ _DENSE_UNKNOWNS = 8000
 Harmonics = int | str | AdaptiveHarmonics
 
 
+@timed
 def frequency_response(
     system: System,
     omega: tuple[float, float],
@@ -109,6 +110,7 @@ def frequency_response(
     return _branch(system, "omega", trace, settings, options)
 
 
+@timed
 def continue_branch(
     start: System | PeriodicOrbit | BranchPoint | Bifurcation,
     parameter: str,
@@ -267,13 +269,15 @@ def _curve(
         )
     if linear is not None and not isinstance(linear, LinearPart):
         raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
-    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
-    if balance.dimension > _DENSE_UNKNOWNS:
+    size = system.n if linear is None else linear.size
+    unknowns = size * (2 * high * nu + 1)
+    if unknowns > _DENSE_UNKNOWNS:
         raise InputError(
-            f"{balance.size} DOFs with {high} harmonics are {balance.dimension} unknowns with dense matrices, more "
-            f"than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads "
-            "touch (linear=)"
+            f"{size} DOFs with {high} harmonics are {unknowns} unknowns with dense matrices, more than "
+            f"{_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
+            "(linear=)"
         )
+    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
     return ResponseCurve(balance, name, omega, span, adaptive)
 
 

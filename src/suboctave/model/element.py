@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
 from suboctave.model.expression import Coefficient, coefficient
+from suboctave.model.recorded import Recorded
 from suboctave.model.sampling import Sampling, SharpSampling, SharpVelocitySampling
 
 __all__ = ["Array", "BaseElement", "Dof", "Element", "Place"]
@@ -80,7 +81,7 @@ class Place:
         return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
 
 
-class BaseElement(ABC):
+class BaseElement(Recorded, ABC, family="element"):
     """What all elements have in common: where they act, and their coefficients. Immutable by convention.
 
     own_nodes
@@ -130,7 +131,7 @@ class BaseElement(ABC):
             c[i] = source.value(values)
         return c
 
-    def check(self, values: Mapping[str, float], first: bool) -> None:  # noqa: B027 - most have nothing to refuse
+    def check(self, values: Mapping[str, float], first: bool) -> None:
         """Refuse coefficients that make no sense at a system's parameters.
 
         Called with `first=True` when a system is made, with False when it is given other parameters.

@@ -15,6 +15,7 @@ from suboctave.errors import InputError
 from suboctave.model.element import Array, Dof, Place, required
 from suboctave.model.expression import ZERO, Coefficient, coefficient
 from suboctave.model.matrix import MatrixCoefficient
+from suboctave.model.recorded import Recorded
 
 __all__ = ["HarmonicLoad", "Load", "LoadComponent", "Matrices"]
 
@@ -33,7 +34,7 @@ class LoadComponent:
     phase: Coefficient
 
 
-class Load(ABC):
+class Load(Recorded, ABC, family="load"):
     """A periodic or constant force on the right-hand side. Subclasses are immutable by convention."""
 
     @property
@@ -53,7 +54,7 @@ class Load(ABC):
         `matrices`: those of the structure, for loads of inertia and of moving bases.
         """
 
-    def check_elements(self, n: int, elements: Sequence[Any]) -> None:  # noqa: B027 - most go with any
+    def check_elements(self, n: int, elements: Sequence[Any]) -> None:
         """Refuse elements that the load cannot act beside."""
 
     def _read(self, what: str, source: Any) -> Coefficient:

@@ -1,0 +1,214 @@
+"""What a study leaves: branches and tables by name, with what produced them; and `load`, which reads results files."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.saved import branch_from_dataset, branch_to_dataset
+from suboctave.errors import InputError, suggest
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.store import files
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["Results", "Table", "from_dataset", "load", "provenance", "save_branch", "to_dataset"]
+
+#: what a group of a file may hold
+_BRANCH, _TABLE = "branch", "table"
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Numbers and texts in named columns, (rows,) each: what analyses give that are no curves. `title` says of what."""
+
+    columns: Mapping[str, np.ndarray]
+    title: str = ""
+
+    def __len__(self) -> int:
+        return max((len(column) for column in self.columns.values()), default=0)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.columns:
+            raise InputError(f"the table has no column {name!r}{suggest(name, self.columns)}")
+        return self.columns[name]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The columns as variables on the dimension `row`."""
+        import xarray
+
+        return xarray.Dataset(
+            {name: ("row", column) for name, column in self.columns.items()}, attrs={"title": self.title}
+        )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per row."""
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.columns))
+
+    def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
+        """The table as comma-separated text; a file that exists is left alone unless `overwrite`."""
+        return write_csv(self.to_dataframe(), path, overwrite)
+
+    def __repr__(self) -> str:
+        return f"Table: {self.title or 'untitled'}, {len(self)} rows\n{self.to_dataframe().to_string()}"
+
+
+@dataclass(frozen=True, eq=False)
+class Results(Mapping[str, "Branch | Table"]):
+    """The results of a study by the names of its analyses, in their order.
+
+    `attributes`: title, version, platform, time, the study's text; `details`: the same for each analysis (its kind, the
+    seconds that it took).
+    """
+
+    items_by_name: Mapping[str, Branch | Table]
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Branch | Table:
+        if name not in self.items_by_name:
+            raise InputError(f"there is no analysis {name!r}{suggest(str(name), self.items_by_name)}")
+        return self.items_by_name[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.items_by_name
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.items_by_name)
+
+    def __len__(self) -> int:
+        return len(self.items_by_name)
+
+    @property
+    def branches(self) -> dict[str, Branch]:
+        """The curves among the results."""
+        return {name: item for name, item in self.items_by_name.items() if isinstance(item, Branch)}
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """All of it as one NetCDF file (.nc), a group for each analysis; docs/results.md describes the layout.
+
+        Raises InputError where the file exists and `overwrite` is not given, or cannot be written.
+        """
+        target = files.free_place(path, overwrite, (".nc",))
+        wrong = [name for name in self if not name or "/" in name or name == "."]
+        if wrong:
+            raise InputError(f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, no slashes")
+        groups = {name: to_dataset(item, self.details.get(name, {})) for name, item in self.items()}
+        files.write(target, groups, {"contents": "study", **provenance(), **self.attributes})
+        return target
+
+    def __repr__(self) -> str:
+        title = self.attributes.get("title") or "untitled"
+        lines = [f"Results of the study {title!r}:"]
+        for name, item in self.items():
+            what = f"{len(item)} points, {len(item.bifurcations)} bifurcations" if isinstance(item, Branch) else "table"
+            lines.append(f"  {name}: {what}")
+        return "\n".join(lines)
+
+
+def provenance() -> dict[str, str]:
+    """What a file says of its origin: version, interpreter, platform, time."""
+    return {
+        "suboctave": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "platform": platform.platform(),
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def to_dataset(item: Branch | Table, details: Mapping[str, Any] | None = None) -> xarray.Dataset:
+    """A result as a dataset that a file or the journal can hold, `details` among its attributes."""
+    if isinstance(item, Branch):
+        return branch_to_dataset(item).assign_attrs({**(details or {}), "contents": _BRANCH})
+    dataset = item.to_xarray()
+    for name, variable in list(dataset.variables.items()):
+        if variable.dtype.kind == "c":
+            pair = {f"{name}_real": ("row", variable.values.real), f"{name}_imag": ("row", variable.values.imag)}
+            dataset = dataset.drop_vars([name]).assign(pair)
+        elif variable.dtype.kind == "O":
+            dataset = dataset.assign({name: ("row", variable.values.astype(str))})
+    order = "\n".join(item.columns)
+    return dataset.assign_attrs({**(details or {}), "contents": _TABLE, "columns": order})
+
+
+def from_dataset(
+    dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None
+) -> tuple[Branch | Table, dict[str, Any]]:
+    """The result that `to_dataset` wrote, and the dataset's attributes."""
+    details = {str(name): _plain(value) for name, value in dataset.attrs.items()}
+    if details.get("contents") == _BRANCH:
+        return branch_from_dataset(dataset, allow_code, linear), details
+    if details.get("contents") != _TABLE:
+        raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
+    columns: dict[str, np.ndarray] = {}
+    for name in str(details.get("columns", "")).splitlines():
+        if name in dataset:
+            columns[name] = np.asarray(dataset[name].values)
+        else:
+            columns[name] = dataset[f"{name}_real"].values + 1j * dataset[f"{name}_imag"].values
+    return Table(columns, str(details.get("title", ""))), details
+
+
+def save_branch(branch: Branch, path: str | Path, overwrite: bool = False) -> Path:
+    """One branch as a NetCDF file (.nc) of its own."""
+    target = files.free_place(path, overwrite, (".nc",))
+    files.write(target, {"": to_dataset(branch)}, provenance())
+    return target
+
+
+def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None) -> Branch | Results:
+    """Read a results file: the branch of `Branch.save`, or the `Results` of a study.
+
+    Parameters
+    ----------
+    path
+        A NetCDF file that suboctave wrote.
+    allow_code
+        Import the modules of a user's own elements and functions that the file names. Classes that are already defined
+        are found without it.
+    linear
+        The linear part that the curves were computed with, where that was not the system's own matrices.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, no results file, damaged, or of a newer version; the message says what to do.
+    """
+    groups = files.read(path)
+    root = groups.pop("")
+    try:
+        if root.attrs.get("contents") == _BRANCH:
+            item, _ = from_dataset(root, allow_code, linear)
+            assert isinstance(item, Branch)
+            return item
+        read = {name: from_dataset(dataset, allow_code, linear) for name, dataset in groups.items()}
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    order = str(root.attrs.get("analyses", "")).splitlines()
+    names = sorted(read, key=lambda name: order.index(name) if name in order else len(order))
+    attributes = {str(name): _plain(value) for name, value in root.attrs.items()}
+    return Results({n: read[n][0] for n in names}, attributes, {n: read[n][1] for n in names})
+
+
+def write_csv(frame: pandas.DataFrame, path: str | Path, overwrite: bool = False) -> Path:
+    """A table as comma-separated text, all digits kept."""
+    target = files.free_place(path, overwrite, (".csv",))
+    files.replace_file(target, lambda place: frame.to_csv(place, index=False, float_format="%.17g"))
+    return target
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,299 @@
+"""A system as plain data, and back, bit for bit: `describe(system)` and `build(description)`.
+
+The description is what JSON can hold: numbers, texts, lists, mappings. Elements and loads are `{"type": name, argument:
+value, ...}` with the arguments they were made with; matrices keep their numbers and their expressions apart, as the
+system does. Floating-point numbers survive JSON unchanged. Large arrays may be kept outside, in a mapping that the
+caller provides.
+
+Nothing that a description says is executed. A user's own class is found if it is already defined in this process;
+modules are imported, and Python functions looked up, only with `allow_code=True`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import numbers
+from collections.abc import Mapping, MutableMapping
+from typing import Any
+
+import numpy as np
+
+from suboctave.errors import InputError, suggest
+from suboctave.model.expression import Coefficient, coefficient
+from suboctave.model.mass_check import check_mass
+from suboctave.model.matrix import MatrixCoefficient
+from suboctave.model.recorded import Recorded, constructor_arguments, known_kinds, type_name
+from suboctave.model.system import System, _assemble, _read_dof_names, _read_parameters
+
+__all__ = ["build", "build_part", "describe", "describe_part", "plain_value"]
+
+Arrays = MutableMapping[str, np.ndarray]
+#: entries from which on an array is kept outside the description, where there is an outside
+_LARGE = 64
+#: keys that say what a mapping stands for
+_MARKS = frozenset({"float", "expression", "array", "stored", "sparse", "mapping", "callable", "type"})
+_DTYPES = ("|b1", *(f"{order}{kind}{size}" for order in "<>|" for kind in "iuf" for size in (1, 2, 4, 8)))
+_MATRICES = ("mass", "damping", "stiffness")
+_NO_CODE = "it names Python code, which is used only if you allow it (allow_code=True, or --allow-code)"
+
+
+def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
+    """The system as plain data; large arrays go into `arrays` under names of their own, if that is given.
+
+    Raises InputError where an argument cannot be written down (a function without a name that can be imported).
+    """
+    return {
+        "name": system.name,
+        "dof_names": list(system.dof_names),
+        **{what: _matrix(getattr(system, what), arrays) for what in _MATRICES},
+        "elements": [describe_part(element, arrays) for element in system.elements],
+        "loads": [describe_part(load, arrays) for load in system.loads],
+        "parameters": dict(system.parameters),
+    }
+
+
+def describe_part(part: Any, arrays: Arrays | None = None) -> dict[str, Any]:
+    """An element or load as `{"type": name, argument: value, ...}`."""
+    kind = type(part)
+    given = getattr(part, "arguments", None)
+    if not isinstance(part, Recorded) or given is None:
+        raise InputError(f"{part!r} cannot be written down: it does not know the arguments it was made with")
+    if "<" in kind.__qualname__:
+        raise InputError(f"{kind.__qualname__} cannot be written down: define it at the top of a module")
+    try:
+        return {"type": type_name(kind)} | {name: plain_value(value, arrays) for name, value in given.items()}
+    except InputError as error:
+        raise InputError(f"{part!r}: {error}") from None
+
+
+def build(
+    description: Mapping[str, Any], arrays: Mapping[str, np.ndarray] | None = None, allow_code: bool = False
+) -> System:
+    """The system of a description that `describe` made.
+
+    Raises InputError where the description is not one, or names a class that is not known (see `allow_code` above).
+    """
+    try:
+        mass, damping, stiffness = (_read_matrix(description[what], what, arrays or {}) for what in _MATRICES)
+        elements, loads = (
+            tuple(build_part(item, family, arrays or {}, allow_code) for item in description[f"{family}s"])
+            for family in ("element", "load")
+        )
+        parameters, name = description["parameters"], str(description["name"])
+        dof_names = _read_dof_names(description["dof_names"], mass.n)
+    except InputError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
+    if not mass.n == damping.n == stiffness.n:
+        raise InputError("this is not the description of a system: its matrices have different sizes")
+    read = _read_parameters(parameters)
+    system = _assemble(mass, damping, stiffness, elements, loads, read, name, dof_names)
+    system._check_names()
+    system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
+    check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))
+    return system
+
+
+def build_part(
+    item: Mapping[str, Any],
+    family: str,
+    arrays: Mapping[str, np.ndarray] | None = None,
+    allow_code: bool = False,
+) -> Any:
+    """The element or load (`family`) of `{"type": name, argument: value, ...}`; InputError for anything wrong in it."""
+    if not isinstance(item, Mapping):
+        raise InputError(f"an {family} is a table with a type, not {item!r}")
+    given = dict(item)
+    if "type" not in given:
+        raise InputError(f"the {family} has no type{suggest('', known_kinds(family))}")
+    kind = _kind(given.pop("type"), family, allow_code)
+    known = constructor_arguments(kind)
+    for name in given:
+        if name not in known:
+            raise InputError(f"{kind.__name__} has no argument {name!r}{suggest(str(name), known)}")
+    try:
+        return kind(**{name: from_plain(value, arrays or {}, allow_code) for name, value in given.items()})
+    except InputError:
+        raise
+    except (TypeError, ValueError, ArithmeticError, RecursionError) as error:
+        raise InputError(f"{kind.__name__}: {error}") from None
+
+
+def _kind(name: Any, family: str, allow_code: bool) -> type:
+    known = known_kinds(family)
+    if not isinstance(name, str):
+        raise InputError(f"the type of an {family} is a text, not {name!r}")
+    if name in known:
+        return known[name]
+    if ":" in name:
+        module, _, _ = name.partition(":")
+        if not allow_code:
+            raise InputError(f"the {family} {name!r} is not defined in this process: {_NO_CODE}")
+        _import(module)
+        known = known_kinds(family)
+        if name in known:
+            return known[name]
+    raise InputError(f"there is no {family} {name!r}{suggest(name, known)}")
+
+
+def _import(module: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except Exception as error:  # whatever happens while a user's module runs
+        raise InputError(f"cannot import the module {module!r}: {type(error).__name__}: {error}") from None
+
+
+# ------------------------------------------------------------------------------------------------------------ values
+def plain_value(value: Any, arrays: Arrays | None = None) -> Any:
+    """An argument as plain data."""
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real):
+        number = float(value)
+        return number if math.isfinite(number) else {"float": repr(number)}
+    if isinstance(value, Coefficient):
+        return {"expression": value.text, "by": list(value.by)} if value.by else {"expression": value.text}
+    if isinstance(value, np.ndarray):
+        return _plain_array(value, arrays)
+    if hasattr(value, "tocsr"):
+        return _plain_sparse(value, arrays)
+    if isinstance(value, list | tuple):
+        return [plain_value(item, arrays) for item in value]
+    if isinstance(value, Mapping):
+        if not all(isinstance(name, str | int) for name in value):
+            raise InputError(f"cannot be written down: the keys of {value!r} are neither texts nor whole numbers")
+        pairs = {str(name): plain_value(item, arrays) for name, item in value.items()}
+        return {"mapping": [list(pair) for pair in pairs.items()]} if pairs.keys() & _MARKS else pairs
+    if isinstance(value, Recorded):
+        return describe_part(value, arrays)
+    if callable(value):
+        return {"callable": _place_of(value)}
+    raise InputError(f"cannot be written down: an argument is a {type(value).__name__}, {value!r}")
+
+
+def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = False) -> Any:
+    """The argument that `plain_value` wrote."""
+    if isinstance(value, list):
+        return [from_plain(item, arrays, allow_code) for item in value]
+    if not isinstance(value, Mapping):
+        return value
+    match dict(value):
+        case {"float": "inf" | "-inf" | "nan" as text}:
+            return float(text)
+        case {"expression": str()}:
+            return _expression(value)
+        case {"array": _, "dtype": _, "shape": _} | {"stored": str()}:
+            return _read_array(value, arrays)
+        case {"sparse": Mapping()}:
+            return _read_sparse(value, arrays)
+        case {"mapping": list() as pairs}:
+            return {name: from_plain(item, arrays, allow_code) for name, item in pairs}
+        case {"callable": str() as place}:
+            return _callable(place, allow_code)
+        case {"type": str() as name}:
+            family = next((f for f in ("element", "load") if name in known_kinds(f)), "element")
+            return build_part(value, family, arrays, allow_code)
+    return {
+        int(name) if isinstance(name, str) and name.isdecimal() else name: from_plain(item, arrays, allow_code)
+        for name, item in value.items()
+    }
+
+
+def _expression(value: Mapping[str, Any]) -> Coefficient:
+    result = coefficient(value["expression"])
+    for name in value.get("by", ()):
+        result = result.derivative(name)
+    return result
+
+
+def _place_of(function: Any) -> str:
+    module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", None)
+    found: Any = None
+    if module and name and "<" not in name:
+        found = importlib.import_module(module)
+        for part in name.split("."):
+            found = getattr(found, part, None)
+    if found is not function:
+        raise InputError(f"cannot be written down: {function!r} is no function at the top of a module")
+    return f"{module}:{name}"
+
+
+def _callable(place: str, allow_code: bool) -> Any:
+    module, _, name = place.partition(":")
+    if not module or not name:
+        raise InputError(f"write a Python function as 'module:function', not {place!r}")
+    if not allow_code:
+        raise InputError(f"the function {place!r} is not called: {_NO_CODE}")
+    found = _import(module)
+    for part in name.split("."):
+        if not hasattr(found, part):
+            raise InputError(f"the module {module!r} has no {name!r}{suggest(name, dir(found), 4)}")
+        found = getattr(found, part)
+    return found
+
+
+# ---------------------------------------------------------------------------------------------------------- matrices
+def _matrix(matrix: MatrixCoefficient, arrays: Arrays | None) -> dict[str, Any]:
+    return {
+        "base": plain_value(matrix._base, arrays),
+        "terms": [[plain_value(c), plain_value(pattern, arrays)] for c, pattern in matrix._terms],
+    }
+
+
+def _read_matrix(description: Mapping[str, Any], what: str, arrays: Mapping[str, np.ndarray]) -> MatrixCoefficient:
+    base = from_plain(description["base"], arrays)
+    terms = [(_expression(c), from_plain(pattern, arrays)) for c, pattern in description["terms"]]
+    shapes = {matrix.shape for matrix in (base, *(pattern for _, pattern in terms))}
+    if len(shapes) != 1 or len(base.shape) != 2 or base.shape[0] != base.shape[1]:
+        raise InputError(f"this is not the description of a system: {what} has shapes {sorted(shapes)}")
+    if not hasattr(base, "tocsr"):
+        base.setflags(write=False)
+    return MatrixCoefficient(base, terms, what)
+
+
+def _plain_array(array: np.ndarray, arrays: Arrays | None) -> Any:
+    if array.dtype.kind not in "fiub":
+        return [plain_value(item, arrays) for item in array.tolist()]
+    if arrays is not None and array.size > _LARGE:
+        key = f"array_{len(arrays)}"
+        arrays[key] = np.array(array)
+        return {"stored": key}
+    if not np.isfinite(array).all():
+        raise InputError("cannot be written down: an array has entries that are not finite")
+    return {"array": array.tolist(), "dtype": array.dtype.str, "shape": list(array.shape)}
+
+
+def _read_array(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    if "stored" in value:
+        if value["stored"] not in arrays:
+            raise InputError(f"the array {value['stored']!r} that the description refers to is missing")
+        return np.array(arrays[value["stored"]])
+    try:
+        if value["dtype"] not in _DTYPES:
+            raise ValueError(f"no array of {value['dtype']!r}")
+        return np.array(value["array"], dtype=value["dtype"]).reshape(value["shape"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"this is not an array: {error}") from None
+
+
+def _plain_sparse(matrix: Any, arrays: Arrays | None) -> dict[str, Any]:
+    rows = matrix.tocsr()
+    parts = {name: plain_value(np.asarray(getattr(rows, name)), arrays) for name in ("data", "indices", "indptr")}
+    return {"sparse": {**parts, "shape": list(rows.shape)}}
+
+
+def _read_sparse(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Any:
+    import scipy.sparse
+
+    inside = value["sparse"]
+    try:
+        parts = tuple(_read_array(inside[name], arrays) for name in ("data", "indices", "indptr"))
+        return scipy.sparse.csr_array(parts, shape=tuple(inside["shape"]))
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"this is not a sparse matrix: {error}") from None

@@ -1,0 +1,171 @@
+"""Results as NetCDF files: written beside their place, synced and renamed; read back only if nothing has changed.
+
+One curve is the file's root group; a study has a group for each analysis. Every group carries a digest of its content
+in the attribute `digest`, so that damage is noticed even where HDF5 itself does not.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.store.blocks import digest
+from suboctave.store.layout import LAYOUT
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["free_place", "read", "replace_file", "write"]
+
+_AGAIN = "run the study again, or take a copy that is whole"
+
+
+def free_place(path: str | Path, overwrite: bool = False, suffixes: tuple[str, ...] = ()) -> Path:
+    """The path, if a file can be written there; found out before any work.
+
+    Raises InputError where a file exists and `overwrite` is not given, or the folder is missing or not writable.
+    """
+    target = Path(path)
+    if suffixes and target.suffix.lower() not in suffixes:
+        raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
+    if target.is_dir():
+        raise InputError(f"{target} is a folder, not a file")
+    if target.exists() and not overwrite:
+        raise InputError(f"{target} exists and is left as it is: choose another name, or overwrite it on purpose")
+    folder = target.parent
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder: make it, or write elsewhere")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"the folder {folder} is not writable: write elsewhere, or ask for the right to")
+    return target
+
+
+def replace_file(target: Path, make: Any) -> None:
+    """Have `make(path)` write a file beside `target`, sync it to the disk and rename it: all of it, or nothing."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}-", suffix=".part", dir=target.parent)
+    os.close(handle)
+    try:
+        make(Path(name))
+        with open(name, "rb+") as written:
+            os.fsync(written.fileno())
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(name, 0o666 & ~mask)
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    _sync_folder(target.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write(path: Path, groups: Mapping[str, xarray.Dataset], attributes: Mapping[str, Any]) -> None:
+    """The datasets as groups of one file (the name "" is the root), with attributes on the root."""
+    import xarray
+
+    def make(place: Path) -> None:
+        root = groups.get("", xarray.Dataset())
+        root = root.assign_attrs(attributes)
+        _to_group(root, place, None, "w")
+        for name, dataset in groups.items():
+            if name:
+                _to_group(dataset, place, name, "a")
+
+    replace_file(path, make)
+
+
+def _to_group(dataset: xarray.Dataset, place: Path, group: str | None, mode: Any) -> None:
+    stated = dataset.assign_attrs(layout=LAYOUT, suboctave=__version__)
+    stated = stated.assign_attrs(digest=digest(stated))
+    encoding: dict[Any, Any] = {
+        name: {"_FillValue": None} | ({"zlib": True, "shuffle": True} if variable.size > 256 else {})
+        for name, variable in stated.variables.items()
+        if variable.dtype.kind not in "OU"
+    }
+    stated.to_netcdf(place, mode=mode, group=group, engine="h5netcdf", encoding=encoding)
+
+
+def read(path: str | Path) -> dict[str, xarray.Dataset]:
+    """The groups of a results file, by name, each whole and unchanged.
+
+    Raises InputError for what is missing, no results file, damaged, or written by a newer version.
+    """
+    source = Path(path)
+    if not source.exists():
+        raise InputError(f"there is no file {source}")
+    if source.is_dir():
+        raise InputError(f"{source} is a folder, not a results file")
+    try:
+        with open(source, "rb") as file:
+            start = file.read(8)
+    except OSError as error:
+        raise InputError(f"cannot read {source}: {error.strerror}") from None
+    if start != b"\x89HDF\r\n\x1a\n":
+        what = "it is empty" if not start else "it is not a NetCDF (HDF5) file"
+        raise InputError(f"{source} is no results file of suboctave: {what}")
+    try:
+        groups = _read_groups(source)
+    except InputError:
+        raise
+    except Exception as error:  # what a damaged file makes of the HDF5 library is anyone's guess
+        raise InputError(f"{source} is damaged or cut short ({_first_line(error)}): {_AGAIN}") from None
+    for name, dataset in groups.items():
+        _check(source, name, dataset)
+    return groups
+
+
+def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
+    import h5py
+    import xarray
+
+    with h5py.File(source, "r") as file:
+        if "layout" not in file.attrs:
+            raise InputError(f"{source} is no results file of suboctave: it has no attribute 'layout'")
+        found = int(np.ravel(file.attrs["layout"])[0])
+        if found > LAYOUT:
+            raise InputError(
+                f"{source} has layout {found}, newer than {LAYOUT}: it was written by suboctave "
+                f"{file.attrs.get('suboctave', '(unknown version)')}; update suboctave to read it"
+            )
+        if found < 1:
+            raise InputError(f"{source} states the unknown layout {found}: {_AGAIN}")
+        names = [name for name, item in file.items() if isinstance(item, h5py.Group)]
+    groups = {}
+    for name in ["", *names]:
+        with xarray.open_dataset(source, group=name or None, engine="h5netcdf") as dataset:
+            groups[name] = dataset.load()
+    return groups
+
+
+def _check(source: Path, name: str, dataset: xarray.Dataset) -> None:
+    part = f"the part {name!r} of {source}" if name else str(source)
+    stated = dataset.attrs.pop("digest", None)
+    if stated is None:
+        raise InputError(f"{part} has no digest: it was changed by another program; {_AGAIN}")
+    try:
+        found = digest(dataset)
+    except Exception as error:  # attributes and texts that no writer of ours has made
+        raise InputError(f"{part} is damaged ({_first_line(error)}): {_AGAIN}") from None
+    if found != stated:
+        raise InputError(f"{part} is damaged: its content is not what was written; {_AGAIN}")
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0][:120]}" if text else type(error).__name__

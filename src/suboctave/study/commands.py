@@ -1,0 +1,277 @@
+"""What the commands do: each prints for a reader, or one JSON object for a machine."""
+
+from __future__ import annotations
+
+import json
+from contextlib import AbstractContextManager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis import Branch, Results, Table, load
+from suboctave.errors import InputError, suggest
+from suboctave.store import files
+from suboctave.study.file import Study, read_study
+from suboctave.study.runner import JOURNAL, Finished, Outcome, recovered, run_study
+from suboctave.study.screen import bar, console, print_branch, print_table, print_texts
+from suboctave.study.steps import Step
+
+__all__ = ["check", "examples", "new", "run", "show"]
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def examples() -> dict[str, str]:
+    """The study files that `new` writes, by name, with the first line of each."""
+    return {
+        path.stem: path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
+        for path in sorted(_TEMPLATES.glob("*.toml"))
+    }
+
+
+def new(path: Path, example: str, names: bool, overwrite: bool, as_json: bool) -> None:
+    """Write an example, or name them all."""
+    known = examples()
+    if names:
+        if as_json:
+            _print_json({"ok": True, "examples": known})
+            return
+        print_texts(console(), ("example", "what it is"), list(known.items()), left=("example", "what it is"))
+        return
+    if example not in known:
+        raise InputError(f"there is no example {example!r}{suggest(example, known)}")
+    target = files.free_place(path, overwrite, (".toml",))
+    text = (_TEMPLATES / f"{example}.toml").read_text(encoding="utf-8").replace("THIS_FILE", str(path))
+    files.replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
+    if as_json:
+        _print_json({"ok": True, "file": str(target), "example": example})
+    else:
+        console().print(f"{target} is written; run it: suboctave run {target}", markup=False, soft_wrap=True)
+
+
+def check(path: Path, allow_code: bool, as_json: bool) -> None:
+    """Read a study; what is wrong is raised."""
+    study = read_study(path, allow_code)
+    if as_json:
+        _print_json({"ok": True, "analyses": [step.name for step in study.steps], "mistakes": []})
+    else:
+        count = "1 analysis" if len(study.steps) == 1 else f"{len(study.steps)} analyses"
+        console().print(f"{path} is in order: {count}, outputs in {study.folder}", markup=False, soft_wrap=True)
+
+
+def run(path: Path, out: Path | None, overwrite: bool, resume: bool, allow_code: bool, as_json: bool) -> int:
+    """Run a study and print what came of it; the exit status."""
+    study = read_study(path, allow_code)
+    screen = console(quiet=as_json)
+    titles = [study.title] if study.title else []
+
+    def watch(step: Step) -> AbstractContextManager[Any]:
+        return bar(step.name)
+
+    def said(item: Finished) -> None:
+        while titles:  # above the first result: what is refused before any work has no title
+            screen.print(titles.pop(), style="bold", markup=False)
+        _print_finished(screen, item)
+
+    outcome = run_study(study, out, overwrite, resume, watch, said)
+    if outcome.complete_already:
+        screen.print(f"nothing to resume: {outcome.files[0]} is complete", markup=False, soft_wrap=True)
+    elif outcome.files:
+        screen.print()
+        for file in outcome.files:
+            screen.print(f"written: {file}", markup=False, soft_wrap=True)
+    status = _status(outcome)
+    if as_json:
+        _print_json(_summary(outcome, status))
+    elif outcome.interrupted:
+        screen.print(f"interrupted; what was computed is kept. Go on: suboctave run {path} --resume", markup=False)
+    elif status:
+        names = ", ".join(item.step.name for item in outcome.failed)
+        screen.print(f"failed: {names}. Change the study, and go on with --resume", markup=False)
+    return status
+
+
+def _status(outcome: Outcome) -> int:
+    if outcome.interrupted:
+        return 130
+    if not outcome.failed:
+        return 0
+    return 2 if any(item.wrong_input for item in outcome.failed) else 1
+
+
+def _print_finished(screen: Any, item: Finished) -> None:
+    note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
+    if isinstance(item.result, Branch):
+        print_branch(screen, item.step.name, item.result, note)
+    elif item.result is not None:
+        print_table(screen, item.step.name, item.result, note)
+    else:
+        screen.print(f"\n{item.step.name}", style="bold", markup=False, end="")
+        screen.print(f": failed. {item.failure}", markup=False)
+
+
+def _summary(outcome: Outcome, status: int) -> dict[str, Any]:
+    analyses = []
+    for item in outcome.finished:
+        said: dict[str, Any] = {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
+        said |= {"reused": item.reused, "failure": item.failure}
+        if item.result is not None:
+            said |= _result(item.result)
+        analyses.append(said)
+    return {
+        "ok": status == 0,
+        "status": status,
+        "interrupted": outcome.interrupted,
+        "analyses": analyses,
+        "files": [str(file) for file in outcome.files],
+    }
+
+
+def show(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, as_json: bool) -> None:
+    """Print a results file, a study file or a journal."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name the results file in it, or the study file")
+    if path.suffix.lower() == ".toml":
+        _no_csv(csv)
+        _show_study(read_study(path, allow_code), as_json)
+        return
+    if path.suffix == Path(JOURNAL).suffix:
+        _no_csv(csv)
+        _show_journal(path, as_json)
+        return
+    found = load(path, allow_code=allow_code)
+    results = found if isinstance(found, Results) else Results({path.stem: found})
+    written = _csv(results, csv, overwrite) if csv is not None else []
+    if as_json:
+        listed = {name: _result(item) for name, item in results.items()}
+        _print_json(
+            {"ok": True, "attributes": dict(results.attributes), "analyses": listed, "files": [str(f) for f in written]}
+        )
+        return
+    screen = console()
+    if results.attributes.get("title"):
+        screen.print(str(results.attributes["title"]), style="bold", markup=False)
+    if "written" in results.attributes:
+        said = results.attributes
+        screen.print(f"suboctave {said.get('suboctave')}, {said['written']}", markup=False)
+    for name, item in results.items():
+        seconds = results.details.get(name, {}).get("seconds")
+        note = f" in {seconds:.2f} s" if seconds is not None else ""
+        if isinstance(item, Branch):
+            print_branch(screen, name, item, note)
+        else:
+            print_table(screen, name, item, note)
+    for file in written:
+        screen.print(f"written: {file}", markup=False, soft_wrap=True)
+
+
+def _no_csv(csv: Path | None) -> None:
+    if csv is not None:
+        raise InputError("--csv writes the tables of a results file; this is none")
+
+
+def _csv(results: Results, folder: Path, overwrite: bool) -> list[Path]:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    jobs: list[tuple[Path, Any]] = []
+    for name, item in results.items():
+        jobs.append((folder / f"{name}.csv", item.to_csv))
+        if isinstance(item, Branch):
+            bifurcations = item
+
+            def events(path: Path, overwrite: bool, branch: Branch = bifurcations) -> Path:
+                return branch.to_csv(path, "bifurcations", overwrite)
+
+            jobs.append((folder / f"{name}_bifurcations.csv", events))
+    for path, _ in jobs:
+        files.free_place(path, overwrite)
+    return [write(path, overwrite=overwrite) for path, write in jobs]
+
+
+def _show_study(study: Study, as_json: bool) -> None:
+    steps = [
+        {"name": step.name, "type": step.kind, "arguments": json.loads(step.model_dump_json(exclude_unset=True))}
+        for step in study.steps
+    ]
+    if as_json:
+        _print_json(
+            {
+                "ok": True,
+                "title": study.title,
+                "system": repr(study.system),
+                "analyses": steps,
+                "out": str(study.folder),
+            }
+        )
+        return
+    screen = console()
+    screen.print(study.title or study.source.name, style="bold", markup=False)
+    screen.print(repr(study.system), markup=False)
+    screen.print("\nanalyses", style="bold")
+    for step in steps:
+        said = {k: v for k, v in step["arguments"].items() if k not in ("name", "type")}
+        listed = ", ".join(f"{name} = {_written(value)}" for name, value in said.items())
+        screen.print(f"  {step['name']}: {step['type']}({listed})", markup=False)
+    screen.print(f"\noutputs in {study.folder}", markup=False, soft_wrap=True)
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k} = {_written(v)}" for k, v in value.items() if v not in (None, 0)) + "}"
+    return json.dumps(value)
+
+
+def _show_journal(path: Path, as_json: bool) -> None:
+    found, torn = recovered(path)
+    if as_json:
+        _print_json({"ok": True, "analyses": [asdict(item) for item in found], "torn": torn})
+        return
+    screen = console()
+    screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
+    rows = [[item.name, item.state, str(item.points), str(item.bifurcations)] for item in found]
+    print_texts(screen, ("analysis", "state", "points", "bifurcations"), rows, left=("analysis", "state"))
+    for item in found:
+        if item.events:
+            screen.print(f"{item.name}, so far", style="bold", markup=False)
+            lines = [[kind, f"{omega:.8f}", f"{amplitude:.7f}"] for kind, omega, amplitude in item.events]
+            print_texts(screen, ("kind", "omega", "max |x|"), lines, left=("kind",))
+    if torn:
+        screen.print("its last record is torn and is left out", markup=False)
+
+
+def _result(item: Branch | Table) -> dict[str, Any]:
+    if isinstance(item, Table):
+        return {"title": item.title, "rows": len(item), "columns": {n: _listed(c) for n, c in item.columns.items()}}
+    events = item.bifurcations_frame().to_dict("records")
+    values = item.parameter(item.name)
+    return {
+        "points": len(item),
+        "unstable": int(np.count_nonzero(~item.stable)) if len(item) else 0,
+        "along": item.name,
+        "from": float(values[0]) if len(item) else None,
+        "to": float(values[-1]) if len(item) else None,
+        "closed": bool(item.closed),
+        "ended": item.ended,
+        "warnings": list(item.warnings),
+        "bifurcations": [{str(k): _plain(v) for k, v in event.items()} for event in events],
+    }
+
+
+def _listed(column: np.ndarray) -> list[Any]:
+    return [_plain(value) for value in column]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, complex | np.complexfloating):
+        return [_plain(value.real), _plain(value.imag)]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _print_json(said: dict[str, Any]) -> None:
+    print(json.dumps(said, ensure_ascii=False, allow_nan=False, default=_plain))

@@ -1,0 +1,254 @@
+"""The study file: TOML to a checked `Study`, or all its mistakes at once, each with its line."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from suboctave.errors import InputError, suggest
+from suboctave.model.description import describe
+from suboctave.model.system import System
+from suboctave.study.lines import Lines
+from suboctave.study.mistakes import Mistake, Mistakes, StudyError
+from suboctave.study.outputs import FigureSection, Outputs, check_outputs
+from suboctave.study.steps import STEPS, Step, Surroundings
+from suboctave.study.system import SystemSection, make_system, overridden
+from suboctave.version import __version__
+
+__all__ = ["Study", "read_study"]
+
+#: a study file is written by hand; anything longer is something else
+_LONGEST = 5_000_000
+
+
+class StudyFile(BaseModel):
+    """The sections of a study file; analyses are read one by one, each as the step that it is."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    title: str = ""
+    system: dict[str, Any]
+    analyses: list[dict[str, Any]] = Field(min_length=1)
+    outputs: dict[str, Any] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study that has been checked and can run.
+
+    source, text
+        The file and what it says.
+    system
+        What vibrates.
+    steps
+        The analyses in order.
+    outputs
+        What is written, and where.
+    allow_code
+        Whether the user has allowed Python code that the file names.
+    """
+
+    source: Path
+    text: str
+    title: str
+    system: System
+    steps: tuple[Step, ...]
+    outputs: Outputs
+    allow_code: bool = False
+
+    def system_of(self, step: Step) -> System:
+        """The system at the parameters of one analysis."""
+        return self.system.with_parameters(step.parameters) if step.parameters else self.system
+
+    def key_of(self, step: Step) -> str:
+        """What an analysis depends on, as a digest: version, system, arguments, and the analyses it starts from."""
+        by_name = {s.name: s for s in self.steps}
+        said = {
+            "version": __version__,
+            "system": describe(self.system_of(step)),
+            "step": {k: v for k, v in step.model_dump(mode="json").items() if k != "name"},
+            "needs": [self.key_of(by_name[name]) for _, name in step.needs()],
+        }
+        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def folder(self) -> Path:
+        """Where outputs go, unless told otherwise: beside the study file."""
+        return self.source.parent / (self.outputs.folder or f"{self.source.stem}_results")
+
+
+def read_study(path: str | Path, allow_code: bool = False) -> Study:
+    """A study file, read and checked; nothing is run.
+
+    Raises StudyError (an InputError) with every mistake and its line.
+    """
+    source = Path(path)
+    text = _text(source)
+    content = _parsed(source, text)
+    mistakes = Mistakes(str(source), Lines(text))
+    sections = _validated(StudyFile, content, (), mistakes)
+    if sections is None:
+        # the sections that are there are still looked at, so that all mistakes are told at once
+        kept = {k: v for k, v in content.items() if k in StudyFile.model_fields and _fits(k, v)}
+        sections = StudyFile.model_construct(**{"title": "", "system": None, "analyses": [], "outputs": {}} | kept)
+    system = None
+    if isinstance(sections.system, dict):
+        section = _validated(SystemSection, sections.system, ("system",), mistakes)
+        if section is None:
+            section = _what_is_left(sections.system)
+        if section is not None:
+            system = make_system(section, source.parent, mistakes, allow_code)
+    steps = _steps(sections.analyses, system, mistakes, allow_code)
+    outputs = _outputs(sections.outputs, steps, system, mistakes)
+    mistakes.refuse()
+    assert system is not None
+    assert outputs is not None
+    return Study(source, text, sections.title, system, tuple(s for s in steps if s), outputs, allow_code)
+
+
+def _what_is_left(given: Mapping[str, Any]) -> SystemSection | None:
+    """The [system] without what is wrong in it, so that the rest is looked at as well; None where that cannot be."""
+    kept = {name: value for name, value in given.items() if name in SystemSection.model_fields}
+    try:
+        return SystemSection.model_validate(kept)
+    except ValidationError as error:
+        for item in error.errors(include_url=False):
+            place = item["loc"]
+            if place[0] == "parameters" and len(place) > 1 and isinstance(kept["parameters"], dict):
+                # it exists: expressions that name it are right
+                kept["parameters"] = {**kept["parameters"], str(place[1]): 1.0}
+            else:
+                kept.pop(str(place[0]), None)
+    try:
+        return SystemSection.model_validate(kept)
+    except ValidationError:
+        return None
+
+
+def _fits(key: str, value: Any) -> bool:
+    if key == "analyses":
+        return isinstance(value, list) and all(isinstance(item, dict) for item in value)
+    return isinstance(value, str if key == "title" else dict)
+
+
+def _text(source: Path) -> str:
+    if source.is_dir():
+        raise StudyError(str(source), [Mistake("", 0, "this is a folder, not a study file")])
+    try:
+        if source.stat().st_size > _LONGEST:
+            raise StudyError(str(source), [Mistake("", 0, "this is too long for a study file; keep matrices in files")])
+        return source.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        near = [p.name for p in source.parent.glob("*.toml")] if source.parent.is_dir() else []
+        hint = suggest(source.name, near) if near else "; `suboctave new` writes one"
+        raise StudyError(str(source), [Mistake("", 0, f"there is no such file{hint}")]) from None
+    except UnicodeDecodeError as error:
+        raise StudyError(str(source), [Mistake("", 0, f"this is no text in UTF-8 ({error.reason})")]) from None
+    except OSError as error:
+        raise StudyError(str(source), [Mistake("", 0, f"cannot be read: {error.strerror}")]) from None
+
+
+def _parsed(source: Path, text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        reason, line = "values are nested too deeply", 0
+    except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
+        reason = str(error)
+        found = re.search(r" \(at line (\d+), column (\d+)\)", reason)
+        line = int(found.group(1)) if found else text.count("\n") + 1 if "end of document" in reason else 0
+        reason = reason.replace(found.group(0), f", in column {found.group(2)}") if found else reason
+        reason = reason.replace(" (at end of document)", ": the file ends in the middle")
+    raise StudyError(str(source), [Mistake("", line, f"this is not TOML: {reason}")])
+
+
+def _validated(model: type[Any], given: Mapping[str, Any], prefix: tuple[str | int, ...], mistakes: Mistakes) -> Any:
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        mistakes.add_validation(prefix, error, model.model_fields)
+    return None
+
+
+def _steps(
+    analyses: list[dict[str, Any]], system: System | None, mistakes: Mistakes, allow_code: bool
+) -> list[Step | None]:
+    steps: list[Step | None] = []
+    before: dict[str, type[Step]] = {}
+    names: set[str] = set()
+    for index, given in enumerate(analyses):
+        place = ("analyses", index)
+        kind = given.get("type")
+        if not isinstance(kind, str) or kind not in STEPS:
+            if kind is None:
+                mistakes.add((*place, "type"), f"is missing{suggest('', STEPS)}")
+            else:
+                mistakes.add((*place, "type"), f"there is no analysis of the type {kind!r}{suggest(str(kind), STEPS)}")
+            steps.append(None)
+        else:
+            named = {"name": kind, **given} if isinstance(kind, str) else dict(given)
+            step = _validated(STEPS[kind], named, place, mistakes)
+            steps.append(step)
+            if step is not None and system is not None:
+                for where, text in _checked(step, system, before, mistakes, place, allow_code):
+                    mistakes.add((*place, *(p for p in where if p != "")), text)
+        name = given.get("name", kind)
+        if not isinstance(name, str):
+            continue
+        if name in names:
+            mistakes.add((*place, "name"), f"two analyses are called {name!r}; give each a name of its own")
+        elif not re.fullmatch(r"[^\W][\w .-]*", name):
+            mistakes.add((*place, "name"), f"{name!r} will not do: letters, digits, spaces, and . - _, no slash")
+        names.add(name)
+        if isinstance(kind, str) and kind in STEPS:
+            before[name] = STEPS[kind]
+    return steps
+
+
+def _checked(
+    step: Step,
+    system: System,
+    before: Mapping[str, type[Step]],
+    mistakes: Mistakes,
+    place: tuple[str | int, ...],
+    allow_code: bool,
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    here = overridden(system, step.parameters, (*place, "parameters"), mistakes)
+    if here is None:
+        return
+    try:
+        yield from step.check(Surroundings(here, before, allow_code))
+    except InputError as error:
+        yield (), str(error)
+
+
+def _outputs(
+    given: dict[str, Any], steps: list[Step | None], system: System | None, mistakes: Mistakes
+) -> Outputs | None:
+    plain = dict(given)
+    figures = plain.pop("figures", [])
+    sections: list[FigureSection] = []
+    if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
+        mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
+        figures = []
+    for index, item in enumerate(figures):
+        figure = _validated(FigureSection, item, ("outputs", "figures", index), mistakes)
+        if figure is not None:
+            sections.append(figure)
+    outputs = _validated(Outputs, plain, ("outputs",), mistakes)
+    if outputs is None or len(sections) < len(figures):
+        return None
+    complete: Outputs = outputs.model_copy(update={"figures": sections})
+    known = [step for step in steps if step is not None]
+    if len(known) == len(steps) and steps:
+        for key, text in check_outputs(complete, known, system):
+            mistakes.add(("outputs", *key), text)
+    return complete

@@ -1,0 +1,150 @@
+"""What a study writes: results, tables, figures, a report page. The one place where studies meet pictures."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path, PurePath
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from suboctave.analysis import Branch, Results, Table
+from suboctave.errors import suggest
+from suboctave.model.system import System
+from suboctave.pictures import plot_response
+from suboctave.pictures.saving import SUFFIXES
+from suboctave.store import files
+from suboctave.study.steps import Step
+
+__all__ = ["FigureSection", "Outputs", "check_outputs", "csv_names", "places", "write_outputs"]
+
+_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+_REPORT = "suboctave.pictures.report"
+
+
+class FigureSection(BaseModel):
+    """One figure of response curves; the form follows the suffix of `file`."""
+
+    model_config = _STRICT
+
+    file: str
+    analyses: list[str] = Field(default_factory=list)
+    x: str | None = None
+    labels: list[str] | None = None
+    title: str | None = None
+    size: list[float] = Field(default=[6.4, 4.2], min_length=2, max_length=2)
+
+
+class Outputs(BaseModel):
+    """What is written into `folder` (default: the study's name with _results, beside the study file)."""
+
+    model_config = _STRICT
+
+    folder: str | None = Field(default=None, min_length=1)
+    results: str = "results.nc"
+    csv: bool = False
+    html: str | None = None
+    figures: list[Any] = Field(default_factory=list)
+
+
+def check_outputs(
+    outputs: Outputs, steps: Sequence[Step], system: System | None
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """What is wrong with the outputs, before any work: key and message."""
+    curves = [step.name for step in steps if step.gives_branch]
+    names: list[tuple[tuple[str | int, ...], str]] = [(("results",), outputs.results)]
+    yield from _wrong_suffix(("results",), outputs.results, (".nc",))
+    if outputs.html is not None:
+        names.append((("html",), outputs.html))
+        yield from _wrong_suffix(("html",), outputs.html, (".html", ".htm"))
+        if importlib.util.find_spec(_REPORT) is None:
+            yield ("html",), "this version writes no report pages: leave it out"
+    for index, figure in enumerate(outputs.figures):
+        key = ("figures", index)
+        names.append(((*key, "file"), figure.file))
+        yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
+        for i, name in enumerate(figure.analyses):
+            if name not in curves:
+                yield (*key, "analyses", i), f"no analysis {name!r} gives a curve{suggest(name, curves)}"
+        if not curves:
+            yield key, "there is no analysis that gives a curve"
+        known = ["omega", *(system.parameters if system else ())]
+        if system is not None and figure.x is not None and figure.x not in known:
+            yield (*key, "x"), f"neither omega nor a parameter{suggest(figure.x, known)}"
+        drawn = len(figure.analyses or curves)
+        if figure.labels is not None and len(figure.labels) != drawn:
+            yield (*key, "labels"), f"{len(figure.labels)} labels for {drawn} curves"
+        if min(figure.size) <= 0.2 or max(figure.size) > 100.0:
+            yield (*key, "size"), f"width and height in inches, from 0.2 to 100, not {figure.size}"
+    seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
+    if outputs.csv and len(seen) < len(csv_names(steps)):
+        yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
+    for place, name in names:
+        if PurePath(name).name != name or name in (".", ".."):
+            yield place, f"{name!r} is a name inside the folder of the outputs, without slashes"
+        elif name in seen:
+            yield place, f"{name!r} is written twice: choose another name"
+        seen[name] = name
+
+
+def _wrong_suffix(
+    key: tuple[str | int, ...], name: str, suffixes: Sequence[str]
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    if PurePath(name).suffix.lower() not in suffixes:
+        yield key, f"{name!r} must end in {' or '.join(suffixes)}"
+
+
+def csv_names(steps: Sequence[Step]) -> list[str]:
+    """The names of the tables that `csv = true` writes."""
+    names = []
+    for step in steps:
+        names.append(f"{step.name}.csv")
+        if step.gives_branch:
+            names.append(f"{step.name}_bifurcations.csv")
+    return names
+
+
+def places(outputs: Outputs, steps: Sequence[Step], folder: Path) -> list[Path]:
+    """Every file that the study will write."""
+    names = [outputs.results, *(figure.file for figure in outputs.figures)]
+    names += csv_names(steps) if outputs.csv else []
+    names += [outputs.html] if outputs.html else []
+    return [folder / name for name in names]
+
+
+def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) -> Iterator[Path]:
+    """Write what was asked for of what there is, and yield each file; what stood there is replaced."""
+    yield results.save(folder / outputs.results, overwrite=True)
+    if outputs.csv:
+        for name, item in results.items():
+            yield from _tables(name, item, folder)
+    curves = results.branches
+    for figure in outputs.figures:
+        chosen = [name for name in figure.analyses or curves if name in curves and len(curves[name])]
+        if not chosen:
+            continue
+        every = figure.analyses or list(curves)
+        labels = None if figure.labels is None else [figure.labels[every.index(name)] for name in chosen]
+        path = folder / figure.file
+        plot_response(
+            [curves[name].to_xarray() for name in chosen],
+            path,
+            x=figure.x,
+            labels=labels,
+            title=figure.title,
+            size=(figure.size[0], figure.size[1]),
+        )
+        yield path
+    if outputs.html is not None and curves:
+        path = folder / outputs.html
+        report: Any = importlib.import_module(_REPORT)
+        datasets: Mapping[str, Any] = {name: branch.to_xarray() for name, branch in curves.items()}
+        report.write_report(datasets, path, title=title or "Study", overwrite=True)
+        yield path
+
+
+def _tables(name: str, item: Branch | Table, folder: Path) -> Iterator[Path]:
+    yield item.to_csv(files.free_place(folder / f"{name}.csv", True), overwrite=True)
+    if isinstance(item, Branch):
+        yield item.to_csv(folder / f"{name}_bifurcations.csv", "bifurcations", overwrite=True)

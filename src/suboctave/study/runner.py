@@ -1,0 +1,306 @@
+"""Runs a study: analyses in order, each kept in the journal when it is there, results and pictures at the end.
+
+A run that was killed left its journal: `resume` takes the finished analyses from it and goes on. An analysis is taken
+over only if version, system, its arguments and those of the analyses it starts from are the same.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from suboctave.analysis import Branch, Results, Table
+from suboctave.analysis.results import from_dataset, to_dataset
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.store.journal import Journal, Record, read_journal
+from suboctave.study.file import Study
+from suboctave.study.outputs import places, write_outputs
+from suboctave.study.steps import Context, Step
+
+__all__ = ["JOURNAL", "Finished", "Outcome", "Recovered", "recovered", "run_study"]
+
+JOURNAL = "unfinished.journal"
+#: seconds between records of points of an analysis that is under way
+_OFTEN = 1.0
+
+
+@dataclass(frozen=True)
+class Finished:
+    """An analysis that is over: its result (None if it has none), the seconds it took, and what is to be said of it."""
+
+    step: Step
+    result: Branch | Table | None
+    seconds: float
+    reused: bool = False
+    failure: str = ""
+    wrong_input: bool = False
+
+
+@dataclass
+class Outcome:
+    """What a run gave: analyses in order, files written, and whether it was interrupted."""
+
+    finished: list[Finished] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    interrupted: bool = False
+    complete_already: bool = False
+
+    @property
+    def failed(self) -> list[Finished]:
+        """The analyses that failed."""
+        return [item for item in self.finished if item.failure]
+
+
+Watch = Callable[[Step], AbstractContextManager[Any]]
+
+
+def run_study(
+    study: Study,
+    folder: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    watch: Watch | None = None,
+    said: Callable[[Finished], None] | None = None,
+) -> Outcome:
+    """Run a study and write its outputs.
+
+    Parameters
+    ----------
+    folder
+        Where outputs go, in place of what the study says.
+    overwrite, resume
+        Replace what an earlier run left, or go on with it.
+    watch
+        Gives for each analysis a context whose value is the `progress=` of its verb.
+    said
+        Told of each analysis when it is over.
+
+    Raises
+    ------
+    InputError
+        If outputs exist and neither is given, or the folder cannot be written to: before any work.
+    """
+    place = Path(folder) if folder is not None else study.folder
+    journal_at = place / JOURNAL
+    targets = places(study.outputs, study.steps, place)
+    if resume and not journal_at.exists() and targets[0].exists():
+        return _complete(study, targets[0])
+    _prepare(place, targets, journal_at, overwrite, resume)
+    journal = Journal.reopen(journal_at) if resume and journal_at.exists() else Journal.create(journal_at)
+    for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
+        torn.unlink(missing_ok=True)
+    try:
+        return _run(study, place, targets, journal, watch, said)
+    except BaseException:
+        journal.close()
+        raise
+
+
+def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, resume: bool) -> None:
+    """Make the folder and refuse what must not be overwritten, before any work."""
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder {place} cannot be made: {error.strerror}; write elsewhere with --out") from None
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(f"the folder {place} is not writable: write elsewhere with --out")
+    if overwrite and not resume:
+        if journal.exists():
+            Journal.reopen(journal).remove()
+        return
+    ours: set[str] = set()
+    if journal.exists():
+        if not resume:
+            raise InputError(
+                f"{place} holds a run that did not finish: go on with --resume, or start anew with --overwrite"
+            )
+        records, _, _ = read_journal(journal)
+        ours = {record.said.get("file", "") for record in records if record.kind == "output"}
+    there = [path.name for path in targets if path.exists() and path.name not in ours]
+    if there and not overwrite:
+        more = f" and {len(there) - 3} more" if len(there) > 3 else ""
+        raise InputError(
+            f"{place} already holds {', '.join(there[:3])}{more}, left as it is: --overwrite replaces it, --out writes "
+            "elsewhere"
+        )
+
+
+def _complete(study: Study, path: Path) -> Outcome:
+    """Nothing to resume: the results are there. InputError if they are those of another study."""
+    from suboctave.analysis import load
+
+    results = load(path, allow_code=study.allow_code)
+    done = isinstance(results, Results) and all(
+        step.name in results and results.details[step.name].get("key") == study.key_of(step) for step in study.steps
+    )
+    if not done:
+        raise InputError(
+            f"there is nothing to resume: {path} holds the results of another study, or of this one before it was "
+            "changed; --overwrite replaces it, --out writes elsewhere"
+        )
+    assert isinstance(results, Results)
+    finished = [
+        Finished(step, results[step.name], float(results.details[step.name].get("seconds", 0.0)), True)
+        for step in study.steps
+    ]
+    return Outcome(finished, [path], complete_already=True)
+
+
+def _run(
+    study: Study,
+    place: Path,
+    targets: list[Path],
+    journal: Journal,
+    watch: Watch | None,
+    said: Callable[[Finished], None] | None,
+) -> Outcome:
+    kept = {r.said["key"]: r for r in journal.records if r.kind == "analysis"}
+    journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
+    outcome = Outcome()
+    results: dict[str, Branch | Table] = {}
+    details: dict[str, dict[str, Any]] = {}
+    for step in study.steps:
+        done, interrupted = _one(study, step, results, kept, journal, watch)
+        if done is not None:
+            outcome.finished.append(done)
+            if done.result is not None:
+                results[step.name] = done.result
+                details[step.name] = {
+                    "type": step.kind,
+                    "seconds": done.seconds,
+                    "key": "" if interrupted else study.key_of(step),
+                    "arguments": step.model_dump_json(exclude_defaults=True),
+                }
+            if said is not None:
+                said(done)
+        if interrupted:
+            outcome.interrupted = True
+            break
+    if results:
+        attributes = {"title": study.title, "study": study.text, "analyses": "\n".join(results)}
+        for path in targets:
+            journal.append("output", {"file": path.name}, sync=False)
+        everything = Results(results, attributes, details)
+        outcome.files = list(write_outputs(study.outputs, everything, place, study.title))
+    if outcome.interrupted or outcome.failed:
+        journal.close()  # --resume goes on from here
+    else:
+        journal.remove()
+    return outcome
+
+
+def _one(
+    study: Study,
+    step: Step,
+    results: dict[str, Branch | Table],
+    kept: dict[str, Record],
+    journal: Journal,
+    watch: Watch | None,
+) -> tuple[Finished | None, bool]:
+    """One analysis: what came of it, and whether the user stopped it."""
+    key = study.key_of(step)
+    if key in kept:
+        result, said = from_dataset(kept[key].dataset, study.allow_code)
+        return Finished(step, result, float(said.get("seconds", 0.0)), reused=True), False
+    missing = [name for _, name in step.needs() if name not in results]
+    if missing:
+        return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), False
+    begin = perf_counter()
+    interrupted = False
+    outcome: Branch | Table | None = None
+    failure, wrong = "", False
+    with (watch or _silent)(step) as progress, _noting(journal, step, progress) as noted:
+        try:
+            system = study.system_of(step)
+            outcome = step.run(Context(system, results, noted, study.allow_code))
+        except KeyboardInterrupt:
+            interrupted = True
+        except ConvergenceError as error:
+            failure = str(error)
+        except InputError as error:
+            failure, wrong = str(error), True
+    seconds = perf_counter() - begin
+    if isinstance(outcome, Branch) and outcome.ended.startswith("interrupted"):
+        interrupted = True
+    if outcome is not None and not interrupted:
+        journal.append("analysis", {"name": step.name, "key": key}, to_dataset(outcome, {"seconds": seconds}))
+    if outcome is None and interrupted:
+        return None, True
+    return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interrupted
+
+
+def _silent(step: Step) -> AbstractContextManager[Any]:
+    return nullcontext(None)
+
+
+@contextmanager
+def _noting(journal: Journal, step: Step, progress: Any) -> Iterator[Any]:
+    """A `progress=` that passes reports on and writes what has been found to the journal now and then."""
+    yield _Noting(journal, step, progress)
+
+
+class _Noting:
+    def __init__(self, journal: Journal, step: Step, progress: Any) -> None:
+        self.journal, self.step, self.progress = journal, step, progress
+        self.since = perf_counter()
+        self.points = self.events = 0
+
+    def __call__(self, share: float, where: str) -> None:
+        if self.progress is not None:
+            self.progress(share, where)
+
+    def found(self, trace: Any) -> None:
+        """Called at each point of a curve with what has been found on it so far."""
+        now = perf_counter()
+        events = len(trace.bifurcations)
+        if now - self.since < _OFTEN and events == self.events:
+            return
+        self.since = now
+        points, located = trace.points[self.points :], trace.bifurcations[self.events :]
+        said = {
+            "name": self.step.name,
+            "from": self.points,
+            "omega": [point.orbit.omega for point in points],
+            "values": [dict(point.orbit.values) for point in points],
+            "coefficients": [point.orbit.coefficients.tolist() for point in points],
+            "stable": [bool(point.floquet.stable) for point in points],
+            "bifurcations": [[b.kind, b.omega, dict(b.parameters), b.amplitude] for b in located],
+        }
+        self.points, self.events = len(trace.points), events
+        self.journal.append("points", said, sync=False)
+
+
+@dataclass
+class Recovered:
+    """What a journal holds of one analysis; `events` are (kind, omega, amplitude) of one that had not finished."""
+
+    name: str
+    state: str = "begun"
+    points: int = 0
+    bifurcations: int = 0
+    events: list[tuple[str, float, float]] = field(default_factory=list)
+
+
+def recovered(path: str | Path) -> tuple[list[Recovered], bool]:
+    """What a journal holds, analysis by analysis, and whether its end was torn."""
+    records, _, torn = read_journal(path)
+    found: dict[str, Recovered] = {}
+    for record in records:
+        name = str(record.said.get("name", ""))
+        if record.kind == "points":
+            if not record.said["from"]:
+                found[name] = Recovered(name)
+            item = found.setdefault(name, Recovered(name))
+            item.points += len(record.said["omega"])
+            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.said["bifurcations"]]
+            item.bifurcations = len(item.events)
+        elif record.kind == "analysis":
+            sizes = record.dataset.sizes
+            count = int(sizes.get("point", sizes.get("row", 0)))
+            found[name] = Recovered(name, "finished", count, int(sizes.get("event", 0)))
+    return list(found.values()), torn

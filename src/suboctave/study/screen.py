@@ -1,0 +1,141 @@
+"""What is seen in the terminal: tables of 80 columns on stdout, bars on stderr while somebody watches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.analysis import Branch, Table
+from suboctave.store.layout import branch_dataset
+from suboctave.study.demo import event_lines
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["bar", "console", "print_branch", "print_events", "print_table", "print_texts"]
+
+WIDTH = 80
+
+
+def console(quiet: bool = False) -> Console:
+    """Standard output, at most 80 columns wide; `quiet` prints nothing."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=min(WIDTH, Console().width), quiet=quiet)
+
+
+@contextmanager
+def bar(name: str) -> Iterator[Callable[[float, str], None]]:
+    """A bar on stderr while something is computed, gone afterwards; silent where nobody watches."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    errors = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=28),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[text]}"),
+        console=errors,
+        transient=True,
+        disable=not errors.is_terminal,
+    ) as shown:
+        task = shown.add_task(_cut(name, 20), total=1.0, text="")
+        furthest = 0.0
+
+        def report(fraction: float, text: str = "") -> None:
+            nonlocal furthest  # a curve that folds back runs through its range again; a bar does not
+            furthest = max(furthest, fraction)
+            shown.update(task, completed=furthest, text=_cut(text, 22))
+
+        yield report
+
+
+def print_events(out: Console, lines: Sequence[Sequence[str]], free: str = "omega") -> None:
+    """Located bifurcations as a table, one line each."""
+    if not lines:
+        out.print("no bifurcation")
+        return
+    names = ("kind", "omega", "max |x|", "multiplier", "residual") + ((free,) if free != "omega" else ())
+    print_texts(out, names, lines, left=("kind",))
+
+
+def print_texts(out: Console, names: Sequence[str], lines: Sequence[Sequence[str]], left: Sequence[str] = ()) -> None:
+    """A table of texts, numbers to the right."""
+    from rich import box
+    from rich.table import Table as Grid
+
+    table = Grid(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0))
+    for name in names:
+        last = name in left and name == names[-1]
+        table.add_column(name, justify="left" if name in left else "right", no_wrap=not last, overflow="ellipsis")
+    for line in lines:
+        table.add_row(*(_escaped(text) for text in line))
+    out.print(table)
+
+
+def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> None:
+    """A branch: its bifurcations, how many points, why it ended, what is to be said."""
+    out.print(f"\n{name}", style="bold", markup=False, end="")
+    values = branch.parameter(branch.name)
+    ends = (min(values), max(values)) if branch.closed else (values[0], values[-1])
+    span = f"{'closed, ' if branch.closed else ''}along {branch.name}, {ends[0]:.6g} to {ends[1]:.6g}"
+    out.print(f": {span}", markup=False)
+    lines = [list(line) for line in event_lines(branch_dataset(branch))]
+    if branch.name != "omega":
+        met = sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda b: b.arclength)
+        for line, event in zip(lines, met, strict=True):
+            line[1] = f"{event.omega:.6g}"
+            line.append(f"{event.parameter(branch.name):.8g}")
+    print_events(out, lines, branch.name)
+    unstable = int(np.count_nonzero(~branch.stable)) if len(branch) else 0
+    out.print(f"{len(branch)} points, {unstable} unstable{note}; {branch.ended}.", markup=False)
+    for warning in branch.warnings:
+        out.print(f"note: {warning}", markup=False)
+
+
+def print_table(out: Console, name: str, table: Table, note: str = "") -> None:
+    """A table of results: the columns that fit, the longest texts below it."""
+    out.print(f"\n{name}", style="bold", markup=False, end="")
+    out.print(f": {table.title}{note}", markup=False)
+    shown: list[str] = []
+    texts: dict[str, list[str]] = {}
+    room = out.width
+    for column in table.columns:
+        texts[column] = [_number(value) for value in table[column]]
+        width = max([len(column), *(len(text) for text in texts[column])]) + 2
+        if width <= room and width <= 40:
+            shown.append(column)
+            room -= width
+    kinds = [name for name in shown if table[name].dtype.kind in "OU"]
+    lines = [[texts[name][i] for name in shown] for i in range(len(table))]
+    print_texts(out, shown, lines, left=kinds)
+    left_out = [name for name in table.columns if name not in shown]
+    if left_out:
+        out.print(f"not shown: {', '.join(left_out)} (--csv writes everything)", markup=False)
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, complex | np.complexfloating):
+        return f"{value.real:.6f}{value.imag:+.6f}i" if value.imag else f"{value.real:.6f}"
+    if isinstance(value, int | np.integer):
+        return str(value)
+    return f"{value:.7g}" if abs(value) >= 1e-3 or value == 0.0 else f"{value:.1e}"
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def _escaped(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)

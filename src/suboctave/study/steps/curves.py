@@ -1,0 +1,148 @@
+"""What the steps that follow a curve have in common: the options of the verbs as fields, checked and passed on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+from suboctave.analysis.checks import make_settings
+from suboctave.continuation import Event
+from suboctave.errors import InputError
+from suboctave.model.description import from_plain
+from suboctave.study.options import as_harmonics, as_newton, as_stability, as_stepping
+from suboctave.study.steps.base import (
+    Complaint,
+    Context,
+    Motion,
+    Step,
+    Surroundings,
+    check_branch,
+    check_motion,
+    chosen,
+    tried,
+)
+
+__all__ = ["CurveStep"]
+
+
+class EventTable(BaseModel):
+    """A user's event: the zero of a Python function of the motion, "module:function"."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    name: str
+    function: str
+
+
+class CurveStep(Step):
+    """The arguments that `frequency_response` and `continue_branch` share."""
+
+    gives_branch: ClassVar[bool] = True
+
+    harmonics: Any = None
+    start: str | Motion | list[float] | list[list[float]] | None = None
+    max_step: float | None = None
+    observe: int | None = None
+    events: list[EventTable] = Field(default_factory=list)
+    newton: dict[str, Any] | None = None
+    stepping: dict[str, Any] | None = None
+    stability: Any = None
+
+    @field_validator("newton", "stepping", "harmonics", "stability")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        _READ[str(info.field_name)](given)
+        return given
+
+    @property
+    def motion(self) -> Motion | None:
+        """The motion of an earlier branch that it starts from; the name of one alone means its last point."""
+        return (
+            Motion(analysis=self.start)
+            if isinstance(self.start, str)
+            else (self.start if isinstance(self.start, Motion) else None)
+        )
+
+    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
+        """See `Step.needs`."""
+        if self.motion is None:
+            return []
+        return [(("start",) if isinstance(self.start, str) else ("start", "analysis"), self.motion.analysis)]
+
+    def check(self, around: Surroundings) -> Iterator[Complaint]:
+        """The options of every verb."""
+        wrong = list(tried("events", lambda: self._events(around.allow_code)))
+        yield from wrong
+        if not wrong:
+            yield from _by_name(self._settings(around))
+        if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * around.system.n > _MOST:
+            yield (
+                ("harmonics",),
+                f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics",
+            )
+        if self.motion is not None:
+            for key, name in self.needs():
+                yield from check_branch(name, key, around)
+            yield from check_motion(self.motion, ("start",), around)
+
+    def _settings(self, around: Surroundings) -> Iterator[Complaint]:
+        """What the verbs themselves refuse."""
+        given: dict[str, Any] = {
+            "max_step": self.max_step,
+            "observe": self.observe,
+            "events": self._events(around.allow_code),
+            "newton": as_newton(self.newton),
+            "stepping": as_stepping(self.stepping),
+            "stability": as_stability(self.stability),
+        }
+        yield from tried("", lambda: make_settings(around.system, **given))
+
+    def _events(self, allow_code: bool) -> list[Event]:
+        return [Event(e.name, from_plain({"callable": e.function}, {}, allow_code)) for e in self.events]
+
+    def options(self, context: Context) -> dict[str, Any]:
+        """The arguments of the verb that were given."""
+        given = {
+            "harmonics": as_harmonics(self.harmonics),
+            "max_step": self.max_step,
+            "observe": self.observe,
+            "newton": as_newton(self.newton),
+            "stepping": as_stepping(self.stepping),
+            "stability": as_stability(self.stability),
+            "events": self._events(context.allow_code) or None,
+            "progress": context.progress,
+        }
+        return {name: value for name, value in given.items() if value is not None}
+
+    def started(self, context: Context) -> Any:
+        """What the curve starts from: a motion of an earlier branch, numbers, or None."""
+        if self.motion is not None:
+            found = chosen(self.motion, context)
+            return self._moved(found.orbit, context)
+        return self.start
+
+    def _moved(self, orbit: Any, context: Context) -> Any:
+        """The motion as it is: a step that starts from one keeps its parameters."""
+        changed = {name: value for name, value in self.parameters.items() if orbit.values[name] != value}
+        if changed:
+            names = ", ".join(changed)
+            raise InputError(f"the motion it starts from has other values of {names}: leave them out of parameters")
+        return orbit
+
+
+_READ: dict[str, Callable[[Any], Any]] = {
+    "newton": as_newton,
+    "stepping": as_stepping,
+    "harmonics": as_harmonics,
+    "stability": as_stability,
+}
+_MOST = 8000  # unknowns of a dense problem, as the verbs have it
+
+
+def _by_name(complaints: Iterator[Complaint]) -> Iterator[Complaint]:
+    """A complaint of a whole call, at the key that its message begins with."""
+    for _, text in complaints:
+        named = next((key for key in ("max_step", "observe", "newton", "stepping", "stability") if key in text), None)
+        yield ((named,) if named else ()), text

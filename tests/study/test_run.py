@@ -1,0 +1,470 @@
+"""Studies run: the same as a script, kept while running, resumed after a kill, nothing overwritten."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import types
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.analysis.results import from_dataset
+from suboctave.store.journal import Journal, read_journal
+from suboctave.study.commands import examples
+from suboctave.study.file import read_study
+from suboctave.study.runner import JOURNAL, run_study
+
+DUFFING = (Path(__file__).parent / "duffing.toml").read_text(encoding="utf-8")
+
+
+def equal(a, b):
+    """Two branches, bit for bit: points, bifurcations, multipliers, options."""
+    assert len(a) == len(b)
+    for x, y in zip(a.points, b.points, strict=True):
+        assert x.orbit.coefficients.tobytes() == y.orbit.coefficients.tobytes()
+        assert (x.orbit.omega, dict(x.orbit.values)) == (y.orbit.omega, dict(y.orbit.values))
+        assert x.floquet.multipliers.tobytes() == y.floquet.multipliers.tobytes()
+        assert x.arclength == y.arclength
+    assert repr(a) == repr(b)
+    assert a.options == b.options
+
+
+def script():
+    system = so.System(
+        mass=1.0,
+        damping="c",
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient="alpha")],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"c": 0.1, "alpha": 1.0, "F": 0.3},
+    )
+    response = so.frequency_response(system, (3.0, 0.5), max_step=0.2)
+    return response, so.continue_branch(response.bifurcations["LP"][0], "F", (0.25, 0.4), max_step=0.2)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def by_script():
+    """The same by a script; computed twice, since kernels that are not compiled yet differ in the last bits."""
+    script()
+    return script()
+
+
+def test_a_study_gives_what_a_script_gives_bit_for_bit(study_file, by_script):
+    outcome = run_study(read_study(study_file()))
+    results = so.load(outcome.files[0])
+    for item, branch, read in zip(outcome.finished, by_script, results.values(), strict=True):
+        equal(item.result, branch)
+        equal(read, branch)
+    assert list(results) == ["response", "up"]
+    assert results.attributes["title"] == "Duffing"
+    assert results.attributes["study"] == DUFFING
+    assert results.details["up"]["seconds"] > 0.0
+
+
+def test_everything_that_was_asked_for_is_written(study_file, suboctave):
+    first = 'file = "a.png"\nanalyses = ["response"]\n'
+    second = 'file = "b.svg"\nanalyses = ["up"]\nx = "F"\ntitle = "up"\n'
+    wanted = '[outputs]\ncsv = true\nfolder = "there"\n'
+    path = study_file(DUFFING + wanted + f"[[outputs.figures]]\n{first}[[outputs.figures]]\n{second}")
+    status, out, err = suboctave("run", path)
+    assert status == 0, err
+    folder = path.parent / "there"
+    names = {p.name for p in folder.iterdir()}
+    tables = {"response.csv", "response_bifurcations.csv", "up.csv", "up_bifurcations.csv"}
+    assert names == {"results.nc", "a.png", "b.svg"} | tables
+    assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert not err  # nobody watches: no bar
+    assert max(len(line) for line in out.splitlines() if not line.startswith("written")) <= 80
+
+
+def test_parameters_may_differ_for_one_analysis(study_file, by_script):
+    text = DUFFING.replace("F = 0.3 }", "F = 9.0 }").replace(
+        "max_step = 0.2\n", "max_step = 0.2\nparameters = { F = 0.3 }\n", 1
+    )
+    study = read_study(study_file(text.split('[[analyses]]\nname = "up"')[0]))
+    result = run_study(study).finished[0].result
+    assert [p.orbit.coefficients.tobytes() for p in result.points] == [
+        p.orbit.coefficients.tobytes() for p in by_script[0].points
+    ]
+
+
+def test_every_option_of_a_verb_reaches_it(study_file):
+    options = (
+        'max_step = 0.3\nharmonics = { minimum = 7, tolerance = 1e-6 }\nstability = "hill"\n'
+        "newton = { iterations = 9 }\nstepping = { deviation = 0.02 }\nobserve = 0\nstart = [0.05, 0.0]\n"
+    )
+    text = DUFFING.split('[[analyses]]\nname = "up"')[0].replace("max_step = 0.2\n", options)
+    study = read_study(study_file(text))
+    again = partial(
+        so.frequency_response,
+        study.system,
+        (3.0, 0.5),
+        so.AdaptiveHarmonics(minimum=7, tolerance=1e-6),
+        start=[0.05, 0.0],
+        max_step=0.3,
+        newton=so.NewtonOptions(iterations=9),
+        stability="hill",
+        stepping=so.SteppingOptions(deviation=0.02),
+        observe=0,
+    )
+    run_study(study)  # kernels of the method are compiled by now
+    equal(run_study(study, overwrite=True).finished[0].result, again())
+    assert {p.floquet.method for p in again().points} == {"Hill"}
+
+
+def test_steps_choose_their_motions(study_file, by_script):
+    response = by_script[0]
+    text = (
+        DUFFING
+        + """
+[[analyses]]
+name = "near"
+type = "continue_branch"
+start = { analysis = "response", nearest = { omega = 1.2, amplitude = 1.2 } }
+parameter = "alpha"
+bounds = [1.0, 1.1]
+[[analyses]]
+name = "third"
+type = "stability"
+branch = "response"
+points = [3]
+bifurcations = ["LP"]
+methods = ["monodromy", { method = "hill", selection = "strip" }]
+[[analyses]]
+name = "witness"
+type = "verify"
+branch = "up"
+every = 5
+"""
+    )
+    outcome = run_study(read_study(study_file(text)))
+    near, third, witness = (item.result for item in outcome.finished[2:])
+    start = min(response.points, key=lambda p: ((p.orbit.omega - 1.2) / np.ptp(response.omega)) ** 2
+                + ((p.orbit.amplitude() - 1.2) / np.ptp(response.amplitude)) ** 2)  # fmt: skip
+    assert start.orbit.omega == near.omega[0]
+    folds = len(response.bifurcations["LP"])
+    assert len(third) == 2 * (1 + folds)
+    np.testing.assert_allclose(third["multiplier_0"][0], so.stability(response.orbits[3]).multipliers[0])
+    assert set(third["method"]) >= {"monodromy"}
+    assert witness["agrees"].all()
+    read = so.load(outcome.files[0])
+    assert read["third"]["multiplier_0"].tobytes() == third["multiplier_0"].tobytes()
+    assert list(read["witness"]["reason"]) == list(witness["reason"])
+
+
+def test_outputs_that_exist_are_left_alone(study_file, suboctave):
+    path = study_file()
+    assert suboctave("run", path)[0] == 0
+    file = path.parent / "study_results" / "results.nc"
+    before = file.read_bytes()
+    status, _, err = suboctave("run", path)
+    assert status == 2
+    assert "--overwrite" in err
+    assert file.read_bytes() == before
+    assert suboctave("run", path, "--overwrite")[0] == 0
+    assert suboctave("run", path, "--out", path.parent / "elsewhere")[0] == 0
+    status, out, _ = suboctave("run", path, "--resume")
+    assert status == 0
+    assert "is complete" in out
+    path.write_text(DUFFING.replace("alpha = 1.0", "alpha = 1.5"))
+    status, _, err = suboctave("run", path, "--resume")
+    assert status == 2
+    assert "another study" in err
+
+
+def test_a_kill_in_the_middle_loses_no_finished_analysis(study_file, by_script):
+    slow = DUFFING.replace("max_step = 0.2\n", "max_step = 0.2\n", 1).replace(
+        "bounds = [0.25, 0.4]\nmax_step = 0.2", "bounds = [0.25, 0.4]\nmax_step = 0.0001"
+    )
+    path = study_file(slow)
+    folder = path.parent / "study_results"
+    process = subprocess.Popen([sys.executable, "-m", "suboctave", "run", str(path)], stdout=subprocess.DEVNULL)
+    journal = folder / JOURNAL
+    deadline = time.monotonic() + 400  # with kernels to compile; seconds without
+    while time.monotonic() < deadline and process.poll() is None:
+        kinds = [r.kind for r in read_journal(journal)[0]] if journal.exists() else []
+        if "analysis" in kinds:  # the first is finished; the second takes much longer than this loop
+            break
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert not (folder / "results.nc").exists()
+    with open(journal, "ab") as file:
+        file.write(b"half a reco")  # as if the power had failed in the middle of a record
+    first = next(r for r in read_journal(journal)[0] if r.kind == "analysis")
+
+    path.write_text(DUFFING)  # the analysis that had not finished may be changed
+    outcome = run_study(read_study(path), resume=True)
+    assert [item.reused for item in outcome.finished] == [True, False]
+    # what the killed process had finished is taken as it is; what follows starts from it
+    equal(outcome.finished[0].result, from_dataset(first.dataset)[0])
+    for item, branch in zip(outcome.finished, by_script, strict=True):
+        np.testing.assert_allclose(item.result.amplitude, branch.amplitude, rtol=1e-9)
+    assert outcome.finished[0].seconds == first.dataset.attrs["seconds"]
+    assert not journal.exists()
+    assert list(so.load(outcome.files[0])) == ["response", "up"]
+
+
+def test_ctrl_c_keeps_what_is_there_and_can_go_on(study_file, by_script):
+    study = read_study(study_file())
+    calls = 0
+
+    from contextlib import contextmanager
+
+    @contextmanager
+    def impatient(step):
+        def report(share, where):
+            nonlocal calls
+            calls += 1
+            if step.name == "up" and share > 0.3:
+                raise KeyboardInterrupt
+
+        yield report
+
+    outcome = run_study(study, watch=impatient)
+    assert outcome.interrupted
+    assert calls > 5
+    kept = so.load(outcome.files[0])
+    equal(kept["response"], by_script[0])
+    assert kept["up"].ended.startswith("interrupted")
+    assert 0 < len(kept["up"]) < len(by_script[1])
+    with pytest.raises(so.InputError, match="--resume"):
+        run_study(study)
+    again = run_study(study, resume=True)
+    assert [item.reused for item in again.finished] == [True, False]
+    equal(so.load(again.files[0])["up"], by_script[1])
+
+
+def test_two_runs_do_not_write_the_same_journal(tmp_path):
+    first = Journal.create(tmp_path / "j.journal")
+    with pytest.raises(so.InputError, match="another run"):
+        Journal.reopen(tmp_path / "j.journal")
+    first.close()
+
+
+def test_any_torn_end_of_a_journal_is_dropped(tmp_path):
+    import xarray as xr
+
+    path = tmp_path / "a.journal"
+    journal = Journal.create(path)
+    for i in range(3):
+        journal.append("analysis", {"name": f"n{i}"}, xr.Dataset({"a": ("x", np.arange(3.0) + i)}))
+    journal.close()
+    whole = path.read_bytes()
+    ends = [read_journal(path)[1]]
+    for cut in range(0, len(whole), 7):
+        path.write_bytes(whole[:cut])
+        records, end, torn = read_journal(path)
+        assert end <= cut
+        assert torn == (end < cut)
+        assert [r.said["name"] for r in records] == [f"n{i}" for i in range(len(records))]
+        if records:
+            np.testing.assert_array_equal(records[-1].dataset["a"], np.arange(3.0) + len(records) - 1)
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 4
+    path.write_bytes(flipped)
+    assert len(read_journal(path)[0]) < 3
+    assert ends == [len(whole)]
+
+
+def test_a_failed_analysis_does_not_take_the_others_with_it(study_file, suboctave):
+    text = (
+        DUFFING.replace('bifurcation = "LP" }', 'bifurcation = "NS" }')
+        + """
+[[analyses]]
+name = "after"
+type = "continue_branch"
+start = "up"
+parameter = "c"
+bounds = [0.1, 0.2]
+[[analyses]]
+name = "independent"
+type = "verify"
+branch = "response"
+every = 50
+"""
+    )
+    path = study_file(text)
+    status, out, _ = suboctave("run", path)
+    assert status == 2
+    assert "'response' has no NS" in " ".join(out.split())
+    assert "which gave nothing" in " ".join(out.split())
+    assert list(so.load(path.parent / "study_results" / "results.nc")) == ["response", "independent"]
+
+
+@pytest.mark.parametrize("name", sorted(examples()))
+def test_every_example_is_in_order(name, tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    assert suboctave("new", path, "--example", name)[0] == 0
+    if name == "matrices":
+        chain = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+        for what, matrix in (("M", np.eye(3)), ("C", 0.05 * np.eye(3)), ("K", chain)):
+            np.savetxt(tmp_path / f"{what}.csv", matrix, delimiter=",")
+    status, out, err = suboctave("check", path)
+    assert status == 0, err
+    assert "in order" in out
+
+
+@pytest.mark.parametrize("name", ["reference_oscillator", "nltva", "mathieu_duffing", "unbalance"])
+def test_examples_are_short(name):
+    text = (Path(so.__file__).parent / "study" / "templates" / f"{name}.toml").read_text()
+    told = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    assert len(told) <= 25
+
+
+def test_the_reference_oscillator_from_its_study_file(tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    suboctave("new", path)
+    status, out, err = suboctave("run", path, "--json")
+    assert status == 0, err
+    said = json.loads(out)
+    doublings = [b["omega"] for b in said["analyses"][0]["bifurcations"] if b["kind"] == "PD"]
+    # by shooting (tests/data/reference.json holds the digits): the exact law
+    np.testing.assert_allclose(doublings, [3.96971, 2.29375], atol=1e-5)
+    assert suboctave("run", path, "--overwrite")[0] == 0  # with every kernel compiled
+    equal(
+        so.load(tmp_path / "mine_results" / "results.nc")["response"],
+        so.frequency_response(so.library.reference_oscillator(), (4.5, 1.3)),
+    )
+
+
+def test_the_tongue_of_the_mathieu_oscillator(tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    suboctave("new", path, "--example", "mathieu_duffing")
+    path.write_text(path.read_text().replace("p = 0.01", "p = 1e-5"))
+    assert suboctave("run", path)[0] == 0
+    branch = so.load(tmp_path / "mine_results" / "results.nc")["response"]
+    # averaging at omega = 2: unstable within omega = 2 +- 2 sqrt(delta^2 / 16 - zeta^2), up to O(delta^2)
+    half = 2.0 * np.sqrt(0.15**2 / 16.0 - 0.02**2)
+    found = [b.omega for b in branch.bifurcations["PD"]]
+    np.testing.assert_allclose(found, [2.0 + half, 2.0 - half], atol=2e-3)
+    # the tip: at delta = 4 zeta both meet
+    path.write_text(path.read_text().replace("delta = 0.15", "delta = 0.0799"))
+    assert suboctave("run", path, "--overwrite")[0] == 0
+    assert not list(so.load(tmp_path / "mine_results" / "results.nc")["response"].bifurcations)
+    path.write_text(path.read_text().replace("delta = 0.0799", "delta = 0.0805"))
+    assert suboctave("run", path, "--overwrite")[0] == 0
+    tip = so.load(tmp_path / "mine_results" / "results.nc")["response"].bifurcations["PD"]
+    np.testing.assert_allclose([b.omega for b in tip], 2.0, atol=6e-3)
+    assert len(tip) == 2
+
+
+@pytest.mark.slow
+def test_the_detached_branch_of_the_absorber(tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    suboctave("new", path, "--example", "nltva")
+    assert suboctave("run", path)[0] == 0
+    detached = so.load(tmp_path / "mine_results" / "results.nc")["detached"]
+    assert detached.closed
+    # its right end by shooting
+    assert abs(max(b.omega for b in detached.bifurcations["LP"]) - 2.3037802598) < 1e-6
+
+
+def test_the_unbalance_response_before_contact(tmp_path, suboctave):
+    path = tmp_path / "mine.toml"
+    suboctave("new", path, "--example", "unbalance")
+    path.write_text(path.read_text().replace("omega = [0.5, 2.0]", "omega = [0.5, 0.8]"))
+    assert suboctave("run", path)[0] == 0
+    branch = so.load(tmp_path / "mine_results" / "results.nc")["run-up"]
+    w = branch.omega
+    linear = 0.06 * w**2 / np.abs(1.0 - w**2 + 0.08j * w)
+    assert linear.max() < 0.5  # the play is never used up
+    np.testing.assert_allclose(branch.amplitude, linear, rtol=1e-9)
+
+
+def test_matrices_come_from_files(tmp_path, suboctave):
+    import scipy.io
+    import scipy.sparse
+
+    from suboctave.study.matrices import read_matrix
+
+    matrix = np.array([[2.0, -1.0], [-1.0, 1.0 / 3.0]])
+    np.save(tmp_path / "a.npy", matrix)
+    np.savez(tmp_path / "b.npz", K=matrix, M=2.0 * matrix)
+    scipy.sparse.save_npz(tmp_path / "c.npz", scipy.sparse.csr_array(matrix))
+    scipy.io.mmwrite(tmp_path / "d.mtx", scipy.sparse.coo_array(matrix), precision=17)
+    scipy.io.savemat(tmp_path / "e.mat", {"K": matrix})
+    np.savetxt(tmp_path / "f.csv", matrix, delimiter=",", fmt="%.17g")
+    for name, key in (
+        ("a.npy", None),
+        ("b.npz", "K"),
+        ("c.npz", None),
+        ("d.mtx", None),
+        ("e.mat", None),
+        ("f.csv", None),
+    ):
+        read = read_matrix(tmp_path / name, key)
+        dense = read.toarray() if hasattr(read, "toarray") else read
+        assert dense.tobytes() == matrix.tobytes(), name
+    with pytest.raises(so.InputError, match="choose one with key="):
+        read_matrix(tmp_path / "b.npz", None)
+    with pytest.raises(so.InputError, match="holds no 'k'"):
+        read_matrix(tmp_path / "b.npz", "k")
+
+
+def test_show_prints_results_studies_and_journals(study_file, suboctave):
+    path = study_file()
+    suboctave("run", path)
+    file = path.parent / "study_results" / "results.nc"
+    status, out, _ = suboctave("show", file)
+    assert status == 0
+    assert max(map(len, out.splitlines())) <= 80
+    assert "response: along omega" in out
+    assert "LP" in out
+    said = json.loads(suboctave("show", file, "--json")[1])
+    assert [b["kind"] for b in said["analyses"]["response"]["bifurcations"]].count("LP") == 2
+    status, out, _ = suboctave("show", path)
+    assert status == 0
+    assert "CubicSpring" in out
+    assert "continue_branch" in out
+    status, out, _ = suboctave("show", file, "--csv", path.parent / "tables")
+    assert status == 0
+    assert {p.name for p in (path.parent / "tables").iterdir()} == {
+        "response.csv", "response_bifurcations.csv", "up.csv", "up_bifurcations.csv",
+    }  # fmt: skip
+    assert suboctave("show", file, "--csv", path.parent / "tables")[0] == 2
+    journal = Journal.create(path.parent / "x.journal")
+    journal.append("points", {"name": "response", "from": 0, "omega": [1.0, 2.0], "bifurcations": []})
+    journal.close()
+    status, out, _ = suboctave("show", path.parent / "x.journal")
+    assert status == 0
+    assert "begun" in out
+
+
+def test_a_report_page_gets_the_curves(study_file, suboctave, monkeypatch):
+    report = types.ModuleType("suboctave.pictures.report")
+    report.__spec__ = importlib.machinery.ModuleSpec("suboctave.pictures.report", None)
+    got = {}
+
+    def write_report(results, path, *, title, overwrite=False):
+        got.update(names=list(results), title=title, overwrite=overwrite, omega=results["up"]["omega"].size)
+        Path(path).write_text("<html>")
+
+    report.write_report = write_report
+    monkeypatch.setitem(sys.modules, "suboctave.pictures.report", report)
+    path = study_file(DUFFING + '[outputs]\nhtml = "report.html"\n')
+    assert suboctave("run", path)[0] == 0
+    assert (path.parent / "study_results" / "report.html").read_text() == "<html>"
+    assert got["names"] == ["response", "up"]
+    assert (got["title"], got["overwrite"]) == ("Duffing", True)
+    assert got["omega"] > 3
+
+
+def test_a_report_page_is_refused_only_where_there_is_none(study_file, suboctave):
+    path = study_file(DUFFING + '[outputs]\nhtml = "report.html"\n')
+    status, _, err = suboctave("check", path)
+    if importlib.util.find_spec("suboctave.pictures.report") is None:
+        assert status == 2
+        assert "report pages" in err
+    else:
+        assert status == 0
