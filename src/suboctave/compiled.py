@@ -7,8 +7,8 @@ most cost less there than their compilation would. So a kernel first runs as the
 - within the first computation of a process, compiling may take `BUDGET` seconds in all;
 - from the second computation on everything is compiled when it is called.
 
-What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Results are
-the same up to the order of sums.
+What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Kernels in
+which the compiler may reorder sums (`fastmath`) are compiled at once.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def kernel(patience: float = PATIENCE, **options: Any) -> Callable[[_Function], 
 
     def decorate(function: _Function) -> _Function:
         result = njit(cache=True, **options)(function)
-        if isinstance(result, CPUDispatcher):
+        # sums that the compiler may reorder would come out otherwise in Python
+        if isinstance(result, CPUDispatcher) and not options.get("fastmath"):
             result.__class__ = _Patient
             result.patience = patience
         return result

@@ -23,11 +23,9 @@ from suboctave.stability.nodes import ORDER
 
 #: error of the fine steps per panel, and of the coarse ones, in units of the Magnus expansion's leading error
 _FINE, _COARSE = 1.0e-9, 6.4e-8
-#: sums may be reordered; infinities keep their meaning
-_FAST = {"reassoc", "contract", "nsz"}
 
 
-@kernel(fastmath=_FAST)
+@kernel()
 def _monodromy(stretch, scale, base, k, damping, c, kick, table, tolerance):
     """Trace of the monodromy matrix, and `int c dt`.
 
@@ -145,7 +143,7 @@ def _monodromy(stretch, scale, base, k, damping, c, kick, table, tolerance):
     return (p11 + p22) * math.exp(-late), 2.0 * total
 
 
-@kernel(fastmath=_FAST)
+@kernel()
 def _respond(stretch, scale, base, k, damping, c, force, between, nodes, weight):
     """The periodic solution of `d'' + c d' + k d = -force` at the nodes, d and d' (2, N), and the largest |d|.
 
