@@ -34,7 +34,7 @@ ROWS = [
     ("cut short", 'bounds = [0.25, 0.4]', "bounds = [0.25,", ["not TOML"], None),
     ("no system", "[system]", "[sytem]", ["system", "did you mean 'system'"], "[sytem]"),
     ("no analysis", DUFFING[DUFFING.index("[[analyses]]"):], "", ["analyses", "is missing"], None),
-    ("title no text", 'title = "Duffing"', "title = 3", ["title", "string"], "title = 3"),
+    ("title no text", 'title = "Duffing"', "title = 3", ["title", "must be a text"], "title = 3"),
     ("unknown section", "[system]", "[plots]\n[system]", ["plots", "no such key"], "[plots]"),
     # ---------------------------------------------------------------------------------------------------- the system
     ("misspelt key of the system", "stiffness = 1.0", "stifness = 1.0", ["did you mean 'stiffness'"], "stifness = 1.0"),
@@ -46,6 +46,11 @@ ROWS = [
     ("mass negative", "mass = 1.0", "mass = -1.0", ["mass"], "mass = -1.0"),
     ("mass not a number", "mass = 1.0", "mass = nan", ["mass", "finite"], "mass = nan"),
     ("stiffness infinite", "stiffness = 1.0", "stiffness = inf", ["stiffness", "finite"], "stiffness = inf"),
+    ("mass of hundreds of digits", "mass = 1.0", f"mass = 1{'0' * 400}", ["mass", "finite"], "mass = 10000"),
+    ("matrix of hundreds of digits", "mass = 1.0", f"mass = [[1{'0' * 400}]]", ["mass", "finite"], "mass = [["),
+    ("mass next to nothing", "mass = 1.0", "mass = 1e-320", ["units"], None),
+    ("system a text", DUFFING[DUFFING.index("[system]"):DUFFING.index("[[analyses]]")], 'system = "duffing"\n',
+     ["system", "must be a table"], 'system = "duffing"'),
     ("mass a truth value", "mass = 1.0", "mass = true", ["mass"], "mass = true"),
     ("matrix not square", "mass = 1.0", "mass = [[1.0, 0.0]]", ["mass", "square"], "mass = [[1.0, 0.0]]"),
     ("rows of different lengths", "mass = 1.0", "mass = [[1.0, 0.0], [0.0]]", ["different lengths"], "mass = [["),
@@ -104,8 +109,8 @@ ROWS = [
     ("range empty", RESPONSE, "omega = [1.0, 1.0]\n", ["two different"], "omega = [1.0"),
     ("range negative", RESPONSE, "omega = [-1.0, 1.0]\n", ["positive"], "omega = [-1"),
     ("range from zero", RESPONSE, "omega = [0.0, 1.0]\n", ["positive"], "omega = [0.0"),
-    ("range of one number", RESPONSE, "omega = [1.0]\n", ["2 items"], "omega = [1.0]"),
-    ("range of three", RESPONSE, "omega = [1.0, 2.0, 3.0]\n", ["2 items"], "omega = [1.0"),
+    ("range of one number", RESPONSE, "omega = [1.0]\n", ["at least 2 items, not 1"], "omega = [1.0]"),
+    ("range of three", RESPONSE, "omega = [1.0, 2.0, 3.0]\n", ["at most 2 items, not 3"], "omega = [1.0"),
     ("range no numbers", RESPONSE, 'omega = ["1", "2"]\n', ["number"], "omega ="),
     ("range nan", RESPONSE, "omega = [nan, 2.0]\n", ["finite"], "omega ="),
     ("range a number", RESPONSE, "omega = 2.0\n", ["list"], "omega ="),
@@ -129,6 +134,11 @@ ROWS = [
     ("start unknown", 'analysis = "response"', 'analysis = "respnse"', ["did you mean 'response'"], "start ="),
     ("start after", 'analysis = "response"', 'analysis = "up"', ["before this one"], "start ="),
     ("start from a kind unknown", 'bifurcation = "LP"', 'bifurcation = "FOLD"', ["no kind"], "start ="),
+    ("start without an analysis", 'analysis = "response", ', "", ["analyses[1].start.analysis: is missing"], "start ="),
+    ("start a number", 'start = { analysis = "response", bifurcation = "LP" }', "start = 3", ["[1].start: must be"],
+     "start = 3"),
+    ("start of a wrong kind", 'analysis = "response"', "analysis = 3", ["start.analysis: must be a text"], "start ="),
+    ("name empty", 'name = "up"', 'name = ""', ["must not be empty"], 'name = ""'),
     ("start chosen twice", 'bifurcation = "LP"', 'bifurcation = "LP", point = 3', ["several"], "start ="),
     ("nearest of an unknown name", 'bifurcation = "LP"', "nearest = { omga = 1.0 }", ["mean 'omega'"], "start ="),
     ("parameter to vary unknown", 'parameter = "F"', 'parameter = "G"', ["unknown parameter 'G'"], 'parameter = "G"'),
@@ -382,6 +392,28 @@ def test_a_study_file_that_is_no_text(suboctave, tmp_path):
     status, _, err = suboctave("check", path)
     assert status == 2
     assert "UTF-8" in err
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_study_file_that_never_ends(suboctave, tmp_path):
+    os.mkfifo(tmp_path / "a.toml")
+    status, _, err = suboctave("check", tmp_path / "a.toml")
+    assert status == 2
+    assert "no ordinary file" in err
+
+
+def test_a_mark_of_byte_order_is_no_mistake(suboctave, tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + DUFFING.replace("\n", "\r\n").encode())
+    assert suboctave("check", path)[0] == 0
+
+
+@pytest.mark.parametrize("command", ["new", "check", "run", "show"])
+def test_a_name_too_long_for_the_disk(command, suboctave, tmp_path):
+    status, out, err = suboctave(command, tmp_path / f"{'a' * 400}.toml")
+    assert (status, out) == (2, "")
+    assert "too long" in err
+    assert "Errno" not in err
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])

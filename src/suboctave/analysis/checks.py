@@ -79,7 +79,11 @@ def _check_held(system: System) -> None:
     """Refuse a body that nothing holds: the mean of its motion is not determined."""
     mass, _, stiffness = system.matrices()
     scale = 1.0 / np.sqrt(np.diag(mass))
-    _, sizes, vectors = np.linalg.svd(stiffness * np.multiply.outer(scale, scale))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = stiffness * scale[:, None] * scale
+    if not np.isfinite(scaled).all():
+        raise InputError("the stiffness over the mass is larger than any number: check the units of both")
+    _, sizes, vectors = np.linalg.svd(scaled)
     free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
     if not len(free):
         return

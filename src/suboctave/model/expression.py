@@ -154,7 +154,10 @@ def coefficient(source: Any) -> Coefficient:
     if isinstance(source, str):
         return _parse(source)
     if not isinstance(source, bool) and isinstance(source, numbers.Real):
-        number = float(source)
+        try:
+            number = float(source)
+        except OverflowError:  # a whole number of hundreds of digits
+            number = math.inf
         if not math.isfinite(number):
             raise InputError(f"a coefficient must be finite, not {number}")
         return _number(number)

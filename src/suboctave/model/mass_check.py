@@ -30,7 +30,7 @@ def check_mass(mass: Any) -> None:
             f"inertia (condense one without out of the model)"
         )
     scale = 1.0 / np.sqrt(diagonal)
-    scaled = mass * np.outer(scale, scale) if isinstance(mass, np.ndarray) else _scaled_sparse(mass, scale)
+    scaled = mass * scale[:, None] * scale if isinstance(mass, np.ndarray) else _scaled_sparse(mass, scale)
     difference = abs(scaled - scaled.T)
     if difference.max() > _ASYMMETRY:
         i, j = _where_largest(difference)

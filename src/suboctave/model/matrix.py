@@ -115,7 +115,10 @@ def _constant(source: Any, what: str) -> Any:
         matrix = scipy.sparse.csr_array(source, dtype=float)
         entries = matrix.data
     else:
-        matrix = entries = np.array(source, dtype=float)
+        try:
+            matrix = entries = np.array(source, dtype=float)
+        except OverflowError:  # a whole number of hundreds of digits
+            raise InputError(f"{what} has entries that are not finite") from None
         matrix.setflags(write=False)
     if len(matrix.shape) != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
         raise InputError(f"{what} must be square, not of shape {tuple(matrix.shape)}")

@@ -41,8 +41,15 @@ def main() -> None:
         if "--json" in sys.argv[1:]:
             print(json.dumps(_as_object(error, status), ensure_ascii=False))
         else:
-            print(_readable(f"suboctave: {error}"), file=sys.stderr)
+            print(_readable(f"suboctave: {_said(error)}"), file=sys.stderr)
         sys.exit(status)
+
+
+def _said(error: Exception) -> str:
+    """A refusal of the operating system, without its number."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}; nothing was changed there"
+    return str(error)
 
 
 def _readable(text: str) -> str:
@@ -63,7 +70,7 @@ def _readable(text: str) -> str:
 def _as_object(error: Exception, status: int) -> dict[str, Any]:
     mistakes = getattr(error, "mistakes", ())
     listed = [{"key": m.key, "line": m.line, "message": m.message} for m in mistakes]
-    return {"ok": False, "status": status, "message": str(error), "mistakes": listed}
+    return {"ok": False, "status": status, "message": _said(error), "mistakes": listed}
 
 
 def application() -> "typer.Typer":

@@ -143,9 +143,11 @@ def _text(source: Path) -> str:
     if source.is_dir():
         raise StudyError(str(source), [Mistake("", 0, "this is a folder, not a study file")])
     try:
+        if source.exists() and not source.is_file():  # a pipe or a device never ends
+            raise StudyError(str(source), [Mistake("", 0, "this is no ordinary file")])
         if source.stat().st_size > _LONGEST:
             raise StudyError(str(source), [Mistake("", 0, "this is too long for a study file; keep matrices in files")])
-        return source.read_text(encoding="utf-8")
+        return source.read_text(encoding="utf-8-sig")  # some editors put a mark in front
     except FileNotFoundError:
         near = [p.name for p in source.parent.glob("*.toml")] if source.parent.is_dir() else []
         hint = suggest(source.name, near) if near else "; `suboctave new` writes one"

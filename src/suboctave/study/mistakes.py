@@ -57,9 +57,13 @@ class Mistakes:
     def add_validation(self, prefix: Path, error: pydantic.ValidationError, known: Iterable[str]) -> None:
         """What pydantic found in the table at `prefix`, whose keys are `known`, in our words."""
         names = list(known)
-        for item in error.errors(include_url=False):
+        found = error.errors(include_url=False)
+        inside = {item["loc"][:1] for item in found if len(item["loc"]) > 2}
+        for item in found:
+            if isinstance(item.get("input"), dict) and len(item["loc"]) == 2 and item["loc"][:1] in inside:
+                continue  # an alternative to the table that is meant; what is wrong in the table is told
             path = (*prefix, *item["loc"])
-            self.add(_shortened(path, self.lines), _in_words(item, names))
+            self.add(_shortened(path, self.lines, item["type"] == "missing"), _in_words(item, names))
 
     def __len__(self) -> int:
         return len(self._found)
@@ -90,16 +94,18 @@ def written(path: Path) -> str:
     return text
 
 
-def _shortened(path: Path, lines: Lines) -> Path:
+def _shortened(path: Path, lines: Lines, missing: bool) -> Path:
     """Without the names that pydantic gives to alternatives, which are no keys of the file."""
     kept: Path = ()
     for i, part in enumerate(path):
         if isinstance(part, int) or (*kept, part) in lines or i == 0:
             kept = (*kept, part)
-    missing = path[-1]
-    if isinstance(missing, str) and kept != path and missing.isidentifier() and len(path) - len(kept) == 1:
-        return path
-    return kept
+    # a key that is missing is not in the file, and still part of the path
+    return (*kept, path[-1]) if missing and kept[-1:] != path[-1:] else kept
+
+
+#: what pydantic calls otherwise than TOML does
+_WORDS = {"string_type": "a text", "list_type": "a list", "dict_type": "a table", "model_type": "a table"}
 
 
 def _in_words(item: Any, known: list[str]) -> str:
@@ -111,5 +117,12 @@ def _in_words(item: Any, known: list[str]) -> str:
     said = str(item["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")
     if kind in ("value_error", "assertion_error"):
         return said
+    if kind in ("too_short", "too_long"):
+        about, wanted = item["ctx"], item["ctx"].get("min_length", item["ctx"].get("max_length"))
+        bound = "at least" if kind == "too_short" else "at most"
+        return f"must have {bound} {wanted} item{'s' * (wanted != 1)}, not {about['actual_length']}"
+    if kind == "string_too_short":
+        return "must not be empty"
+    said = _WORDS.get(kind, said)
     shown = repr(given)
     return f"must be {said}, not {shown if len(shown) <= 60 else shown[:57] + '...'}"

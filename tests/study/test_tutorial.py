@@ -1,0 +1,96 @@
+"""What the tutorial tells its readers to do works, and gives what it says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.study.commands import examples
+
+ROOT = Path(__file__).parents[2]
+TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+
+
+def blocks(kind):
+    return re.findall(rf"^```{kind}\n(.*?)^```", TUTORIAL, re.M | re.S)
+
+
+def touches(amplitude, force, zeta):
+    """The frequencies, in units of the resonance, at which the linear oscillator reaches an amplitude, low and high."""
+    # (1 - s)^2 + (2 zeta)^2 s = (force / amplitude)^2 with s the square of the frequency
+    roots = np.roots([1.0, 4.0 * zeta**2 - 2.0, 1.0 - (force / amplitude) ** 2])
+    return np.sqrt(np.sort(roots.real))
+
+
+def numbers(table):
+    """Kinds, frequencies and amplitudes of a printed table."""
+    return re.findall(r"^ (LP|PD|NS|BP|grazing) +([\d.]+) +([\d.]+)", table, re.M)
+
+
+def test_three_lines_of_the_new_file_are_changed(suboctave, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert suboctave("new", "study.toml")[0] == 0
+    before = Path("study.toml").read_text(encoding="utf-8").splitlines()
+    (after,) = blocks("toml")
+    changed = [a for a, b in zip(before, after.splitlines(), strict=True) if a != b]
+    assert [line.split(" = ")[0] for line in changed] == ["title", "parameters", "omega"]
+
+
+def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (text,) = blocks("toml")
+    Path("study.toml").write_text(text, encoding="utf-8")
+    checked, ran = blocks("console")
+    assert suboctave("check", "study.toml")[1] == checked.split("\n", 1)[1]
+    status, out, _ = suboctave("run", "study.toml")
+    assert status == 0
+    assert numbers(out) == numbers(ran)  # the table is what the program prints
+    assert len(numbers(out)) == 6
+
+    script, again = blocks("python")
+    scope = {}
+    exec(compile(script + again, "docs/tutorial.md", "exec"), scope)
+    said = capsys.readouterr().out
+    printed = blocks("text")[1]
+    assert said.splitlines()[0] == printed.splitlines()[0]
+    assert "Verification: agrees" in said
+    # before the stop is touched the oscillator is linear
+    low, high = touches(0.5, force=0.1, zeta=0.02)
+    first, *_, last = scope["curve"].grazings
+    assert first.omega == pytest.approx(high, abs=1e-9)
+    assert last.omega == pytest.approx(low, abs=1e-9)
+
+
+def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (text,) = blocks("toml")
+    text = text.replace("alpha = 0.0", "alpa = 0.0").replace("omega = [2.5, 0.5]", "omega = [2.5]")
+    Path("study.toml").write_text(text, encoding="utf-8")
+    status, _, err = suboctave("check", "study.toml")
+    assert status == 2
+    assert err == blocks("text")[0]
+
+
+def test_every_command_it_names_is_there(suboctave):
+    for command in set(re.findall(r"suboctave (\w+) ", "\n".join(blocks("sh") + blocks("console")))):
+        assert suboctave(command, "--help")[0] == 0
+    assert "new --list" in TUTORIAL
+    assert len(examples()) >= 5
+
+
+def test_the_housing_on_a_shaker(suboctave, tmp_path):
+    status, out, err = suboctave("run", ROOT / "examples" / "study_housing.toml", "--out", tmp_path / "out")
+    assert status == 0, err
+    sweep = so.load(tmp_path / "out" / "results.nc")["sweep"]
+    assert (tmp_path / "out" / "sweep.png").stat().st_size > 0
+    # in SI units: relative motion of 1 mm under a = 1 m/s^2, natural frequency sqrt(k / m)
+    natural = np.sqrt(2000.0 / 0.5)
+    low, high = natural * touches(1e-3, force=1.0 / natural**2, zeta=0.03)
+    first, *_, last = sweep.grazings
+    assert first.omega == pytest.approx(high, rel=1e-9)
+    assert last.omega == pytest.approx(low, rel=1e-9)
+    assert sum(line.startswith(" LP") for line in out.splitlines()) == 2
