@@ -176,7 +176,7 @@ def _validated(model: type[Any], given: Mapping[str, Any], prefix: tuple[str | i
     try:
         return model.model_validate(given)
     except ValidationError as error:
-        mistakes.add_validation(prefix, error, model.model_fields)
+        mistakes.add_validation(prefix, error, model)
     return None
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from suboctave.errors import InputError, suggest
 
@@ -54,16 +54,13 @@ class Mistakes:
         if mistake not in self._found:
             self._found.append(mistake)
 
-    def add_validation(self, prefix: Path, error: pydantic.ValidationError, known: Iterable[str]) -> None:
-        """What pydantic found in the table at `prefix`, whose keys are `known`, in our words."""
-        names = list(known)
-        found = error.errors(include_url=False)
-        inside = {item["loc"][:1] for item in found if len(item["loc"]) > 2}
-        for item in found:
-            if isinstance(item.get("input"), dict) and len(item["loc"]) == 2 and item["loc"][:1] in inside:
-                continue  # an alternative to the table that is meant; what is wrong in the table is told
+    def add_validation(self, prefix: Path, error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> None:
+        """What pydantic found in the table at `prefix`, which is a `model`, in our words."""
+        for item in error.errors(include_url=False):
             path = (*prefix, *item["loc"])
-            self.add(_shortened(path, self.lines, item["type"] == "missing"), _in_words(item, names))
+            self.add(
+                _shortened(path, self.lines, item["type"] == "missing"), _in_words(item, _keys(model, item["loc"]))
+            )
 
     def __len__(self) -> int:
         return len(self._found)
@@ -104,8 +101,31 @@ def _shortened(path: Path, lines: Lines, missing: bool) -> Path:
     return (*kept, path[-1]) if missing and kept[-1:] != path[-1:] else kept
 
 
+def _keys(model: type[pydantic.BaseModel], place: Sequence[str | int]) -> list[str]:
+    """The keys of the table in which the key at `place` stands: of the model, or of a table inside it."""
+    fields = model.model_fields
+    if len(place) < 2 or place[0] not in fields:
+        return list(fields)
+    inner = list(_models(fields[str(place[0])].annotation))
+    return [name for table in inner for name in table.model_fields]
+
+
+def _models(annotation: Any) -> Iterator[type[pydantic.BaseModel]]:
+    if hasattr(annotation, "model_fields"):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models(part)
+
+
 #: what pydantic calls otherwise than TOML does
-_WORDS = {"string_type": "a text", "list_type": "a list", "dict_type": "a table", "model_type": "a table"}
+_WORDS = {
+    "string_type": "a text",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "model_type": "a table",
+}
 
 
 def _in_words(item: Any, known: list[str]) -> str:
@@ -121,6 +141,8 @@ def _in_words(item: Any, known: list[str]) -> str:
         about, wanted = item["ctx"], item["ctx"].get("min_length", item["ctx"].get("max_length"))
         bound = "at least" if kind == "too_short" else "at most"
         return f"must have {bound} {wanted} item{'s' * (wanted != 1)}, not {about['actual_length']}"
+    if kind == "union_tag_not_found":
+        return f"must be a text, a table or a list, not {given!r}"
     if kind == "string_too_short":
         return "must not be empty"
     said = _WORDS.get(kind, said)

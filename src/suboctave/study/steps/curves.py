@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from suboctave.analysis.checks import make_settings
 from suboctave.continuation import Event
@@ -36,13 +36,29 @@ class EventTable(BaseModel):
     function: str
 
 
+def _way(given: Any) -> str | None:
+    """Which way a start is given, so that a mistake in it is told once, as one in that way."""
+    if isinstance(given, list):
+        return "rows" if given and all(isinstance(row, list) for row in given) else "numbers"
+    return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Motion) else None
+
+
+Start = Annotated[
+    Annotated[str, Tag("name")]
+    | Annotated[Motion, Tag("table")]
+    | Annotated[list[float], Tag("numbers")]
+    | Annotated[list[list[float]], Tag("rows")],
+    Discriminator(_way),
+]
+
+
 class CurveStep(Step):
     """The arguments that `frequency_response` and `continue_branch` share."""
 
     gives_branch: ClassVar[bool] = True
 
     harmonics: Any = None
-    start: str | Motion | list[float] | list[list[float]] | None = None
+    start: Start | None = None
     max_step: float | None = None
     observe: int | None = None
     events: list[EventTable] = Field(default_factory=list)
