@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from suboctave.harmonic.orbit import PeriodicOrbit
     from suboctave.model.system import System
 
-__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate", "curve_dataset"]
+__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate", "curve_dataset", "events_met"]
 
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
 UNKNOWN = -1  # in event_stable_after
@@ -283,13 +283,16 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
     )
 
 
+def events_met(branch: BranchLike) -> list[EventLike]:
+    """The branch's bifurcations, grazings and events in the order met: the rows of the dimension `event`."""
+    return sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda event: event.arclength)
+
+
 def _event_rows(branch: BranchLike, arclength: np.ndarray) -> list[EventRow]:
     """The branch's bifurcations, grazings and events in the order met, each with its place and the verdict after it."""
-    passive = [*branch.grazings, *branch.events]  # stability goes on through these
-    own = {id(event) for event in passive}
-    met = sorted([*branch.bifurcations, *passive], key=lambda event: event.arclength)
+    own = {id(event) for event in (*branch.grazings, *branch.events)}  # stability goes on through these
     rows: list[EventRow] = []
-    for event in met:
+    for event in events_met(branch):
         place = int(np.searchsorted(arclength, event.arclength, side="right")) - 1
         after = min(max(place, 0), max(arclength.size - 2, 0))
         told = rows[-1].stable_after if rows and rows[-1].after == after else None
