@@ -104,9 +104,7 @@ class Results(Mapping[str, "Branch | Table"]):
         target = files.free_place(path, overwrite, (".nc",))
         wrong = [name for name in self if not name or "/" in name or name == "."]
         if wrong:
-            raise InputError(
-                f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, no slashes"
-            )
+            raise InputError(f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, no slashes")
         groups = {name: to_dataset(item, self.details.get(name, {})) for name, item in self.items()}
         files.write(target, groups, {"contents": "study", **provenance(), **self.attributes})
         return target

@@ -20,7 +20,7 @@ from suboctave.model.expression import RESERVED, Coefficient
 from suboctave.model.loads import Load, LoadComponent
 from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
-from suboctave.model.sampling import CornerSampling, SharpVelocitySampling
+from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpVelocitySampling
 
 __all__ = ["System"]
 
