@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
+    from suboctave.pictures import plot
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -92,6 +93,7 @@ _HOME = {
     "verify": "suboctave.analysis",
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
+    "plot": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
@@ -139,6 +141,7 @@ __all__ = [
     "frequency_response",
     "library",
     "load",
+    "plot",
     "stability",
     "verify",
 ]

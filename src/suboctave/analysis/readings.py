@@ -213,6 +213,7 @@ def _ground(orbit: PeriodicOrbit) -> float:
 
 
 READINGS: Mapping[str, _Kind] = {
+    "amplitude": _Kind(lambda o, dof, _: o.amplitude(dof), "max |x| over a period", "length"),
     "rms": _Kind(lambda o, dof, _: o.rms(dof), "root mean square of x", "length"),
     "velocity": _Kind(lambda o, dof, _: o.velocity_amplitude(dof), "max |dx/dt| over a period", "length / time"),
     "velocity_rms": _Kind(lambda o, dof, _: o.rms(dof, 1), "root mean square of dx/dt", "length / time"),
@@ -255,8 +256,10 @@ def read_reading(name: str) -> Reading:
         wanted = f"{what}_1" if kind.numbered else what
         needs = f"needs the number of the {kind.numbered}" if kind.numbered else "takes no number"
         raise InputError(f"the reading {name!r} {needs}: write {wanted!r}")
-    if match["dof"] is not None and what not in (*_OF_A_DOF, "harmonic", "phase"):
+    if match["dof"] is not None and what not in ("amplitude", *_OF_A_DOF, "harmonic", "phase"):
         raise InputError(f"the reading {what!r} is not one of a degree of freedom: write it without _dof{match['dof']}")
+    if what == "amplitude" and match["dof"] is None:
+        raise InputError("the amplitude of the observed DOF is there anyway; of another one it is 'amplitude_dof1'")
     number = None if match["number"] is None else float(match["number"])
     if kind.numbered == "element" and number is not None and number % 1.0:
         raise InputError(f"the reading {name!r} needs the index of an element, a whole number")

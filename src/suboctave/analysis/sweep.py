@@ -215,7 +215,9 @@ def _what_ends(
         return f"stability is lost at {name} = {here:.9g} without a located bifurcation", False
     if int(dataset.attrs.get("closed", 0)):
         return f"the branch closes on itself at {name} = {here:.9g}", False
-    return f"end of the branch at {name} = {here:.9g} ({dataset.attrs.get('ended', '')})", False
+    if end == 0:
+        return f"reached the beginning of the branch at {name} = {here:.9g}", False
+    return str(dataset.attrs.get("ended", f"end of the branch at {name} = {here:.9g}")), False
 
 
 def _landings(whole: Line, runs: list[_Run], left: _Run, here: float, sign: float) -> list[tuple[_Run, float]]:
