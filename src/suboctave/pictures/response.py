@@ -84,7 +84,7 @@ def plot_panels(
     shown = view or View()
     wide = 1.2 + 5.2 * len(groups) if len(groups) == 1 else 1.0 + 4.2 * len(groups)
     inches = style.size_in_inches((wide, 4.2) if size is None else size)
-    look = style.look_of(inches[0] / len(groups))
+    look = style.PRINT if isinstance(size, str) else style.look_of(inches[0] / len(groups))
     figure = Figure(figsize=inches, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     frames = figure.subplots(1, len(groups), squeeze=False, sharex=True, sharey=True)[0]
