@@ -51,14 +51,21 @@ def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str
     }
     layout = {
         "font": {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK},
-        "margin": {"l": 64, "r": 12, "t": 12, "b": 52},
+        "margin": {"l": 64, "r": 12, "t": 34, "b": 52},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "hovermode": "closest",
         "hoverlabel": {"align": "left"},
-        "xaxis": {**axis, "title": {"text": across}},
+        "xaxis": {**axis, "title": {"text": across, "standoff": 8}, "automargin": True},
         "yaxis": {**axis, "title": {"text": f"amplitude max |{x}|"}, "rangemode": "tozero"},
-        "legend": {"orientation": "h", "y": -0.16, "yanchor": "top", "x": 0, "font": {"size": 12}},
+        "legend": {
+            "orientation": "h",
+            "yref": "container",
+            "y": 0,
+            "yanchor": "bottom",
+            "x": 0,
+            "font": {"size": 12},
+        },
     }
     return {"data": data, "layout": layout, "name": name}
 

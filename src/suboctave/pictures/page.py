@@ -6,7 +6,13 @@ import base64
 import functools
 import gzip
 
-__all__ = ["SCRIPT", "STYLE", "plotly_source"]
+__all__ = ["POLICY", "SCRIPT", "STYLE", "plotly_source"]
+
+# The page loads nothing and sends nothing, whatever a script or a button in it might wish.
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "base-uri 'none'; form-action 'none'"
+)
 
 STYLE = """
 :root { --ink: #1a1a1a; --soft: #5a5a5a; --rule: #d9d9d9; --wash: #f6f6f4; }
@@ -27,7 +33,9 @@ a { color: #0072B2; }
 .plot { width: 100%; height: 30rem; display: none; }
 .drawn .plot { display: block; }
 .drawn .still { display: none; }
-.still img { width: 100%; height: auto; }
+.still img { width: 100%; max-width: 46rem; height: auto; }
+.hint { display: none; }
+.live .hint { display: block; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 0.86rem; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.2rem 0.7rem 0.2rem 0; text-align: right; white-space: nowrap; vertical-align: top; }
@@ -46,14 +54,15 @@ details summary { cursor: pointer; margin-top: 0.6rem; }
 @media print {
   @page { margin: 14mm; }
   body { max-width: none; padding: 0; font-size: 9.5pt; }
-  nav, .screen { display: none; }
+  nav, .live .hint { display: none; }
   .plot, .drawn .plot { display: none; }
-  .still, .drawn .still { display: block; max-width: 150mm; }
+  .still, .drawn .still { display: block; max-width: 120mm; }
   .pair { display: block; }
   table { font-size: 7.5pt; }
   th, td { padding-right: 0.5rem; }
   .scroll { overflow: visible; }
-  h2 { break-after: avoid; }
+  dl { font-size: 8pt; }
+  h2, h3, .soft { break-after: avoid; }
   .still, tr, .note { break-inside: avoid; }
 }
 """
@@ -76,13 +85,16 @@ SCRIPT = """
     document.querySelectorAll(".figure").forEach(function (figure) {
       var told = JSON.parse(figure.querySelector("script").textContent);
       figure.classList.add("drawn");
+      document.body.classList.add("live");
       Plotly.newPlot(figure.querySelector(".plot"), told.data, told.layout, {
-        responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"],
+        responsive: true, displaylogo: false, plotlyServerURL: "",
+        modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
         toImageButtonOptions: { format: "svg", filename: told.name }
       });
     });
   } catch (error) {
     document.querySelectorAll(".figure").forEach(function (figure) { figure.classList.remove("drawn"); });
+    document.body.classList.remove("live");
   }
 })();
 """

@@ -20,7 +20,7 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.interactive import figure_data
-from suboctave.pictures.page import SCRIPT, STYLE, plotly_source
+from suboctave.pictures.page import POLICY, SCRIPT, STYLE, plotly_source
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.saving import svg_text
 from suboctave.store.files import free_place, replace_file
@@ -97,6 +97,7 @@ def _page(datasets: Mapping[str, xarray.Dataset], title: str) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         f'<meta name="generator" content="suboctave {_safe(__version__)}">\n'
         f"<title>{_safe(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
         + "\n".join(parts)
@@ -109,7 +110,7 @@ def _summary(datasets: Mapping[str, xarray.Dataset]) -> str:
     systems = dict.fromkeys(str(data.attrs["system"]) for data in datasets.values() if data.attrs.get("system"))
     words = [f"suboctave {', '.join(versions) or __version__}", *systems]
     hint = "Hover over a curve for its values, drag to zoom, click in the legend to hide."
-    return f'<p class="soft">{_safe(" · ".join(words))}</p><p class="soft screen">{hint}</p>'
+    return f'<p class="soft">{_safe(" · ".join(words))}</p><p class="soft hint">{hint}</p>'
 
 
 def _overviews(curves: Mapping[str, xarray.Dataset]) -> list[str]:
@@ -137,7 +138,7 @@ def _curve(name: str, dataset: xarray.Dataset) -> str:
     ended = f"; {dataset.attrs['ended']}" if dataset.attrs.get("ended") else ""
     notes = "".join(f'<p class="note">{_safe(note)}</p>' for note in _notes(dataset))
     table = _table(head, rows) if rows else "<p>none</p>"
-    wide = " wide" if len(head) > 6 else ""
+    wide = " wide" if len(head) > 5 else ""
     return (
         f'<p class="soft">{_safe(said + ended)}.</p>'
         f'<div class="pair{wide}"><div>{_figure({name: dataset}, str(dataset.attrs["free"]))}</div>'
@@ -182,7 +183,7 @@ def _bifurcations(dataset: xarray.Dataset) -> tuple[list[tuple[str, str]], list[
     for i in range(len(values)):
         kind = str(column["kind"][i])
         name = style.kind_style(kind).name
-        row = [name if name == kind else f"{kind} ({name})", f"{column['omega'][i]:.9g}"]
+        row = [f"{kind} ({name})" if kind.isupper() and name != kind else name, f"{column['omega'][i]:.9g}"]
         row += [f"{values[i]:.9g}"] if free != "omega" else []
         row += [f"{column['amplitude'][i]:.7g}", _complex(complex(column["multiplier"][i])), _small(residual[i])]
         rows.append(row + ([remarks[i]] if any(remarks) else []))
@@ -202,7 +203,8 @@ def _notes(dataset: xarray.Dataset) -> list[str]:
             )
     doubtful = int(np.count_nonzero(dataset["event_uncertainty"].to_numpy() > 0.0))
     if doubtful:
-        notes.append(f"{doubtful} located with a stated uncertainty: see the remarks in the table.")
+        what = "bifurcation is" if doubtful == 1 else "bifurcations are"
+        notes.append(f"{doubtful} {what} located to a stated uncertainty: see the remarks in the table.")
     return notes
 
 
@@ -217,7 +219,7 @@ def _provenance(dataset: xarray.Dataset) -> str:
     ]
     if "harmonics" in dataset:
         used = dataset["harmonics"].to_numpy()
-        pairs.append(("harmonics", f"{used.min()} to {used.max()}" if np.ptp(used) else f"{used[0]}"))
+        pairs.append(("harmonics used", f"{used.min()} to {used.max()}" if np.ptp(used) else f"{used[0]}"))
     for name, words in (("error", "largest neglected part of the motion"), ("residual", "largest residual")):
         if name in dataset:
             pairs.append((words, _small(float(np.nanmax(dataset[name].to_numpy())))))

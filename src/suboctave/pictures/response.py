@@ -187,7 +187,7 @@ def _draw_events(
             "markersize": mark.size * look.marker,
             "markerfacecolor": mark.colour,
             "markeredgecolor": edge,
-            "markeredgewidth": look.edge * (1.7 if several else 1.0),
+            "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
         chosen = positions[kinds == kind]
         axes.plot(
