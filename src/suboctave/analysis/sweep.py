@@ -108,28 +108,29 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
         return SweepPath(direction, name, np.zeros(0), np.zeros(0), (), "no motion of the branch is stable", False)
     begin = min(runs, key=lambda run: (sign * whole.x[_ends(run, sign)[0]], whole.y[_ends(run, sign)[0]]))
     at, run = _ends(begin, sign)[0], begin
-    values, amplitudes, jumps = [whole.x[at]], [whole.y[at]], []
+    values: list[float] = []
+    amplitudes: list[float] = []
+    jumps: list[Jump] = []
     limit = (whole.x * sign).max()
     while True:
         end = _ends(run, sign)[1]
         step = 1 if end >= at else -1
         walked = np.arange(at, end + step, step)
-        walked = walked[sign * whole.x[walked] >= sign * values[-1]]
-        values += list(whole.x[walked])
-        amplitudes += list(whole.y[walked])
-        why, goes_on = _what_ends(dataset, whole, runs, run, end, step)
+        values += whole.x[walked].tolist()
+        amplitudes += whole.y[walked].tolist()
+        why, goes_on = _what_ends(dataset, whole, run, end, step)
         if not goes_on:
             complete = sign * whole.x[end] >= limit - 1e-12 * max(1.0, abs(limit))
             return _path(direction, name, values, amplitudes, jumps, why, complete)
         here, kind = float(whole.x[end]), why
         landings = _landings(whole, runs, run, here, sign)
         if len(landings) != 1:
-            there = ", ".join(f"{landing[1]:.6g}" for landing in landings)
-            why = (
-                f"several stable motions (amplitudes {there})" if landings else "no stable motion of this branch"
+            there = ", ".join(f"{amplitude:.6g}" for _, amplitude in landings)
+            found = (
+                f"are several stable motions (amplitudes {there})" if landings else "is no stable motion of this branch"
             )
-            why = f"at the fold at {name} = {here:.9g} the sweep jumps, and there is {why} to jump to"
-            return _path(direction, name, values, amplitudes, jumps, why.replace("is several", "are several"), False)
+            why = f"at the fold at {name} = {here:.9g} the sweep jumps, and there {found} to jump to"
+            return _path(direction, name, values, amplitudes, jumps, why, False)
         run, landed = landings[0]
         jumps.append(Jump(here, float(amplitudes[-1]), landed, kind))
         values.append(here)
@@ -195,9 +196,7 @@ def _ends(run: _Run, sign: float) -> tuple[int, int]:
     return (run.first, run.last) if run.sense == sign else (run.last, run.first)
 
 
-def _what_ends(
-    dataset: xarray.Dataset, whole: Line, runs: list[_Run], run: _Run, end: int, step: int
-) -> tuple[str, bool]:
+def _what_ends(dataset: xarray.Dataset, whole: Line, run: _Run, end: int, step: int) -> tuple[str, bool]:
     """Why a run ends: the kind of fold and True where a sweep jumps, else words and False."""
     name, here = str(dataset.attrs["free"]), float(whole.x[end])
     event = int(whole.event[end])

@@ -122,9 +122,7 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> 
     return vertices
 
 
-def _markers(
-    dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool
-) -> list[dict[str, Any]]:
+def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
     heights = dataset["event_amplitude"].to_numpy()
     kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])

@@ -38,9 +38,7 @@ def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line
             legend.remove()
     columns = min(len(entries), 4)
     while True:
-        legend = figure.legend(
-            entries.values(), entries.keys(), loc="outside upper center", ncols=columns, **drawing
-        )
+        legend = figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns, **drawing)
         figure.draw_without_rendering()
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return

@@ -30,7 +30,7 @@ a { color: #0072B2; }
 .pair { display: grid; grid-template-columns: minmax(0, 3fr) minmax(0, 2fr); gap: 1.6rem; align-items: start; }
 .pair.wide { grid-template-columns: minmax(0, 1fr); }
 @media (max-width: 62rem) { .pair { grid-template-columns: minmax(0, 1fr); } }
-.plot { width: 100%; height: 30rem; display: none; }
+.plot { width: 100%; height: 32rem; display: none; }
 .drawn .plot { display: block; }
 .drawn .still { display: none; }
 .still img { width: 100%; max-width: 46rem; height: auto; }
