@@ -32,8 +32,11 @@ class BranchReadings:
     """What is read off a branch, each an array (len,) over its points. DOFs default to the observed one."""
 
     system: System
-    orbits: Sequence[PeriodicOrbit]
     observe: int
+    if TYPE_CHECKING:
+
+        @property
+        def orbits(self) -> list[PeriodicOrbit]: ...
 
     def _over(self, read: Callable[[PeriodicOrbit], float]) -> Array:
         return np.array([read(orbit) for orbit in self.orbits], dtype=float)

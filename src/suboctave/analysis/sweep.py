@@ -9,6 +9,7 @@ where a jump finds no stable motion on the branch, or several: which of them is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -152,7 +153,7 @@ def hysteresis(dataset: xarray.Dataset) -> list[tuple[float, float]]:
     inner = [jump.value for jump in (*up.jumps, *down.jumps) if low < jump.value < high]
     ends = np.unique([low, *inner, high]) if low < high else np.zeros(0)
     found: list[tuple[float, float]] = []
-    for first, last in zip(ends[:-1], ends[1:], strict=True):
+    for first, last in pairwise(ends):
         middle = 0.5 * (first + last)
         a, b = up.amplitude_at(middle), down.amplitude_at(middle)
         if abs(a - b) <= 1e-9 * max(abs(a), abs(b)):

@@ -43,11 +43,12 @@ th { border-bottom: 1px solid var(--ink); font-weight: 600; }
 td { border-bottom: 1px solid var(--rule); }
 th.text, td.text { text-align: left; }
 td.long { white-space: normal; min-width: 12rem; text-align: left; }
-dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: 0.15rem 1.2rem; font-size: 0.88rem; margin: 0; }
+dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: 0.15rem 1.2rem;
+  font-size: 0.88rem; margin: 0; }
 dt { color: var(--soft); }
 dd { margin: 0; overflow-wrap: anywhere; }
-pre { background: var(--wash); padding: 0.6rem 0.8rem; font-size: 0.8rem; white-space: pre-wrap; overflow-wrap: anywhere;
-  margin: 0.4rem 0; }
+pre { background: var(--wash); padding: 0.6rem 0.8rem; font-size: 0.8rem; white-space: pre-wrap;
+  overflow-wrap: anywhere; margin: 0.4rem 0; }
 .note { border-left: 3px solid #E69F00; padding: 0.15rem 0.8rem; margin: 0.5rem 0; background: #fffaf0;
   overflow-wrap: anywhere; white-space: pre-wrap; }
 details summary { cursor: pointer; margin-top: 0.6rem; }

@@ -150,14 +150,8 @@ def _figure(curves: Mapping[str, xarray.Dataset], free: str) -> str:
     name = re.sub(r"[^\w-]+", "_", "_".join(curves))[:60] or "figure"
     told = json.dumps(figure_data(curves, free, name), ensure_ascii=False, separators=(",", ":"))
     # what would end the script early, or is no line end for JSON but one for scripts
-    for bad, good in (
-        ("<", "\\u003c"),
-        (">", "\\u003e"),
-        ("&", "\\u0026"),
-        ("\u2028", "\\u2028"),
-        ("\u2029", "\\u2029"),
-    ):
-        told = told.replace(bad, good)
+    for bad in "<>&\u2028\u2029":
+        told = told.replace(bad, f"\\u{ord(bad):04x}")
     labels = list(curves) if len(curves) > 1 else None
     still = svg_text(plot_response(list(curves.values()), x=free, labels=labels, size=(6.4, 4.2)))
     packed = base64.b64encode(still.encode("utf-8")).decode("ascii")
