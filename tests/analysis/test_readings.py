@@ -166,6 +166,16 @@ def test_what_reaches_the_ground_is_what_the_masses_leave_over():
         curve.transmissibility(direction=[1.0])
 
 
+def test_transmissibility_where_the_force_begins_at_zero():
+    curve = so.continue_branch(so.library.duffing(c=0.1, F=0.1), "F", (0.0, 0.1), omega=0.7, max_step=0.3)
+    assert "transmissibility" in curve.available_readings()
+    ratio = curve.transmissibility()
+    assert np.isnan(ratio[0])
+    linear = abs(1.0 + 0.07j) / abs(1.0 - 0.49 + 0.07j)
+    assert ratio[1] == pytest.approx(linear, rel=1e-2)
+    assert np.isfinite(ratio[1:]).all()
+
+
 def test_readings_are_stored_under_their_names(duffing_curve):
     names = ["rms", "harmonic_3", "phase_1", "peak_force_0"]
     dataset = duffing_curve.to_xarray(readings=names)

@@ -92,6 +92,14 @@ def test_other_ways_to_lose_stability_end_the_path(kind, words):
     assert sweep_path(data, "down").ended.startswith("reached the beginning")
 
 
+def test_two_contacts_that_graze_at_once_are_no_obstacle():
+    omega = np.linspace(0.0, 1.0, 11)
+    events = [EventRow("grazing", 4, 0.45, 0.45, stable_after=True), EventRow("grazing", 4, 0.45, 0.45)]
+    up = sweep_path(curve_dataset(omega, omega, stable=omega < 2.0, events=events), "up")
+    assert up.complete
+    assert up.amplitude_at(0.83) == pytest.approx(0.83)
+
+
 def test_several_motions_to_land_on_are_listed():
     omega = np.array([0.0, 1.0, 2.0, 1.0, 0.5, 2.5, 1.0, 3.0])
     size = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0])

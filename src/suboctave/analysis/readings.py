@@ -102,15 +102,16 @@ class BranchReadings:
     def transmissibility(self, harmonic: float | None = 1, direction: ArrayLike | None = None) -> Array:
         """Force on the ground over force applied, by amplitudes at `harmonic`, or by largest values (None).
 
-        `direction` as in `transmitted_force`. For a moving base compare motions instead: `motion_ratio`.
+        `direction` as in `transmitted_force`; nan where the force applied is zero. For a moving base compare motions
+        instead: `motion_ratio`.
 
         Raises
         ------
         InputError
-            If no force is applied along the direction at that harmonic.
+            If no force is applied along the direction at that harmonic anywhere on the branch.
         """
         r = transmission.translation(self.system.n, direction)
-        return self._over(lambda orbit: _force_ratio(orbit, harmonic, r))
+        return _somewhere(self._over(lambda orbit: _force_ratio(orbit, harmonic, r)), harmonic)
 
     def motion_ratio(self, dof: int, reference: int, harmonic: float | None = 1) -> Array:
         """Amplitude of one DOF over that of another, at `harmonic`, or by largest values (None)."""
@@ -131,7 +132,7 @@ class BranchReadings:
         With a number where it needs one: "harmonic_3", "phase_1", "peak_force_0" (element 0), and of another DOF than
         the observed one with the ending "_dof2".
         """
-        return read_reading(name).of(self.orbits, self.observe)
+        return _on_points(self, read_reading(name))
 
     def available_readings(self) -> list[str]:
         """Names of the read-offs of this branch at the observed DOF, first harmonics and all elements included."""
@@ -143,7 +144,7 @@ class BranchReadings:
         orbit = self.orbits[0]
         if orbit.balance.size == self.system.n:
             names.append("transmitted_force")
-            if transmission.of_harmonic(_applied(orbit), 1, orbit.basis.nu):
+            if any(transmission.of_harmonic(_applied(o), 1, o.basis.nu) for o in self.orbits):
                 names.append("transmissibility")
         return names
 
@@ -198,13 +199,18 @@ def _force_ratio(orbit: PeriodicOrbit, harmonic: float | None, r: Array) -> floa
     else:
         nu = orbit.basis.nu
         sizes = transmission.of_harmonic(ground, harmonic, nu), transmission.of_harmonic(load, harmonic, nu)
-    if not sizes[1]:
+    return sizes[0] / sizes[1] if sizes[1] else np.nan
+
+
+def _somewhere(ratios: Array, harmonic: float | None) -> Array:
+    """Ratios of forces, refused if none of them exists."""
+    if len(ratios) and np.all(np.isnan(ratios)):
         where = "" if harmonic is None else f" at harmonic {harmonic:g}"
         raise InputError(
-            f"transmissibility: no force is applied{where} along the direction {r.tolist()}; give another direction "
-            "or harmonic, or compare motions (motion_ratio)"
+            f"transmissibility: no force is applied{where} along the direction; give another direction or harmonic, "
+            "or compare motions (motion_ratio)"
         )
-    return sizes[0] / sizes[1]
+    return ratios
 
 
 def _applied(orbit: PeriodicOrbit) -> np.ndarray:
@@ -273,13 +279,11 @@ def with_readings(
     dataset: xarray.Dataset, branch: Any, events: Sequence[Any], names: Iterable[str] | bool
 ) -> xarray.Dataset:
     """The dataset of a branch with read-offs on its points and, with the prefix `event_`, on its events."""
-    listed = _listed(branch, names)
-    orbits = branch.orbits
-    for reading in listed:
+    for reading in _listed(branch, names):
         said = reading.attributes(branch.system)
         if reading.name in dataset.coords:  # a free parameter of that name stays among the parameters
             dataset = dataset.drop_vars(reading.name)
-        dataset[reading.name] = ("point", reading.of(orbits, branch.observe), said)
+        dataset[reading.name] = ("point", _on_points(branch, reading), said)
         there = reading.of([event.orbit for event in events], branch.observe)
         if reading.what == "phase":  # of the same turn as the points beside it
             near = dataset[reading.name].to_numpy()[dataset["event_after"].to_numpy()]
@@ -290,7 +294,12 @@ def with_readings(
 
 def columns(branch: Any, names: Iterable[str] | bool) -> dict[str, Array]:
     """Read-offs as the columns of a table."""
-    return {reading.name: reading.of(branch.orbits, branch.observe) for reading in _listed(branch, names)}
+    return {reading.name: _on_points(branch, reading) for reading in _listed(branch, names)}
+
+
+def _on_points(branch: Any, reading: Reading) -> Array:
+    values = reading.of(branch.orbits, branch.observe)
+    return _somewhere(values, 1) if reading.what == "transmissibility" else values
 
 
 def _listed(branch: Any, names: Iterable[str] | bool) -> list[Reading]:

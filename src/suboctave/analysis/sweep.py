@@ -183,11 +183,10 @@ def _runs(whole: Line) -> list[_Run]:
     senses = np.sign(np.diff(whole.x))
     runs: list[_Run] = []
     for piece, (stable, sense) in enumerate(zip(whole.stable, senses, strict=True)):
-        if not stable or not sense:
-            continue
-        if runs and runs[-1].last == piece and runs[-1].sense == sense:
-            runs[-1] = _Run(runs[-1].first, piece + 1, sense)
-        else:
+        # two events at one value (contacts that graze at once) are no turn
+        if stable and runs and runs[-1].last == piece and sense in (0.0, runs[-1].sense):
+            runs[-1] = _Run(runs[-1].first, piece + 1, runs[-1].sense)
+        elif stable and sense:
             runs.append(_Run(piece, piece + 1, sense))
     return runs
 
@@ -239,6 +238,6 @@ def _interpolated(x: Array, y: Array, at: float) -> float:
     """Monotone cubic interpolation; x ascending or descending."""
     from scipy.interpolate import PchipInterpolator
 
-    if x[0] > x[-1]:
-        x, y = x[::-1], y[::-1]
+    x, first = np.unique(x, return_index=True)
+    y = y[first]
     return float(PchipInterpolator(x, y)(at)) if len(x) > 2 else float(np.interp(at, x, y))

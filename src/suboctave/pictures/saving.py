@@ -22,7 +22,7 @@ _METADATA: dict[str, dict[str, Any]] = {".png": {}, ".svg": {"Date": None}, ".pd
 _EMBEDDED: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "suboctave"}
 
 
-def save_figure(figure: Figure, path: str | Path, *, dpi: float = 200.0) -> Path:
+def save_figure(figure: Figure, path: str | Path, *, dpi: float = 300.0) -> Path:
     """Writes the figure as PNG (at `dpi`), SVG or PDF, by the suffix of `path`; makes the folder where it is missing.
 
     Written beside its place and renamed, so that an interruption leaves what was there before.
