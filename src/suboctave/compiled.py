@@ -7,8 +7,9 @@ most cost less there than their compilation would. So a kernel first runs as the
 - within the first computation of a process, compiling may take `BUDGET` seconds in all;
 - from the second computation on everything is compiled when it is called.
 
-What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Results are
-the same up to the order of sums.
+What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Arithmetic is
+the same bit by bit in both; kernels for which that does not hold (sums that the compiler may reorder, complex roots,
+sines and cosines of the same angle) are compiled at once.
 """
 
 from __future__ import annotations
@@ -94,12 +95,15 @@ def compiled(kernel: _Function) -> _Function:
     return kernel
 
 
-def kernel(patience: float = PATIENCE, **options: Any) -> Callable[[_Function], _Function]:
-    """Decorator of a kernel: `numba.njit` with its cache, and patience. Options are those of `njit`."""
+def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+    """Decorator of a kernel: `numba.njit` with its cache, and patience (none with `at_once`, or with `fastmath`).
+
+    Options are those of `njit`.
+    """
 
     def decorate(function: _Function) -> _Function:
         result = njit(cache=True, **options)(function)
-        if isinstance(result, CPUDispatcher):
+        if isinstance(result, CPUDispatcher) and not (at_once or options.get("fastmath")):
             result.__class__ = _Patient
             result.patience = patience
         return result

@@ -103,6 +103,14 @@ def test_van_der_pol_locked_to_its_load():
     assert bool(curve.stable[len(curve) // 2]) == exact.stable
 
 
+def test_rest_in_a_corner_has_no_linear_neighbourhood():
+    """A contact that is closed at rest, and nothing that pushes: no bifurcation is made up there."""
+    text = "x'' + 0.05*x' + (1 + 0.2*cos(omega*t))*x + 3*max(x, 0) = 0"
+    curve = so.frequency_response(so.System.from_equations(text), (1.7, 2.3))
+    assert not curve.amplitude.any()
+    assert len(curve.bifurcations) == 0
+
+
 def test_neither_load_nor_excitation_is_refused():
     system = so.System.from_equations("x'' + 0.1*x' + x + x**3 = 0")
     with pytest.raises(so.InputError, match="no periodic load"):

@@ -81,6 +81,7 @@ def test_a_branch_read_back_is_the_same(curve, saved):
 
 def test_what_was_read_goes_on(curve, saved):
     again = so.load(saved)
+    so.continue_branch(curve.bifurcations["LP"][0], "p", (0.5, 0.6), max_step=0.2)  # kernels are compiled by now
     assert so.verify(again.orbits[3]).agrees
     one, other = (so.stability(b.orbits[7]) for b in (curve, again))
     the_same(one.multipliers, other.multipliers)

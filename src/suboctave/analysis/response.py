@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
@@ -51,9 +52,12 @@ class ResponseEvaluation:
     def at_rest(self) -> bool:
         """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve.
 
-        Without loads (parametric excitation alone) rest is a motion like any other, which may lose its stability.
+        Without loads (parametric excitation alone) rest is a motion like any other, which may lose its stability; but
+        not in a corner of a law, where it has no linear neighbourhood.
         """
-        return self.reference > 0.0 and motion_size(self.state) <= _REST * self.reference
+        if motion_size(self.state) > _REST * self.reference:
+            return False
+        return self.reference > 0.0 or rests_in_corner(self.state)
 
     @lazy
     def truncation(self) -> float:

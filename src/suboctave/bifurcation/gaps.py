@@ -115,3 +115,21 @@ def _along(element: BaseElement) -> float:
     places = (element.place, *element.input_places)
     n = max(len(place.vector) if place.vector is not None else 1 + max(place.dofs) for place in places)
     return float(element.direction(n) @ reads(element, n)) or 1.0
+
+
+def rests_in_corner(state: BalanceState) -> bool:
+    """Whether the stiffness or damping of an element jumps at rest, u = v = 0."""
+    if any(np.any(law.pieces[:, 1] == 0.0) for law in state.balance.coefficients(state.values)[2]):
+        return True
+    for nodal in state.nodal:
+        kind = nodal.kind
+        if not isinstance(kind, CornerSampling):
+            continue
+        for row, levels_there in ((0, kind.points), (nodal.own.count, kind.velocities)):
+            if 0.0 in levels_there:
+                q = np.zeros((2 * nodal.own.count if nodal.own.moving else nodal.own.count, 2))
+                q[row] = -1e-12, 1e-12
+                below, above = nodal.own.law.tangent(q, np.full(2, 0.7), nodal.c)[1][row]
+                if abs(above - below) > 1e-9 * max(abs(above), abs(below)):
+                    return True
+    return False

@@ -192,7 +192,7 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
         expanded = state.linear.expand(direction)
         mobility = float(expanded @ np.linalg.solve(mass, expanded))
         stiffness = abs(float(local.coefficients[kind.pieces[gap.index].stiffness]))
-        size = float(np.abs(gap.value).max())
+        size = float(np.abs(gap.value).max(initial=0.0))
         for tau, value, curve in zip(gap.tau, gap.value, gap.curve, strict=True):
             beyond = value - gap.level
             if curve == 0.0 or abs(beyond) > _NEAR * size:

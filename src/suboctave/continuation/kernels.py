@@ -133,8 +133,9 @@ def between(u, tangent, v, heading, weights, s):
         chord += w * d * d
         first += w * tangent[i] * tangent[i]
         last += w * heading[i] * heading[i]
-    a = (1.0 + 2.0 * s) * (1.0 - s) ** 2
-    b = s * (1.0 - s) ** 2 * math.sqrt(chord / first)
+    r = 1.0 - s
+    a = (1.0 + 2.0 * s) * r * r
+    b = s * r * r * math.sqrt(chord / first)
     c = s * s * (3.0 - 2.0 * s)
     d = s * s * (s - 1.0) * math.sqrt(chord / last)
     out = np.empty(n)

@@ -105,7 +105,7 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
             pr[j] = t
 
 
-@kernel(fastmath=_FAST)
+@kernel(patience=QUICK, fastmath=_FAST)
 def add_smooth_steps(sampled, steps, line, force, stiffness):
     """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.
 
@@ -353,9 +353,11 @@ def tails(x, neglected, weight):
         w = weight[i] * weight[i]
         squares[0] += w * x[0, i] * x[0, i]
         for h in range(1, high + 1):
-            squares[h] += w * (x[2 * h - 1, i] ** 2 + x[2 * h, i] ** 2)
+            a, b = x[2 * h - 1, i], x[2 * h, i]
+            squares[h] += w * (a * a + b * b)
         for h in range(high + 1):
-            squares[high + 1 + h] += w * (neglected[h, i].real ** 2 + neglected[h, i].imag ** 2)
+            a, b = neglected[h, i].real, neglected[h, i].imag
+            squares[high + 1 + h] += w * (a * a + b * b)
     size = 0.0
     for h in range(high + 1):
         size += squares[h]

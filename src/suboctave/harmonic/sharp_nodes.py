@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.instants import _jet
 from suboctave.harmonic.kernels import motion
 
@@ -42,7 +42,7 @@ def tables() -> tuple[np.ndarray, np.ndarray]:
     return nodes, weights
 
 
-@kernel(fastmath=_FAST)
+@kernel(patience=QUICK, fastmath=_FAST)
 def _jets(c, zr, zi):
     """Value, first and second derivative of the motion at the points z, shape (3, N)."""
     n = zr.shape[0]
@@ -76,7 +76,7 @@ def _jets(c, zr, zi):
     return out
 
 
-@kernel()
+@kernel(at_once=True)
 def _roots(x, d, s, point, width):
     """Both complex offsets at which the parabola (x, d, s) equals point + i width."""
     target = complex(x - point, -width)
@@ -88,7 +88,7 @@ def _roots(x, d, s, point, width):
     return 2.0 * target / q, far
 
 
-@kernel()
+@kernel(at_once=True)
 def singular_instants(c, points, widths, reach, zr, zi):
     """Complex instants `s + i d`, d > 0 and below `reach`, at which the motion meets point +- i width; ascending in s.
 
@@ -221,7 +221,7 @@ def _with_motion(c, zr, zi, w):
     return out
 
 
-@kernel()
+@kernel(at_once=True)
 def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
     """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion and its derivative by
     tau there; (5, N).

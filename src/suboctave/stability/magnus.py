@@ -37,7 +37,7 @@ STEPS = _tables()
 BETWEEN = np.array([moments(NODES[i], NODES[i + 1], 2) for i in range(ORDER - 1)])
 
 
-@kernel()
+@kernel(at_once=True)
 def waves(q, decay):
     """`cos(sqrt q)` and `sin(sqrt q) / sqrt q`, with or without a factor `exp(-decay)`, and the decay left to apply."""
     if abs(q) < 0.25:
@@ -60,7 +60,7 @@ def waves(q, decay):
     return slow + fast, (slow - fast) / w, 0.0
 
 
-@kernel()
+@kernel(at_once=True)
 def exponent(a1, b1, k1, a2, b2, k2, a3, b3, k3):
     """Omega as (a, b, k), from the moments a1, a2, a3 in the same form."""
     # [(a, b, k), (a', b', k')] = (b' k - b k', 2 (a b' - a' b), 2 (a' k - a k'))

@@ -27,19 +27,12 @@ import numpy as np
 from scipy.linalg import lapack
 
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.state import BalanceState, length
 from suboctave.stability.linearisation import Linearisation
 from suboctave.stability.magnus import BETWEEN, STEPS
 from suboctave.stability.nodes import NODES
 from suboctave.stability.result import FloquetResult
-from suboctave.stability.several import (
-    POWERS,
-    corrected_several,
-    perturbed,
-    projector,
-    standing_several,
-    weighted,
-)
+from suboctave.stability.several import POWERS, advance, propagate, respond
 from suboctave.stability.single import corrected_single, standing_single
 
 #: a correction larger than this share of the motion is cut down to it
@@ -126,34 +119,136 @@ class _Several:
         self.along = along
         n, linear = len(mass), along.state.linear
         shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
-        matrices = weighted(mass, damping, stiffness, shapes)
-        if along.state.nodal:
-            acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float)
-            matrices = (*matrices[:2], weighted(mass, damping, stiffness, acting)[2], matrices[3])
-        self.about = (along.moving, along.varying, matrices, POWERS, NODES)
+        acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float).reshape(-1, n)
+        # DOFs weighted by the square roots of their masses: norms have no units
+        weight = np.sqrt(mass.diagonal())
+        inverse = np.linalg.inv(mass) * weight[:, None]
+        self.matrices = (
+            inverse @ stiffness / weight,
+            inverse @ damping / weight,
+            np.ascontiguousarray(acting @ inverse.T),
+            shapes / weight,
+        )
+        self.none = np.zeros((len(shapes), 0))
         self.scale = 1.0 / along.state.rate
         self.before: Array = np.zeros((0, 0))
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """See `_Single.multipliers`."""
-        along, about = self.along, self.about
-        without = np.zeros((0, 0)) if weight == 1.0 else (1.0 - weight) * projector(*_vectors(self.before))
-        before, change, share, alone = standing_several(
-            along.stretch, self.scale, along.path, along.law, along.base, *about, _LARGEST, without
-        )
-        self.before = before
+        along = self.along
+        before, alone, rows, start = self._standing()
+        if weight < 1.0:
+            start = start - (1.0 - weight) * (projector(before) @ start)
+        change = respond(start, alone, rows)
+        share = 1.0
+        for change_g, path_g in zip(change, along.path, strict=True):
+            most, size = _LARGEST * np.abs(path_g[0]).max(), np.abs(change_g[0]).max()
+            if not size <= most:
+                share = min(share, most / size if size < np.inf else 0.0)
+        change = share * change if share > 0.0 else np.zeros_like(change)
         law, kick = along.changed(change)
-        after = corrected_several(along.stretch, self.scale, law, along.base, kick, *about, alone)
-        mu, shift = perturbed(*_vectors(after), after, after - before)
+        after = self._corrected(law, kick, alone)
+        mu, shift = perturbed(after, after - before)
         return mu, shift, share
+
+    def _standing(self) -> tuple[Array, Array, Array, Array]:
+        """Along the motion as it stands: monodromy matrix, propagators of all panels, what `respond` needs, and the
+        state with which the correction begins. Polynomials are of lower degree than along the corrected motion.
+        """
+        along = self.along
+        force, k, c = (np.ascontiguousarray(along.law[:, i]) for i in range(3))
+        kick = np.zeros((len(self.none), len(along.stretch)))
+        total, alone, rows = propagate(
+            along.stretch,
+            self.scale,
+            *self.matrices,
+            along.base,
+            k if along.varying else self.none,
+            c if along.moving else self.none,
+            force,
+            kick,
+            POWERS[1],
+            NODES,
+        )
+        size = len(total)
+        self.before = np.ascontiguousarray(total[:, :size])
+        if not len(self.none):
+            return self.before, alone, rows, np.zeros(size)
+        *_, start, singular = lapack.dgesv(np.eye(size) - self.before, total[:, size])
+        return self.before, alone, rows, np.full(size, np.inf) if singular else start
+
+    def _corrected(self, law: Array, kick: Array, alone: Array) -> Array:
+        """Monodromy matrix along the corrected motion; law (G, 2, N), kick (G, P): see `panels.closed_changes`.
+
+        Where stiffness and damping are constant on every panel, the panels' propagators are still the same.
+        """
+        along = self.along
+        _, _, left, right = self.matrices
+        if along.varying:
+            k, c = (np.ascontiguousarray(law[:, i]) for i in range(2))
+            total: Array = propagate(
+                along.stretch,
+                self.scale,
+                *self.matrices,
+                along.base,
+                k,
+                c if along.moving else self.none,
+                self.none,
+                kick,
+                POWERS[0],
+                NODES,
+            )[0]
+            return total
+        size = len(self.before)
+        total = np.eye(size)
+        product = np.empty((size, size))
+        for p, one in enumerate(np.ascontiguousarray(alone[:, :, :size])):
+            advance(total, one, left, right, kick, p, product)
+        return total
 
     def gap(self) -> float:
         """Distance to +1 of the nearest multiplier of the motion as it stands."""
-        real, imaginary, *_ = _vectors(self.before)
-        return float(np.hypot(1.0 - real, imaginary).min())
+        return float(np.abs(1.0 - np.linalg.eigvals(self.before)).min())
 
 
-def _vectors(matrix: Array) -> tuple[Array, Array, Array, Array]:
-    """Eigenvalues (real and imaginary parts) and left and right vectors as LAPACK returns them."""
+def _vectors(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Eigenvalues, left and right vectors in columns; `left^H matrix = mu left^H`."""
     real, imaginary, left, right, _ = lapack.dgeev(matrix, 1, 1)
-    return real, imaginary, left, right
+    mu = real + 1j * imaginary
+    vectors = []
+    for packed in (left, right):
+        v = packed.astype(complex)
+        for j in np.flatnonzero(imaginary > 0.0):
+            v[:, j] = packed[:, j] + 1j * packed[:, j + 1]
+            v[:, j + 1] = v[:, j].conj()
+        vectors.append(v)
+    return mu, vectors[0], vectors[1]
+
+
+def perturbed(phi: Array, change: Array) -> tuple[ComplexArray, Array]:
+    """Eigenvalues of phi (N, N), by descending modulus, and their first-order shifts by a change and by rounding."""
+    mu, left, right = _vectors(phi)
+    scale = np.abs((left.conj() * right).sum(axis=0))
+    by_change = np.abs((left.conj() * (change @ right)).sum(axis=0))
+    by_rounding = (np.abs(left) * (np.abs(phi) @ np.abs(right))).sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.where(scale > 0.0, (by_change + 1e-15 * by_rounding) / scale, np.inf)
+    # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
+    norm = length(change) + 1e-15 * length(phi)
+    size = np.abs(mu)
+    shift = np.minimum(shift, math.sqrt(norm * max(1.0, size.max()))) + 1e-14
+    order = np.argsort(-size, kind="stable")
+    return mu[order], shift[order]
+
+
+def projector(phi: Array) -> Array:
+    """On the direction of the real multiplier nearest to +1, (N, N); zero if there is none or it is a double one."""
+    mu, left, right = _vectors(phi)
+    real = np.flatnonzero(mu.imag == 0.0)
+    if real.size:
+        found = real[np.argmin(np.abs(1.0 - mu[real]))]
+        u, v = left[:, found].real, right[:, found].real
+        scale = float(u @ v)
+        if abs(scale) > 1e-10:
+            return np.multiply.outer(v, u) / scale
+    return np.zeros_like(phi)

@@ -185,6 +185,15 @@ def through(row, one, local, out):
 
 
 @kernel()
+def _whole(values):
+    """Sum of the moduli."""
+    total = 0.0
+    for i in range(values.shape[0]):
+        total += abs(values[i])
+    return total
+
+
+@kernel()
 def growth(poly, local, span, steps, length, graded, size_k, size_c, shares):
     """Largest length of a step in units of the fastest time scale, as large as the polynomials are on the unit disc."""
     most = 0.0
@@ -194,12 +203,12 @@ def growth(poly, local, span, steps, length, graded, size_k, size_c, shares):
                 shifted(poly[q], -1.0 + span * step, span, local[q])
         time = span * length
         if graded:
-            time = span * np.abs(local[0]).sum()
+            time = span * _whole(local[0])
         k = time * size_k
         c = time * size_c
         for g in range(shares.shape[0]):
             f = span * shares[g] * (1.0 if graded else length)
-            k += f * np.abs(local[1 + 3 * g]).sum()
-            c += f * np.abs(local[2 + 3 * g]).sum()
+            k += f * _whole(local[1 + 3 * g])
+            c += f * _whole(local[2 + 3 * g])
         most = max(most, math.sqrt(time * k) + c)
     return most

@@ -29,8 +29,8 @@ _REACH, _MOST = 4.0, 10000
 _EXACT, _CLOSE = 1e-15, 1e-11
 
 
-@kernel()
-def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force, kick, powers, nodes):
+@kernel(at_once=True)
+def propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force, kick, powers, nodes):
     """Monodromy matrix and, where there is a force, what `_respond` needs.
 
     stretch: dtau/ds (P, m); scale: dt/dtau; stiffness, damping: K_0, C_0 (n, n); left, right (G, n); base (G, P): parts
@@ -48,7 +48,9 @@ def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, forc
     varying = k.shape[1] > 0
     size = 2 * n
     cols = size + 1 if forced else size
-    total = np.eye(size, cols)
+    total = np.zeros((size, cols))
+    for i in range(size):
+        total[i, i] = 1.0
     alone = np.empty((count, size, cols))
     rows = np.zeros((groups, 2, count, ORDER, cols) if forced else (0, 2, 1, ORDER, cols))
     # terms of the series, and those where all is constant
@@ -64,25 +66,30 @@ def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, forc
     at_nodes = np.empty((ORDER, groups, 2, many))
     product = np.empty((size, cols))
     known = known_steps = 0
-    matrix = stiffness.copy()
+    matrix = np.empty((n, n))
     current = np.zeros(groups)
     poly = np.zeros((1 + 3 * groups, ORDER))
     local = np.zeros((1 + 3 * groups, ORDER))
     active = np.zeros(groups, dtype=np.bool_)
     size_c = norm(damping)
-    size_k = norm(matrix)
-    known_span = -1.0
+    size_k = known_span = -1.0
     shares = np.empty(groups)
     for g in range(groups):
-        shares[g] = np.abs(left[g]).max() * np.abs(right[g]).sum()
+        top = whole = 0.0
+        for i in range(n):
+            top = max(top, abs(left[g, i]))
+            whole += abs(right[g, i])
+        shares[g] = top * whole
     for p in range(count):
         at = p * (ORDER - 1)
-        changed = False
+        changed = size_k < 0.0
         for g in range(groups):
             changed = changed or base[g, p] != current[g]
         if changed:
             known_span = -1.0
-            matrix[:] = stiffness
+            for i in range(n):
+                for j in range(n):
+                    matrix[i, j] = stiffness[i, j]
             for g in range(groups):
                 current[g] = base[g, p]
                 for i in range(n):
@@ -137,7 +144,9 @@ def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, forc
             # every step has the same propagator, and the same response to a power of x
             known_span = span * length
             known_steps = 0
-            step_matrix[:] = np.eye(size, many)
+            for i in range(size):
+                for j in range(many):
+                    step_matrix[i, j] = 1.0 if i == j else 0.0
             known = series(
                 step_matrix, matrix, damping, left, right, local, known_span, active, moving, False, _EXACT,
                 hall[0], hall[1], hy, hw,
@@ -176,13 +185,15 @@ def _propagate(stretch, scale, stiffness, damping, left, right, base, k, c, forc
             if constant:
                 for i in range(size):
                     through(step_matrix[i], one, local, product[i])
-                one[:] = product
-        _advance(total, one, left, right, kick, p, product)
+                for i in range(size):
+                    for j in range(cols):
+                        one[i, j] = product[i, j]
+        advance(total, one, left, right, kick, p, product)
     return total, alone, rows
 
 
 @kernel(fastmath=FAST)
-def _advance(total, one, left, right, kick, p, product):
+def advance(total, one, left, right, kick, p, product):
     """Take the state `total` past the kicks at the beginning of panel p and the panel's own propagator."""
     size = one.shape[0]
     n = size // 2
@@ -209,12 +220,15 @@ def _advance(total, one, left, right, kick, p, product):
 
 
 @kernel()
-def _respond(start, alone, rows):
+def respond(start, alone, rows):
     """right_g^T d, right_g^T d' at the nodes (G, 2, N) of the response that begins with the state `start` (2 n,)."""
     groups, _, count, m, cols = rows.shape
     out = np.zeros((groups, 2, count * (m - 1) + 1))
-    state = start.copy()
-    follow = np.empty_like(state)
+    size = cols - 1
+    state = np.empty(size)
+    follow = np.empty(size)
+    for i in range(size):
+        state[i] = start[i]
     for p in range(count):
         for g in range(groups):
             for part in range(2):
@@ -228,168 +242,6 @@ def _respond(start, alone, rows):
             for j in range(cols - 1):
                 a += alone[p, i, j] * state[j]
             follow[i] = a
-        state[:] = follow
-    return out
-
-
-@kernel()
-def _solved(matrix, right):
-    """`matrix^-1 right` by elimination; not finite if the matrix is singular."""
-    n = matrix.shape[0]
-    a = matrix.copy()
-    x = right.copy()
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if a[pivot, k] == 0.0:
-            return np.full(n, np.inf)
-        if pivot != k:
-            for j in range(n):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            x[k], x[pivot] = x[pivot], x[k]
-        for i in range(k + 1, n):
-            f = a[i, k] / a[k, k]
-            if f != 0.0:
-                for j in range(k + 1, n):
-                    a[i, j] -= f * a[k, j]
-                x[i] -= f * x[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            x[k] -= a[k, j] * x[j]
-        x[k] /= a[k, k]
-    return x
-
-
-@kernel()
-def weighted(mass, damping, stiffness, shapes):
-    """K_0, C_0 (n, n), left, right (G, n) in DOFs weighted by the square roots of their masses; shapes (G, n)."""
-    n = mass.shape[0]
-    weight = np.sqrt(np.diag(mass))
-    inverse = np.linalg.inv(mass)
-    for i in range(n):
-        inverse[i] *= weight[i]
-    return inverse @ stiffness / weight, inverse @ damping / weight, shapes @ inverse.T, shapes / weight
-
-
-@kernel()
-def standing_several(stretch, scale, path, law, base, moving, varying, matrices, powers, nodes, share, without):
-    """Along the motion as it stands: monodromy matrix (2 n, 2 n) and the correction that the motion needs.
-
-    path, law, base: see `panels.lay_out`; matrices: `weighted`; share: a correction larger than this share of the
-    motion is cut down to it; without (2 n, 2 n) or (0, 0): a part of the state that it begins with is left out.
-    Polynomials are of lower degree than in `corrected_several`. Returns also the correction
-    along the directions (G, 2, N), the factor by which it was cut, and the propagators of all panels (P, 2 n, ...).
-    """
-    stiffness, damping, left, right = matrices
-    groups = path.shape[0]
-    none = np.zeros((groups, 0))
-    k = law[:, 1] if varying else none
-    c = law[:, 2] if moving else none
-    kick = np.zeros((groups, stretch.shape[0]))
-    total, alone, rows = _propagate(
-        stretch, scale, stiffness, damping, left, right, base, k, c, law[:, 0], kick, powers[1], nodes
-    )
-    size = total.shape[0]
-    phi = np.ascontiguousarray(total[:, :size])
-    factor = 1.0
-    change = np.zeros(path.shape)
-    if groups > 0:
-        start = _solved(np.eye(size) - phi, total[:, size].copy())
-        if without.shape[0] > 0:
-            start -= without @ start
-        found = _respond(start, alone, rows)
-        for g in range(groups):
-            most = share * np.abs(path[g, 0]).max()
-            largest = np.abs(found[g, 0]).max()
-            if not largest <= most:
-                factor = min(factor, most / largest if largest < np.inf else 0.0)
-        if factor > 0.0:
-            change = factor * found
-    return phi, change, factor, alone
-
-
-@kernel()
-def corrected_several(stretch, scale, law, base, kick, moving, varying, matrices, powers, nodes, alone):
-    """Monodromy matrix along the corrected motion; law (G, 2, N), kick (G, P): see `panels.closed_changes`.
-
-    Where stiffness and damping are constant on every panel, the panels' propagators `alone` are still the same.
-    """
-    stiffness, damping, left, right = matrices
-    groups = left.shape[0]
-    size = 2 * stiffness.shape[0]
-    none = np.zeros((groups, 0))
-    if varying:
-        c = law[:, 1] if moving else none
-        return _propagate(
-            stretch, scale, stiffness, damping, left, right, base, law[:, 0], c, none, kick, powers[0], nodes
-        )[0]
-    total = np.eye(size)
-    product = np.empty((size, size))
-    for p in range(alone.shape[0]):
-        _advance(total, alone[p, :, :size].copy(), left, right, kick, p, product)
-    return total
-
-
-@kernel()
-def perturbed(real, imaginary, left, right, phi, change):
-    """Eigenvalues of phi (N, N), by descending modulus, and their first-order shifts by a change of it and by rounding.
-
-    real, imaginary, left, right: as LAPACK's dgeev returns them, complex pairs in two columns.
-    """
-    n = real.shape[0]
-    right = np.ascontiguousarray(right)
-    moved = np.dot(change, right)
-    size = np.empty((n, n))
-    for j in range(n):
-        pair = imaginary[j] != 0.0
-        other = j if not pair else (j + 1 if imaginary[j] > 0.0 else j - 1)
-        for i in range(n):
-            size[i, j] = math.hypot(right[i, j], right[i, other]) if pair else abs(right[i, j])
-    rounded = np.dot(np.abs(phi), size)
-    mu = np.empty(n, dtype=np.complex128)
-    shift = np.empty(n)
-    norm = math.sqrt((change * change).sum()) + 1e-15 * math.sqrt((phi * phi).sum())
-    for j in range(n):
-        mu[j] = complex(real[j], imaginary[j])
-    most = max(1.0, np.abs(mu).max())
-    for j in range(n):
-        if imaginary[j] < 0.0:
-            shift[j] = shift[j - 1]
-            continue
-        pair = imaginary[j] > 0.0
-        scale = by_change = complex(0.0, 0.0)
-        by_rounding = 0.0
-        for i in range(n):
-            # the left vector conjugate
-            u = complex(left[i, j], -left[i, j + 1] if pair else 0.0)
-            scale += u * complex(right[i, j], right[i, j + 1] if pair else 0.0)
-            by_change += u * complex(moved[i, j], moved[i, j + 1] if pair else 0.0)
-            by_rounding += abs(u) * rounded[i, j]
-        shift[j] = abs(by_change) + 1e-15 * by_rounding
-        shift[j] = shift[j] / abs(scale) if abs(scale) > 0.0 else np.inf
-        # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
-        shift[j] = min(shift[j], math.sqrt(norm * most)) + 1e-14
-    order = np.argsort(-np.abs(mu), kind="mergesort")
-    return mu[order], shift[order]
-
-
-@kernel()
-def projector(real, imaginary, left, right):
-    """On the direction of the real multiplier nearest to +1, (N, N); zero if there is none or it is a double one."""
-    n = real.shape[0]
-    out = np.zeros((n, n))
-    found = -1
-    for j in range(n):
-        if imaginary[j] == 0.0 and (found < 0 or abs(1.0 - real[j]) < abs(1.0 - real[found])):
-            found = j
-    if found >= 0:
-        scale = 0.0
-        for i in range(n):
-            scale += left[i, found] * right[i, found]
-        if abs(scale) > 1e-10:
-            for i in range(n):
-                for j in range(n):
-                    out[i, j] = right[i, found] * left[j, found] / scale
+        for i in range(size):
+            state[i] = follow[i]
     return out

@@ -23,11 +23,9 @@ from suboctave.stability.nodes import ORDER
 
 #: error of the fine steps per panel, and of the coarse ones, in units of the Magnus expansion's leading error
 _FINE, _COARSE = 1.0e-9, 6.4e-8
-#: sums may be reordered; infinities keep their meaning
-_FAST = {"reassoc", "contract", "nsz"}
 
 
-@kernel(fastmath=_FAST)
+@kernel()
 def _monodromy(stretch, scale, base, k, damping, c, kick, table, tolerance):
     """Trace of the monodromy matrix, and `int c dt`.
 
@@ -70,7 +68,7 @@ def _monodromy(stretch, scale, base, k, damping, c, kick, table, tolerance):
         angle = rate * length * length
         change = (high - low) * length * length + 2.0 * swing * length * (1.0 + math.sqrt(angle))
         # the leading error of a step is rarely more than (angle + 0.3)^2 change / 400
-        want = change * (angle + 0.3) ** 2 / 400.0 / tolerance
+        want = change * (angle + 0.3) * (angle + 0.3) / 400.0 / tolerance
         steps = 1
         while steps < 1000 and steps**6 < want:
             steps += 1
@@ -145,7 +143,7 @@ def _monodromy(stretch, scale, base, k, damping, c, kick, table, tolerance):
     return (p11 + p22) * math.exp(-late), 2.0 * total
 
 
-@kernel(fastmath=_FAST)
+@kernel()
 def _respond(stretch, scale, base, k, damping, c, force, between, nodes, weight):
     """The periodic solution of `d'' + c d' + k d = -force` at the nodes, d and d' (2, N), and the largest |d|.
 
@@ -228,7 +226,8 @@ def _respond(stretch, scale, base, k, damping, c, force, between, nodes, weight)
     det = (1.0 - p11) * (1.0 - p22) - p12 * p21
     d = ((1.0 - p22) * e1 + p12 * e2) / det if det != 0.0 else np.inf
     v = (p21 * e1 + (1.0 - p11) * e2) / det if det != 0.0 else np.inf
-    square = 0.25 * (p11 - p22) ** 2 + p12 * p21
+    apart = p11 - p22
+    square = 0.25 * apart * apart + p12 * p21
     if weight < 1.0 and square > 0.0:
         # (Phi - other) / (near - other) projects on the direction of the real multiplier nearest to +1
         part = math.copysign(math.sqrt(square), 1.0 - 0.5 * (p11 + p22))

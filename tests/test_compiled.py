@@ -1,0 +1,106 @@
+"""Kernels run as Python until compiling them is worth it; what an earlier process compiled is used at once."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+
+import numpy as np
+import pytest
+from numba import config
+from numba.core.registry import CPUDispatcher
+
+from suboctave import compiled
+
+SOURCE = """
+from suboctave.compiled import kernel
+
+@kernel()
+def inner(x):
+    return x * x
+
+@kernel({options})
+def total(values):
+    result = 0.0
+    for i in range(values.shape[0]):
+        result += inner(values[i])
+    return result
+"""
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    """Makes the module's kernels as a process of its own would; keyword arguments are the ledger's state."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
+    path = tmp_path / "kernels_of_a_test.py"
+
+    def make(options="", **state):
+        ledger = compiled._Ledger()
+        for name, value in state.items():
+            setattr(ledger, name, value)
+        monkeypatch.setattr(compiled, "_ledger", ledger)
+        if not path.exists():
+            path.write_text(SOURCE.format(options=options))
+        spec = importlib.util.spec_from_file_location("kernels_of_a_test", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module.total
+
+    return make
+
+
+VALUES = np.arange(5.0)
+
+
+def test_a_cheap_kernel_is_not_compiled_in_the_first_computation(made):
+    total = made()
+    compiled.computation_begins()
+    assert [total(VALUES) for _ in range(3)] == [30.0] * 3
+    assert not total.signatures
+
+
+def test_from_the_second_computation_on_all_are(made):
+    total = made()
+    compiled.computation_begins()
+    total(VALUES)
+    compiled.computation_begins()
+    assert total(VALUES) == 30.0
+    assert len(total.signatures) == 1
+    assert type(total) is CPUDispatcher
+
+
+def test_a_quick_one_is_compiled_as_long_as_the_budget_lasts(made):
+    assert made("patience=-1.0")(VALUES) == 30.0
+    spent = made("patience=-1.0", budget=0.0)
+    assert spent(np.arange(5)) == 30.0
+    assert not spent.signatures
+
+
+def test_what_was_compiled_before_is_used_at_once(made):
+    made(runs=2)(VALUES)
+    total = made()
+    assert total(VALUES) == 30.0
+    assert len(total.signatures) == 1
+    assert not compiled._ledger.fresh
+
+
+def test_costly_calls_are_not_interpreted(made):
+    total = made()
+    assert total(np.ones(compiled.LARGE + 1)) == compiled.LARGE + 1
+    assert len(total.signatures) == 1
+
+
+def test_time_spent_in_other_kernels_is_theirs(made):
+    total = made()
+    start = time.perf_counter()
+    total(np.ones(2000))
+    elapsed = time.perf_counter() - start
+    inner = total.py_func.__globals__["inner"]
+    assert inner._spent > 0.0
+    assert 0.0 < total._spent < elapsed - inner._spent
+
+
+def test_a_failure_is_passed_on(made):
+    total = made()
+    with pytest.raises(TypeError):
+        total(np.array([None]))
