@@ -37,6 +37,7 @@ _TEXT = "text"
 _TOLD = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
 _RECORDS = {"record", "digest", "contents"}
 _LONG = 400
+_BESIDE = 56  # characters in a row of a table that stands beside its figure
 
 
 def write_report(
@@ -138,7 +139,8 @@ def _curve(name: str, dataset: xarray.Dataset) -> str:
     ended = f"; {dataset.attrs['ended']}" if dataset.attrs.get("ended") else ""
     notes = "".join(f'<p class="note">{_safe(note)}</p>' for note in _notes(dataset))
     table = _table(head, rows) if rows else "<p>none</p>"
-    wide = " wide" if len(head) > 5 else ""
+    widths = [max(len(text) for text in column) for column in zip([name for name, _ in head], *rows, strict=True)]
+    wide = " wide" if sum(widths) > _BESIDE else ""
     return (
         f'<p class="soft">{_safe(said + ended)}.</p>'
         f'<div class="pair{wide}"><div>{_figure({name: dataset}, str(dataset.attrs["free"]))}</div>'
@@ -228,9 +230,10 @@ def _provenance(dataset: xarray.Dataset) -> str:
         pairs.append(("stability from", "; ".join(methods)))
     longer = []
     for name, value in attrs.items():
-        if name in _TOLD or name in _RECORDS or str(value) == "":
+        untold = name == "seconds" and not _finite(value)
+        if name in _TOLD or name in _RECORDS or str(value) == "" or untold:
             continue
-        shown = f"{float(value):.3g} s" if name == "seconds" and _finite(value) else str(value)
+        shown = f"{float(value):.3g} s" if name == "seconds" else str(value)
         if len(shown) > _LONG or "\n" in shown:
             longer.append((str(name), shown))
         else:
