@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from suboctave.bifurcation.gaps import contact_side, levels
+from suboctave.bifurcation.gaps import contact_side, levels, told_levels
 from suboctave.errors import InputError
 from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array
@@ -30,10 +30,10 @@ _AROUND, _ROUNDS = 33, 9
 _CANDIDATES = 8
 
 
-def gapped_elements(orbit: PeriodicOrbit) -> list[int]:
+def gapped_elements(system: System) -> list[int]:
     """Indices of the elements that have a gap: a displacement at which contact begins."""
-    state = orbit.state()
-    return [index for index in range(len(orbit.balance.system.elements)) if levels(state.local(index))]
+    told = [(element, element.coefficient_values(system.parameters)) for element in system.elements]
+    return [index for index, (element, c) in enumerate(told) if told_levels(element.sampling(c), c)]
 
 
 def check_element(system: System, element: int | None, gapped: list[int] | None = None) -> int:

@@ -88,8 +88,7 @@ class BranchReadings:
         return self._over(lambda orbit: contacts.contact_of(orbit, chosen)[1])
 
     def _gapped(self, element: int | None) -> int:
-        gapped = contacts.gapped_elements(self.orbits[0]) if len(self.orbits) else []
-        return contacts.check_element(self.system, element, gapped)
+        return contacts.check_element(self.system, element, contacts.gapped_elements(self.system))
 
     def transmitted_force(self, direction: ArrayLike | None = None) -> Array:
         """Largest |F| over a period of the force that springs, dampers and elements pass on to the ground.
@@ -140,7 +139,7 @@ class BranchReadings:
             return []
         names = [*_OF_A_DOF, "harmonic_1", "phase_1"]
         names += [f"peak_force_{i}" for i in range(len(self.system.elements))]
-        names += [f"{what}_{i}" for i in contacts.gapped_elements(self.orbits[0]) for what in _OF_A_GAP]
+        names += [f"{what}_{i}" for i in contacts.gapped_elements(self.system) for what in _OF_A_GAP]
         orbit = self.orbits[0]
         if orbit.balance.size == self.system.n:
             names.append("transmitted_force")
@@ -168,8 +167,9 @@ class Reading:
         dof = observe if self.dof is None else self.dof
         kind = READINGS[self.what]
         if self.what in _OF_AN_ELEMENT and len(orbits):
-            gapped = contacts.gapped_elements(orbits[0]) if self.what in _OF_A_GAP else None
-            contacts.check_element(orbits[0].balance.system, int(self.number or 0), gapped)
+            system = orbits[0].balance.system
+            gapped = contacts.gapped_elements(system) if self.what in _OF_A_GAP else None
+            contacts.check_element(system, int(self.number or 0), gapped)
         values = np.array([kind.read(orbit, dof, self.number or 0.0) for orbit in orbits])
         return _phases(values) if self.what == "phase" else values.astype(float)
 

@@ -73,6 +73,8 @@ def size_in_inches(size: str | tuple[float, float]) -> tuple[float, float]:
             raise InputError(f"unknown size {size!r}{suggest(size, SIZES)}; or width and height in inches")
         return SIZES[size]
     try:
+        if any(isinstance(value, str | bool) for value in size):
+            raise TypeError
         width, height = (float(value) for value in size)
     except (TypeError, ValueError):
         raise InputError(f"size is a name ({', '.join(SIZES)}) or width and height in inches, not {size!r}") from None
