@@ -74,20 +74,19 @@ def _lines(
     dataset: xarray.Dataset, horizontal: str, label: str, curve: style.CurveStyle, index: int, several: bool
 ) -> list[dict[str, Any]]:
     whole = line(dataset, horizontal)
+    words = _Words(dataset)
     verdicts = [None] if whole.stable is None else [True, False]
     traces = []
     for verdict in verdicts:
         vertices = _of_verdict(whole.stable, verdict, whole.x.size)
         if not vertices:
             continue
-        at = np.array(vertices)
-        kept = at >= 0
         word = "motions" if verdict is None else "stable" if verdict else "unstable"
-        x = [float(whole.x[i]) if i >= 0 else None for i in at]
-        y = [float(whole.y[i]) if i >= 0 else None for i in at]
+        x = [float(whole.x[i]) if i >= 0 else None for i in vertices]
+        y = [float(whole.y[i]) if i >= 0 else None for i in vertices]
         told = [
-            _told(dataset, int(whole.point[i]), int(whole.event[i])) if keep else ""
-            for i, keep in zip(at, kept, strict=True)
+            "" if i < 0 else words.of_event(whole.event[i]) if whole.event[i] >= 0 else words.of_point(whole.point[i])
+            for i in vertices
         ]
         traces.append(
             {
@@ -124,7 +123,7 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> 
 
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
-    heights = dataset["event_amplitude"].to_numpy()
+    words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
     kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
     traces = []
     for kind in dict.fromkeys(kinds):
@@ -139,7 +138,7 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
                 "legendgroup": label if several else named,
                 "x": _short(positions[chosen].tolist()),
                 "y": _short(heights[chosen].tolist()),
-                "text": [_told(dataset, -1, int(i)) for i in chosen],
+                "text": [words.of_event(int(i)) for i in chosen],
                 "hovertemplate": f"{label}: {named}<br>%{{text}}<extra></extra>",
                 "marker": {
                     "symbol": _SYMBOLS[mark.marker],
@@ -152,25 +151,40 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
     return traces
 
 
-def _told(dataset: xarray.Dataset, point: int, event: int) -> str:
-    """What hovering over a vertex says: omega, the free parameter, amplitude, the leading multiplier."""
-    prefix, index = ("event_", event) if event >= 0 else ("", point)
-    free = str(dataset.attrs["free"])
-    at, there = coordinate(dataset, free)
-    lines = [f"ω = {float(dataset[f'{prefix}omega'].values[index]):.{_DIGITS}g}"]
-    if free != "omega":
-        lines.append(f"{html.escape(free)} = {float((there if event >= 0 else at)[index]):.{_DIGITS}g}")
-    lines.append(f"amplitude = {float(dataset[f'{prefix}amplitude'].values[index]):.7g}")
-    if event >= 0:
-        mu = complex(dataset["event_multiplier"].values[index])
-    elif "multipliers" in dataset and dataset.sizes.get("multiplier"):
-        mu = complex(dataset["multipliers"].values[index, 0])
-    else:
-        mu = complex(math.nan, math.nan)
-    if np.isfinite(mu):
-        shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
-        lines.append(f"{'critical' if event >= 0 else 'leading'} multiplier = {shown}, modulus {abs(mu):.5g}")
-    return "<br>".join(lines)
+class _Words:
+    """What hovering over a point or an event says: omega, the free parameter, amplitude, a multiplier."""
+
+    def __init__(self, dataset: xarray.Dataset) -> None:
+        free = str(dataset.attrs["free"])
+        self.free = "" if free == "omega" else html.escape(free)
+        at, there = coordinate(dataset, free)
+        known = "multipliers" in dataset and dataset.sizes.get("multiplier", 0) > 0
+        leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(at.size, np.nan + 0.0j)
+        self.points = (dataset["omega"].to_numpy(), at, dataset["amplitude"].to_numpy(), leading)
+        self.events = (
+            dataset["event_omega"].to_numpy(),
+            there,
+            dataset["event_amplitude"].to_numpy(),
+            dataset["event_multiplier"].to_numpy(),
+        )
+
+    def of_point(self, index: int) -> str:
+        return self._told(self.points, index, "leading")
+
+    def of_event(self, index: int) -> str:
+        return self._told(self.events, index, "critical")
+
+    def _told(self, columns: tuple[np.ndarray, ...], index: int, which: str) -> str:
+        omega, free, amplitude, multiplier = (column[index] for column in columns)
+        lines = [f"ω = {omega:.{_DIGITS}g}"]
+        if self.free:
+            lines.append(f"{self.free} = {free:.{_DIGITS}g}")
+        lines.append(f"amplitude = {amplitude:.7g}")
+        mu = complex(multiplier)
+        if np.isfinite(mu):
+            shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
+            lines.append(f"{which} multiplier = {shown}, modulus {abs(mu):.5g}")
+        return "<br>".join(lines)
 
 
 def _short(values: list[Any]) -> list[float | None]:

@@ -13,7 +13,8 @@ coordinate under its own name as well, unless the layout already uses that name.
 `event_`; `event_after` is the index of the point after which the event lies, so that the curve with its events is one
 line: point `i`, the events with `event_after == i` in their order, point `i + 1`. `event_contact` names the contact
 that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which
-it does.
+it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...; docs/pictures.md) are further variables on
+`point`, each with its own on `event`.
 """
 
 from __future__ import annotations
