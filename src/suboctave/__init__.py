@@ -49,7 +49,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
-    from suboctave.pictures import plot
+    from suboctave.pictures import plot, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -94,6 +94,7 @@ _HOME = {
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
     "plot": "suboctave.pictures",
+    "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
@@ -144,6 +145,7 @@ __all__ = [
     "plot",
     "stability",
     "verify",
+    "write_report",
 ]
 
 
