@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
+    from suboctave.pictures import plot, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -92,6 +93,8 @@ _HOME = {
     "verify": "suboctave.analysis",
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
+    "plot": "suboctave.pictures",
+    "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
@@ -139,8 +142,10 @@ __all__ = [
     "frequency_response",
     "library",
     "load",
+    "plot",
     "stability",
     "verify",
+    "write_report",
 ]
 
 

@@ -87,6 +87,19 @@ def test_everything_that_was_asked_for_is_written(study_file, suboctave):
     assert max(len(line) for line in out.splitlines() if not line.startswith("written")) <= 80
 
 
+def test_figures_in_other_units_and_a_page_of_them_all(study_file, suboctave):
+    figure = 'file = "a.svg"\nanalyses = ["response"]\nquantity = "phase"\nfrequency = "Hz"\nsize = "single-column"\n'
+    path = study_file(DUFFING + f'[outputs]\nhtml = "report.html"\n[[outputs.figures]]\n{figure}')
+    status, _, err = suboctave("run", path)
+    assert status == 0, err
+    folder = path.parent / "study_results"
+    assert 'width="238.32pt"' in (folder / "a.svg").read_text()  # 84 mm
+    page = (folder / "report.html").read_text()
+    assert "<h2>response</h2>" in page
+    assert "<h2>up</h2>" in page
+    assert "time taken" in page
+
+
 def test_parameters_may_differ_for_one_analysis(study_file, by_script):
     text = DUFFING.replace("F = 0.3 }", "F = 9.0 }").replace(
         "max_step = 0.2\n", "max_step = 0.2\nparameters = { F = 0.3 }\n", 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.analysis.audit import Audit
+from suboctave.analysis.readings import BranchReadings, columns, with_readings
 from suboctave.bifurcation import Bifurcation, BifurcationList
 from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, suggest
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from suboctave.analysis.sweep import SweepPath
+
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
@@ -34,7 +37,7 @@ class BranchPoint:
     iterations: int
 
 
-class Branch:
+class Branch(BranchReadings):
     """A curve of periodic motions along one free parameter.
 
     Attributes
@@ -158,21 +161,27 @@ class Branch:
         """Highest multiple of the base frequency used at each point, shape (len,), int."""
         return np.array([p.orbit.basis.harmonics for p in self.points])
 
-    def to_xarray(self) -> xarray.Dataset:
-        """The branch as a labelled dataset: points, events, and what produced them."""
-        from suboctave.store.layout import branch_dataset
+    def to_xarray(self, readings: Iterable[str] | bool = False) -> xarray.Dataset:
+        """The branch as a labelled dataset: points, events, and what produced them.
 
-        return branch_dataset(self)
+        `readings`: names of read-offs to add (see `reading`), or True for all of `available_readings`.
+        """
+        from suboctave.store.layout import branch_dataset, events_met
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per point: parameters, amplitude, stability, leading multiplier, errors."""
+        return with_readings(branch_dataset(self), self, events_met(self), readings)
+
+    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+        """One row per point: parameters, amplitude, stability, leading multiplier, errors; read-offs on request.
+
+        `readings` as in `to_xarray`.
+        """
         import pandas as pd
 
         leading = self.multipliers[:, 0]
-        columns: dict[str, Any] = {"omega": self.omega}
+        table: dict[str, Any] = {"omega": self.omega}
         if self.name != "omega":
-            columns[self.name] = self.parameter(self.name)
-        columns |= {
+            table[self.name] = self.parameter(self.name)
+        table |= {
             "amplitude": self.amplitude,
             "stable": self.stable,
             "multiplier_real": leading.real,
@@ -182,7 +191,7 @@ class Branch:
             "truncation": self.truncation,
             "residual": [p.orbit.residual for p in self.points],
         }
-        return pd.DataFrame(columns)
+        return pd.DataFrame(table | columns(self, readings))
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
@@ -231,10 +240,25 @@ class Branch:
         return pd.DataFrame(rows, columns=list(dict.fromkeys(names)))  # a parameter may bear one of these names
 
     def plot(self, path: Any = None, **options: Any) -> Any:
-        """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given."""
-        from suboctave.pictures import plot_response
+        """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given.
 
-        return plot_response(self.to_xarray(), path=path, **options)
+        Options are those of `suboctave.plot`.
+        """
+        from suboctave.pictures import plot
+
+        return plot(self, path, **options)
+
+    def sweep_path(self, direction: str = "up") -> SweepPath:
+        """The path that a slow sweep of the free parameter "up" or "down" would follow, with its jumps."""
+        from suboctave.analysis.sweep import sweep_path
+
+        return sweep_path(self.to_xarray(), direction)
+
+    def hysteresis(self) -> list[tuple[float, float]]:
+        """Ranges of the free parameter in which sweeps up and down find different motions."""
+        from suboctave.analysis.sweep import hysteresis
+
+        return hysteresis(self.to_xarray())
 
     def __repr__(self) -> str:
         values = self.parameter(self.name)

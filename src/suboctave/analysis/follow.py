@@ -10,7 +10,8 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
-from suboctave.analysis.guard import CountCheck, Passage, StepGuard
+from suboctave.analysis.count import CountCheck
+from suboctave.analysis.guard import Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation

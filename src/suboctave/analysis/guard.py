@@ -27,7 +27,7 @@ from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import first_doubtful
 from suboctave.analysis.nearing import nears_grazing
 from suboctave.analysis.response import ResponseCurve
-from suboctave.bifurcation import Bifurcation, Sample
+from suboctave.bifurcation import Sample
 from suboctave.bifurcation.grazing import touches
 from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
 from suboctave.compiled import kernel
@@ -52,8 +52,6 @@ _JUMP = 1e-5
 _AWAY = 0.03
 #: the ends say so themselves if chord and tangents agree to this share of the length
 _AGREE = 0.03
-#: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
-_NEAR_CIRCLE = 0.02
 
 
 @dataclass
@@ -357,45 +355,6 @@ def _mixed(p: Sample, q: Sample) -> bool:
     if p.measures[0, -1] == q.measures[0, -1]:
         return False
     return any(kind is not NEIMARK_SACKER for kind in changes(p, q))
-
-
-class CountCheck:
-    """Holds the number of unstable multipliers against the located bifurcations."""
-
-    def __init__(self) -> None:
-        self._last: Sample | None = None
-        self._since: list[Bifurcation] = []
-
-    def noted(self, item: Bifurcation) -> None:
-        """A bifurcation that belongs to no step."""
-        self._since.append(item)
-
-    def complaint(self, sample: Sample, found: list[Bifurcation]) -> tuple[Sample, Sample, str] | None:
-        """From where to where, and a sentence, if the count has changed by what the bifurcations since the last clear
-        sample do not explain.
-        """
-        self._since += found
-        if not sample.floquet.decided or sample.floquet.clearance < _NEAR_CIRCLE:
-            return None
-        last, items = self._last, self._since
-        self._last, self._since = sample, []
-        if last is None:
-            return None
-        odd = sum(item.kind in ("LP", "PD", "BP") for item in items)
-        pairs = sum(item.kind == "NS" for item in items)
-        before, now = last.floquet.unstable, sample.floquet.unstable
-        change = abs(now - before)
-        # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
-        branching = any(item.kind == "BP" for item in items)
-        if change <= odd + 2 * pairs and (branching or (change - odd) % 2 == 0):
-            return None
-        names = ", ".join(item.kind for item in items) or "none"
-        return (
-            last,
-            sample,
-            f"the number of unstable multipliers changes from {before} to {now}, which the bifurcations located there "
-            f"({names}) do not explain",
-        )
 
 
 @kernel()

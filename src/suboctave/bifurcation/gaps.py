@@ -44,13 +44,13 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     for group, motion in zip(state.balance.groups, state.motions, strict=True):
         turns = None
         for i in group.members:
-            for index, level in enumerate(_levels(kinds[i], coefficients[i])):
+            for index, level in enumerate(told_levels(kinds[i], coefficients[i])):
                 if turns is None:
                     grid = search_grid(motion.shape[0] - 1)
                     turns = extrema(motion, grid.zr, grid.zi)
                 found.append(GapExtrema(i, index, level, *turns))
     for nodal in state.nodal:
-        places = _levels(nodal.kind, nodal.c)
+        places = told_levels(nodal.kind, nodal.c)
         if places:
             grid = search_grid(nodal.motions[0].shape[0] - 1)
             turns = extrema(nodal.motions[0], grid.zr, grid.zi)
@@ -60,10 +60,11 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
 
 def levels(local: LocalMotion) -> tuple[float, ...]:
     """Displacements at which an element's law has a corner, or is sharp."""
-    return _levels(local.kind, local.coefficients)
+    return told_levels(local.kind, local.coefficients)
 
 
-def _levels(kind: Sampling, coefficients: Array) -> tuple[float, ...]:
+def told_levels(kind: Sampling, coefficients: Array) -> tuple[float, ...]:
+    """`levels`, from what an element tells of its law at these coefficients."""
     if isinstance(kind, PiecewiseLinear):
         return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
     return kind.points if isinstance(kind, SharpSampling | CornerSampling) else ()

@@ -28,7 +28,9 @@ _STEP = 1e-9
 #: size of motion and forces at rest: products of it with others neither overflow nor vanish
 _NOTHING = 1e-100
 #: step below which the matrix is not computed anew
-_SHORT = 1e-3
+_SHORT = 1e-4
+#: step, in units of the motion and of the parameter's range, that leads to no bifurcation of this neighbourhood
+_AWAY = 4.0
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,7 @@ def newton(
         if iteration == iterations:
             break
         # after a short step that contracts, the old factors take the next one as far
-        if linear is None or previous > _SHORT or contraction > 0.1:
+        if linear is None or previous > _SHORT or contraction > 0.03:
             linear = _linearised(state, guess, equations, columns, spans, weight, rows, force)
         factor, scale_x, scale_rows, sizes, steepest = linear
         # right behind a grazing the equations are so steep that the last digit of an unknown is more than tolerated
@@ -168,6 +170,8 @@ def newton(
         contraction = length / previous
         if not np.isfinite(length):
             raise ConvergenceError("the bordered system is singular")
+        if iteration > 0 and length > _AWAY:
+            raise ConvergenceError("the bordered system leads away from its start")
         if iteration > 3 and length > 0.5 * previous and previous > 1e-6:
             raise ConvergenceError("the bordered system does not contract")
         damp = min(1.0, 0.5 / length) if length > 0.0 else 1.0

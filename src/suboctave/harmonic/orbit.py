@@ -111,15 +111,33 @@ class PeriodicOrbit:
 
     def amplitude(self, dof: int = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
-        c = np.ascontiguousarray(self._along(dof))
-        return float(instants.peak(c, 8 * self.basis.harmonics + 8)[0])
+        return self._peak(self._along(dof))
+
+    def velocity_amplitude(self, dof: int = 0) -> float:
+        """Largest |dx/dt| of a DOF over the motion's period, as `amplitude`."""
+        return self._peak(self._along(dof, 1))
+
+    def acceleration_amplitude(self, dof: int = 0) -> float:
+        """Largest second derivative of x of a DOF, in modulus, over the motion's period, as `amplitude`."""
+        return self._peak(self._along(dof, 2))
+
+    def rms(self, dof: int = 0, derivative: int = 0) -> float:
+        """Root mean square of x over the period, its mean included, or of a derivative by t.
+
+        By Parseval `sqrt(c_0^2 + sum_k |c_k|^2 / 2)`, exact for the harmonics that the motion has.
+        """
+        c = self._along(dof, derivative)
+        return math.sqrt(c[0].real ** 2 + 0.5 * float(np.sum(np.abs(c[1:]) ** 2)))
+
+    def _peak(self, c: ComplexArray) -> float:
+        return float(instants.peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0])
 
     def start(self) -> Array:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""
         return np.concatenate((self.displacement(0.0), self.velocity(0.0)))
 
-    def _along(self, dof: int) -> ComplexArray:
-        """Complex amplitudes of one of the structure's DOFs, shape (H + 1,)."""
+    def _along(self, dof: int, derivative: int = 0) -> ComplexArray:
+        """Complex amplitudes of one of the structure's DOFs, or of a derivative of it by t, shape (H + 1,)."""
         n = self.balance.system.n
         if not -n <= dof < n:
             raise InputError(
@@ -127,7 +145,8 @@ class PeriodicOrbit:
             )
         unit = np.zeros(n)
         unit[dof] = 1.0
-        return self.amplitudes @ self.balance.linear.retain(unit)
+        c: ComplexArray = self.amplitudes @ self.balance.linear.retain(unit)
+        return c * (1j * self.basis.multiples * self.omega) ** derivative if derivative else c
 
     def __repr__(self) -> str:
         period = "" if self.basis.nu == 1 else f", {self.basis.nu}T"

@@ -1,11 +1,14 @@
-"""What is seen: figures drawn from labelled datasets, the same from a live curve and from a file.
+"""What is seen: figures and report pages drawn from labelled datasets, the same from a live curve and from a file.
 
-from suboctave.pictures import plot_response
+from suboctave.pictures import plot
 
-plot_response(curve.to_xarray(), "curve.png")
+plot(curve.to_xarray(), "curve.png")
 """
 
+from suboctave.pictures.plot import plot
+from suboctave.pictures.report import write_report
 from suboctave.pictures.response import draw_response, plot_panels, plot_response
 from suboctave.pictures.saving import save_figure
+from suboctave.pictures.view import View
 
-__all__ = ["draw_response", "plot_panels", "plot_response", "save_figure"]
+__all__ = ["View", "draw_response", "plot", "plot_panels", "plot_response", "save_figure", "write_report"]

@@ -15,15 +15,16 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
+from suboctave.pictures.legend import ordered, place_legend
 from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import Stroke, strokes
+from suboctave.pictures.view import View
 from suboctave.store.layout import check_layout, coordinate
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
 
 __all__ = ["draw_response", "plot_panels", "plot_response"]
@@ -36,16 +37,23 @@ def plot_response(
     x: str | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
-    size: tuple[float, float] = (6.4, 4.2),
+    size: str | tuple[float, float] = (6.4, 4.2),
+    view: View | None = None,
 ) -> Figure:
     """One or several response curves in one frame, saved to `path` where one is given (.png, .svg, .pdf).
 
     `x` names the horizontal axis: "omega" or a parameter (default: what the curves were followed in). `labels` tell
-    several curves apart (default: the parameters in which they differ). `size` in inches.
+    several curves apart (default: the parameters in which they differ). `size`: "single-column", "double-column", or
+    width and height in inches. `view`: the quantity drawn and the units (default: amplitude, as it is).
     """
-    group = _as_list(curves)
     return plot_panels(
-        [group], path, x=x, labels=None if labels is None else [labels], titles=[title] if title else None, size=size
+        [_as_list(curves)],
+        path,
+        x=x,
+        labels=None if labels is None else [labels],
+        titles=[title] if title else None,
+        size=size,
+        view=view,
     )
 
 
@@ -56,7 +64,8 @@ def plot_panels(
     x: str | None = None,
     labels: Sequence[Sequence[str]] | None = None,
     titles: Sequence[str] | None = None,
-    size: tuple[float, float] | None = None,
+    size: str | tuple[float, float] | None = None,
+    view: View | None = None,
 ) -> Figure:
     """Several frames side by side on the same axes, with one legend for all of them.
 
@@ -72,19 +81,23 @@ def plot_panels(
             raise InputError(f"{name}: expected one entry for each of the {len(groups)} panels, got {len(given)}")
     horizontal = _common_axis([dataset for group in groups for dataset in group], x)
 
-    width = 1.2 + 5.2 * len(groups) if len(groups) == 1 else 1.0 + 4.2 * len(groups)
-    figure = Figure(figsize=size or (width, 4.2), layout="constrained", facecolor="white")
+    shown = view or View()
+    wide = 1.2 + 5.2 * len(groups) if len(groups) == 1 else 1.0 + 4.2 * len(groups)
+    inches = style.size_in_inches((wide, 4.2) if size is None else size)
+    look = style.PRINT if isinstance(size, str) else style.look_of(inches[0] / len(groups))
+    figure = Figure(figsize=inches, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     frames = figure.subplots(1, len(groups), squeeze=False, sharex=True, sharey=True)[0]
     legend: dict[str, Line2D] = {}
     for index, (axes, group) in enumerate(zip(frames, groups, strict=True)):
-        legend |= draw_response(axes, group, x=horizontal, labels=None if labels is None else labels[index])
+        told = None if labels is None else labels[index]
+        legend |= draw_response(axes, group, x=horizontal, labels=told, view=shown, look=look)
         if titles is not None:
-            axes.set_title(titles[index], fontsize=style.LARGE, color=style.INK)
+            axes.set_title(_plain(titles[index]), fontsize=look.large, color=style.INK)
         if index:
             axes.set_ylabel("")
-    _set_limits(frames, groups, horizontal)
-    _place_legend(figure, frames, _ordered(legend))
+    _set_limits(frames, groups, horizontal, shown)
+    place_legend(figure, frames, ordered(legend), look)
     if path is not None:
         save_figure(figure, path)
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
@@ -98,38 +111,53 @@ def draw_response(
     *,
     x: str | None = None,
     labels: Sequence[str] | None = None,
+    view: View | None = None,
+    look: style.Look = style.SCREEN,
 ) -> dict[str, Line2D]:
     """Draws the curves into existing axes; returns the legend's entries, only of what occurs, without drawing it."""
-    group = _as_list(curves)
+    group, shown = _as_list(curves), view or View()
     horizontal = _common_axis(group, x)
+    for dataset in group:
+        shown.check(dataset)
     if labels is not None and len(labels) != len(group):
         raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
-    names = list(labels) if labels is not None else _tell_apart(group)
+    names = [_plain(name) for name in (labels if labels is not None else _tell_apart(group))]
+    several = len(group) > 1
     legend: dict[str, Line2D] = {}
     for index, dataset in enumerate(group):
-        colour = style.CURVE_COLOURS[index % len(style.CURVE_COLOURS)] if len(group) > 1 else style.INK
-        name = names[index] if labels is not None or len(group) > 1 else ""
-        legend |= _draw_line(axes, strokes(dataset, horizontal), colour, name)
-    for dataset in group:  # markers after all lines: none is crossed out by another curve
-        legend |= _draw_events(axes, dataset, horizontal)
-    _dress(axes, group[0], horizontal)
+        name = names[index] if labels is not None or several else ""
+        curve = style.curve_style(index) if several else style.ONE_CURVE
+        pieces = strokes(dataset, horizontal, shown.variable)
+        legend |= _draw_line(axes, pieces, shown.factors(horizontal), curve, look, name)
+    for index, dataset in enumerate(group):  # markers after all lines: none is crossed out by another curve
+        edge = style.curve_style(index).colour if several else style.INK
+        legend |= _draw_events(axes, dataset, shown.values(dataset, horizontal)[0], edge, look, several)
+    _dress(axes, *shown.labels(group[0], horizontal), look)
     return legend
 
 
-def _draw_line(axes: Axes, pieces: Sequence[Stroke], colour: str, name: str) -> dict[str, Line2D]:
+def _draw_line(
+    axes: Axes,
+    pieces: Sequence[Stroke],
+    factors: tuple[float, float],
+    curve: style.CurveStyle,
+    look: style.Look,
+    name: str,
+) -> dict[str, Line2D]:
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
+    width = look.line * curve.width
     if name:
-        legend[name] = Line2D([], [], color=colour, linewidth=style.LINE_WIDTH * 1.6)
+        legend[name] = Line2D([], [], color=curve.colour, linewidth=1.3 * width)
     for piece in pieces:
-        dash: Any = style.UNSTABLE_DASH if piece.stable is False else style.STABLE_DASH
+        dash: Any = curve.dash if piece.stable is False else style.STABLE_DASH
         axes.plot(
-            piece.x,
-            piece.y,
+            piece.x * factors[0],
+            piece.y * factors[1],
             linestyle=dash,
-            color=colour,
-            linewidth=style.LINE_WIDTH,
+            color=curve.colour,
+            linewidth=width,
             solid_capstyle="butt",
             dash_capstyle="butt",
             solid_joinstyle="round",
@@ -138,118 +166,81 @@ def _draw_line(axes: Axes, pieces: Sequence[Stroke], colour: str, name: str) -> 
         )
         if piece.stable is not None:
             key = "stable" if piece.stable else "unstable"
-            legend[key] = Line2D([], [], color=style.INK, linewidth=style.LINE_WIDTH, linestyle=dash)
+            drawn: Any = style.STABLE_DASH if piece.stable else style.UNSTABLE_DASH
+            legend[key] = Line2D([], [], color=style.INK, linewidth=look.line, linestyle=drawn)
     return legend
 
 
-def _draw_events(axes: Axes, dataset: xarray.Dataset, horizontal: str) -> dict[str, Line2D]:
+def _draw_events(
+    axes: Axes, dataset: xarray.Dataset, positions: np.ndarray, edge: str, look: style.Look, several: bool
+) -> dict[str, Line2D]:
+    """Markers: the shape tells the kind; the edge the curve, where there are several."""
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
-    positions = coordinate(dataset, horizontal)[1]
-    amplitudes = dataset["event_amplitude"].to_numpy()
     kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
     for kind in dict.fromkeys(kinds):
-        look = style.kind_style(kind)
+        mark = style.kind_style(kind)
         drawing: dict[str, Any] = {
             "linestyle": "none",
-            "marker": look.marker,
-            "markersize": look.size,
-            "markerfacecolor": look.colour,
-            "markeredgecolor": style.INK,
-            "markeredgewidth": 1.0,
+            "marker": mark.marker,
+            "markersize": mark.size * look.marker,
+            "markerfacecolor": mark.colour,
+            "markeredgecolor": edge,
+            "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
-        chosen = kinds == kind
+        chosen = positions[kinds == kind]
         axes.plot(
-            positions[chosen],
-            amplitudes[chosen],
+            chosen[:, 0],
+            chosen[:, 1],
             zorder=4 if kind == "grazing" else 5,
             gid=kind,
             clip_on=False,
             **drawing,
         )
-        legend[look.name] = Line2D([], [], **drawing)
+        plain = {"markeredgecolor": style.INK, "markeredgewidth": look.edge}
+        legend[mark.name] = Line2D([], [], **{**drawing, **plain})
     return legend
 
 
-def _dress(axes: Axes, dataset: xarray.Dataset, horizontal: str) -> None:
-    if horizontal == "omega":
-        axes.set_xlabel(r"forcing frequency $\omega$", fontsize=style.LARGE, color=style.INK)
-    else:
-        axes.set_xlabel(horizontal, fontsize=style.LARGE, color=style.INK)
-    one = int(dataset.attrs.get("dofs", 1)) == 1
-    observed = "x" if one else f"x_{{{dataset.attrs.get('observed_dof', 0)}}}"
-    axes.set_ylabel(rf"amplitude $\max\,|{observed}|$", fontsize=style.LARGE, color=style.INK)
-    axes.tick_params(direction="in", top=True, right=True, labelsize=style.NORMAL, color=style.INK, zorder=2)
-    axes.grid(True, color=style.GRID, linewidth=0.6, zorder=0)
+def _dress(axes: Axes, across: str, upwards: str, look: style.Look) -> None:
+    axes.set_xlabel(across, fontsize=look.large, color=style.INK)
+    axes.set_ylabel(upwards, fontsize=look.large, color=style.INK)
+    axes.tick_params(direction="in", top=True, right=True, labelsize=look.normal, color=style.INK, zorder=2)
+    axes.grid(True, color=style.GRID, linewidth=0.4 * look.line, zorder=0)
     axes.set_axisbelow(True)
     for spine in axes.spines.values():
         spine.set_color(style.INK)
-        spine.set_linewidth(0.8)
+        spine.set_linewidth(0.53 * look.line)
 
 
-def _set_limits(frames: Sequence[Axes], groups: Sequence[Sequence[xarray.Dataset]], horizontal: str) -> None:
-    datasets = [dataset for group in groups for dataset in group]
-    xs = np.concatenate([np.concatenate(coordinate(dataset, horizontal)) for dataset in datasets])
-    ys = np.concatenate([dataset[name].to_numpy() for dataset in datasets for name in ("amplitude", "event_amplitude")])
-    xs, ys = xs[np.isfinite(xs)], ys[np.isfinite(ys)]
+def _set_limits(
+    frames: Sequence[Axes], groups: Sequence[Sequence[xarray.Dataset]], horizontal: str, view: View
+) -> None:
+    every = np.concatenate([part for group in groups for data in group for part in view.values(data, horizontal)])
+    xs, ys = (column[np.isfinite(column)] for column in every.T)
     if xs.size == 0 or ys.size == 0:
         return
     spread = np.ptp(xs) or abs(xs[0]) or 1.0
     frames[0].set_xlim(xs.min() - 0.02 * spread, xs.max() + 0.02 * spread)
-    frames[0].set_ylim(0.0, 1.06 * (ys.max() or 1.0))
+    if ys.min() >= 0.0:
+        frames[0].set_ylim(0.0, 1.06 * (ys.max() or 1.0))
+    else:
+        height = np.ptp(ys) or abs(ys[0])
+        frames[0].set_ylim(ys.min() - 0.06 * height, ys.max() + 0.06 * height)
+    if view.quantity == "phase" and view.scale is None and np.ptp(ys) > 60.0:
+        frames[0].yaxis.set_major_locator(_degrees())
 
 
-def _place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line2D]) -> None:
-    """One legend: inside the frame that has room for it, else above all frames. It never covers a curve."""
-    if not entries:
-        return
-    drawing: dict[str, Any] = {
-        "fontsize": style.SMALL,
-        "frameon": True,
-        "framealpha": 1.0,
-        "edgecolor": style.GRID,
-        "handlelength": 2.6,
-    }
-    for axes in frames:
-        for location in ("upper left", "upper right", "center left", "center right"):
-            legend = axes.legend(entries.values(), entries.keys(), loc=location, **drawing)
-            legend.set_zorder(6)
-            if not _covers(figure, axes, legend):
-                return
-            legend.remove()
-    figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=min(len(entries), 4), **drawing)
+def _degrees() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=8, steps=[3, 4.5, 6, 9])
 
 
-def _covers(figure: Figure, axes: Axes, legend: Legend) -> bool:
-    figure.draw_without_rendering()
-    box = legend.get_window_extent().padded(figure.dpi / 72.0 * style.MARKER_SIZE)
-    for line in axes.get_lines():
-        x, y = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()])).T
-        if x.size == 0:
-            continue
-        # Points every pixel or so along the line: a long piece may cross a box that holds none of its ends.
-        length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-        if line.get_linestyle() != "None" and length[-1] > 0.0:
-            dense = np.linspace(0.0, length[-1], int(length[-1]) + 2)
-            x, y = np.interp(dense, length, x), np.interp(dense, length, y)
-        if np.any((x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1)):
-            return True
-    return False
-
-
-def _ordered(entries: dict[str, Line2D]) -> dict[str, Line2D]:
-    """Curves first, then stable and unstable, then the kinds in the order of the style table, then a user's own."""
-    lines, kinds = ["stable", "unstable"], [look.name for look in style.KINDS.values()]
-
-    def rank(name: str) -> tuple[int, int]:
-        if name in lines:
-            return 1, lines.index(name)
-        if name in kinds:
-            return 2, kinds.index(name)
-        return (0, 0) if entries[name].get_marker() == "None" else (3, 0)
-
-    return {name: entries[name] for name in sorted(entries, key=rank)}
+def _plain(text: str) -> str:
+    """A name as it is: dollar signs in it do not begin mathematics."""
+    return str(text).replace("$", r"\$")
 
 
 def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.Dataset]:

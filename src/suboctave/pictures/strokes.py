@@ -17,7 +17,7 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Stroke", "strokes"]
+__all__ = ["Line", "Stroke", "line", "strokes"]
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,45 @@ class Stroke:
     stable: bool | None
 
 
-def strokes(dataset: xarray.Dataset, x: str) -> list[Stroke]:
-    """The curve over parameter `x`, cut where stability changes.
+@dataclass(frozen=True)
+class Line:
+    """The points of a curve and its events as one line of vertices.
+
+    `x`, `y`, (vertices,); `point` and `event`, (vertices,), the index of the point or event at each, else -1; `stable`,
+    (vertices - 1,), whether the motions between two vertices are (None: not computed).
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    point: np.ndarray
+    event: np.ndarray
+    stable: np.ndarray | None
+
+
+def strokes(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> list[Stroke]:
+    """The curve over parameter `x`, cut where stability changes; `y` is a variable of the dataset.
 
     A piece between two neighbours of the line is stable when both ends say so. An event takes the stability of the side
     in question: that of the preceding point before it, of the following point after it. Between two events of the same
     step `event_stable_after` tells; where it does not, and where stability changes with no located event,
     the piece counts as unstable: a picture must not promise more than was found.
     """
+    drawn = line(dataset, x, y)
+    if drawn.stable is None:
+        return [Stroke(drawn.x, drawn.y, None)]
+    if drawn.stable.size == 0:
+        return [Stroke(drawn.x, drawn.y, bool(dataset["stable"].to_numpy().all()))]
+    cuts = [0, *(np.flatnonzero(np.diff(drawn.stable)) + 1), drawn.stable.size]
+    return [
+        Stroke(drawn.x[first : last + 1], drawn.y[first : last + 1], bool(drawn.stable[first]))
+        for first, last in pairwise(cuts)
+    ]
+
+
+def line(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> Line:
+    """The curve over parameter `x` as one line, with the verdict on every piece as `strokes` describes it."""
     horizontal, event_horizontal = coordinate(dataset, x)
-    vertical = dataset["amplitude"].to_numpy()
-    event_vertical = dataset["event_amplitude"].to_numpy()
+    vertical, event_vertical = dataset[y].to_numpy(), dataset[f"event_{y}"].to_numpy()
     after = dataset["event_after"].to_numpy()
     order = np.argsort(after, kind="stable")
     # Position on the line: all points, each followed by its events.
@@ -49,23 +77,19 @@ def strokes(dataset: xarray.Dataset, x: str) -> list[Stroke]:
     line_y = np.empty_like(line_x)
     line_x[position], line_y[position] = horizontal, vertical
     line_x[event_position], line_y[event_position] = event_horizontal[order], event_vertical[order]
-
-    if "stable" not in dataset:
-        return [Stroke(line_x, line_y, None)]
-    verdict = _pieces(
-        dataset["stable"].to_numpy().astype(bool),
-        after[order],
-        dataset["event_stable_after"].to_numpy()[order],
-        position,
-        event_position,
-    )
-    if verdict.size == 0:
-        return [Stroke(line_x, line_y, bool(dataset["stable"].to_numpy().all()))]
-    cuts = [0, *(np.flatnonzero(np.diff(verdict)) + 1), verdict.size]
-    return [
-        Stroke(line_x[first : last + 1], line_y[first : last + 1], bool(verdict[first]))
-        for first, last in pairwise(cuts)
-    ]
+    point, event = np.full((2, line_x.size), -1)
+    point[position] = np.arange(vertical.size)
+    event[event_position] = order
+    verdict = None
+    if "stable" in dataset:
+        verdict = _pieces(
+            dataset["stable"].to_numpy().astype(bool),
+            after[order],
+            dataset["event_stable_after"].to_numpy()[order],
+            position,
+            event_position,
+        )
+    return Line(line_x, line_y, point, event, verdict)
 
 
 def _pieces(

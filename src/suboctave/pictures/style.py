@@ -3,14 +3,37 @@
 The colours are those of Okabe and Ito (*Color Universal Design*, 2008). Shape carries the kind on its own, so that
 a black-and-white print loses nothing: circles for limit points and triangles for period doublings, as in Alcorta
 et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Grazing
-contacts, which need not change the response, are crosses beneath the others.
+contacts, which need not change the response, are crosses beneath the others. Several curves in one frame differ in
+colour, in width and in the dashes of their unstable parts, and each one's markers have its colour at the edge.
+
+Widths of "single-column" and "double-column" are 84 mm and 174 mm, which fit the columns of the journals of the field;
+letters are then 7 to 8 points high.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["CURVE_COLOURS", "INK", "KINDS", "STABLE_DASH", "UNSTABLE_DASH", "KindStyle", "kind_style"]
+from suboctave.errors import InputError, suggest
+
+__all__ = [
+    "CURVE_COLOURS",
+    "INK",
+    "KINDS",
+    "ONE_CURVE",
+    "PRINT",
+    "SCREEN",
+    "SIZES",
+    "STABLE_DASH",
+    "UNSTABLE_DASH",
+    "CurveStyle",
+    "KindStyle",
+    "Look",
+    "curve_style",
+    "kind_style",
+    "look_of",
+    "size_in_inches",
+]
 
 INK = "#1a1a1a"
 GRID = "#d9d9d9"
@@ -21,7 +44,68 @@ UNSTABLE_DASH = (0, (3.2, 1.6))  # in line widths: begins with a dash, so the ch
 
 LINE_WIDTH = 1.5
 MARKER_SIZE = 6.5
-SMALL, NORMAL, LARGE = 9.0, 10.0, 11.0  # font sizes in points
+
+#: inches; the widths are 84 mm and 174 mm
+SIZES = {"single-column": (3.31, 2.4), "double-column": (6.85, 3.6)}
+_PRINT_BELOW = 4.2  # inches of width of one frame
+
+
+@dataclass(frozen=True)
+class Look:
+    """Sizes of letters, lines and marker edges in points; markers as a multiple of the table's."""
+
+    small: float
+    normal: float
+    large: float
+    line: float
+    edge: float
+    marker: float
+
+
+SCREEN = Look(9.0, 10.0, 11.0, LINE_WIDTH, 1.0, 1.0)
+PRINT = Look(7.0, 7.5, 8.0, 1.1, 0.7, 0.72)
+
+
+def size_in_inches(size: str | tuple[float, float]) -> tuple[float, float]:
+    """Width and height of a named size, or those given; InputError for what is neither."""
+    if isinstance(size, str):
+        if size not in SIZES:
+            raise InputError(f"unknown size {size!r}{suggest(size, SIZES)}; or width and height in inches")
+        return SIZES[size]
+    try:
+        if any(isinstance(value, str | bool) for value in size):
+            raise TypeError
+        width, height = (float(value) for value in size)
+    except (TypeError, ValueError):
+        raise InputError(f"size is a name ({', '.join(SIZES)}) or width and height in inches, not {size!r}") from None
+    if not (0.2 < width <= 100.0 and 0.2 < height <= 100.0):
+        raise InputError(f"size: width and height in inches, from 0.2 to 100, not {size!r}")
+    return width, height
+
+
+def look_of(width: float) -> Look:
+    """The look of a frame this many inches wide: that of print for the columns of a journal."""
+    return PRINT if width < _PRINT_BELOW else SCREEN
+
+
+@dataclass(frozen=True)
+class CurveStyle:
+    """How one curve is drawn: colour, width as a multiple of the look's, dashes of its unstable parts."""
+
+    colour: str
+    width: float
+    dash: tuple[float, tuple[float, ...]]
+
+
+ONE_CURVE = CurveStyle(INK, 1.0, UNSTABLE_DASH)
+_WIDTHS = (1.0, 0.65, 1.5)
+_DASHES = (UNSTABLE_DASH, (0, (5.5, 1.8, 1.2, 1.8)), (0, (1.2, 1.2)))
+
+
+def curve_style(index: int) -> CurveStyle:
+    """The style of one of several curves in a frame."""
+    colour = CURVE_COLOURS[index % len(CURVE_COLOURS)]
+    return CurveStyle(colour, _WIDTHS[index % len(_WIDTHS)], _DASHES[index % len(_DASHES)])
 
 
 @dataclass(frozen=True)

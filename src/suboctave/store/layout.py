@@ -13,18 +13,19 @@ coordinate under its own name as well, unless the layout already uses that name.
 `event_`; `event_after` is the index of the point after which the event lies, so that the curve with its events is one
 line: point `i`, the events with `event_after == i` in their order, point `i + 1`. `event_contact` names the contact
 that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which
-it does.
+it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...; docs/pictures.md) are further variables on
+`point`, each with its own on `event`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from suboctave.errors import InputError, suggest
+from suboctave.store.events import BranchEvents, EventRow, event_rows, event_variables, events_met
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -34,82 +35,16 @@ if TYPE_CHECKING:
     from suboctave.harmonic.orbit import PeriodicOrbit
     from suboctave.model.system import System
 
-__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate", "curve_dataset"]
+__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate", "curve_dataset", "events_met"]
 
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
-UNKNOWN = -1  # in event_stable_after
 RESERVED = frozenset(
     {"point", "event", "parameter", "multiplier", "omega", "amplitude", "stable", "harmonics", "error", "residual"}
     | {"multipliers", "multiplier_errors", "stability_method", "parameters"}
 )
 
 
-@dataclass(frozen=True)
-class EventRow:
-    """One located bifurcation, as a row of the dataset.
-
-    `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
-    the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
-    `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at
-    a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does;
-    `multiplier_error` is the estimated error of `multiplier`, `stability_method` where it comes from.
-    """
-
-    kind: str
-    after: int
-    omega: float
-    amplitude: float
-    residual: float = np.nan
-    multiplier: complex = complex(np.nan, np.nan)
-    multiplier_error: float = np.nan
-    stability_method: str = ""
-    criticality: str | None = None
-    stable_after: bool | None = None
-    uncertainty: float = 0.0
-    contact: str = ""
-    contact_at: float = np.nan
-    parameters: Mapping[str, float] = field(default_factory=dict)
-
-
-class ContactLike(Protocol):
-    """What the layout asks of a contact that grazes: words for it, and where in the free parameter it does."""
-
-    @property
-    def parameter(self) -> float: ...
-    def __str__(self) -> str: ...
-
-
-class EventLike(Protocol):
-    """What the layout asks of a located bifurcation or a user's event."""
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def omega(self) -> float: ...
-    @property
-    def amplitude(self) -> float: ...
-    @property
-    def residual(self) -> float: ...
-    @property
-    def uncertainty(self) -> float: ...
-    @property
-    def criticality(self) -> str | None: ...
-    @property
-    def contact(self) -> ContactLike | None: ...
-    @property
-    def arclength(self) -> float: ...
-    @property
-    def parameters(self) -> Mapping[str, float]: ...
-    @property
-    def multipliers(self) -> np.ndarray: ...
-    @property
-    def critical_error(self) -> float: ...
-    @property
-    def stability_method(self) -> str: ...
-    def critical_multiplier(self) -> complex: ...
-
-
-class BranchLike(Protocol):
+class BranchLike(BranchEvents, Protocol):
     """What the layout asks of a branch; events carry their place as arclength along it."""
 
     @property
@@ -123,8 +58,6 @@ class BranchLike(Protocol):
     @property
     def amplitude(self) -> np.ndarray: ...
     @property
-    def stable(self) -> np.ndarray: ...
-    @property
     def harmonics(self) -> np.ndarray: ...
     @property
     def truncation(self) -> np.ndarray: ...
@@ -136,12 +69,6 @@ class BranchLike(Protocol):
     def stability_methods(self) -> Sequence[str]: ...
     @property
     def arclength(self) -> np.ndarray: ...
-    @property
-    def bifurcations(self) -> Iterable[EventLike]: ...
-    @property
-    def grazings(self) -> Iterable[EventLike]: ...
-    @property
-    def events(self) -> Iterable[EventLike]: ...
     @property
     def closed(self) -> bool: ...
     @property
@@ -227,7 +154,7 @@ def curve_dataset(
             raise InputError(f"{name}: expected one row for each of the {count} points, got shape {table.shape}")
         variables[name] = (("point", "multiplier"), table, {"long_name": meaning})
     described.add("stability_method", stability_method, "where the multipliers come from", object)
-    variables |= _event_variables(events, names, values)
+    variables |= event_variables(events, names, values)
 
     coords: dict[str, Any] = {
         "omega": ("point", frequency, {"long_name": "circular forcing frequency", "units": "rad per unit time"}),
@@ -269,7 +196,7 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
         stability_method=branch.stability_methods,
         parameters={name: branch.parameter(name) for name in names},
         free=branch.name,
-        events=_event_rows(branch, arclength),
+        events=event_rows(branch, arclength),
         system=branch.system.name,
         ended=branch.ended,
         closed=branch.closed,
@@ -281,48 +208,6 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
             for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
         },
     )
-
-
-def _event_rows(branch: BranchLike, arclength: np.ndarray) -> list[EventRow]:
-    """The branch's bifurcations, grazings and events in the order met, each with its place and the verdict after it."""
-    passive = [*branch.grazings, *branch.events]  # stability goes on through these
-    own = {id(event) for event in passive}
-    met = sorted([*branch.bifurcations, *passive], key=lambda event: event.arclength)
-    rows: list[EventRow] = []
-    for event in met:
-        place = int(np.searchsorted(arclength, event.arclength, side="right")) - 1
-        after = min(max(place, 0), max(arclength.size - 2, 0))
-        told = rows[-1].stable_after if rows and rows[-1].after == after else None
-        before = bool(branch.stable[after]) if told is None else told
-        critical = event.critical_multiplier()
-        rows.append(
-            EventRow(
-                event.kind,
-                after,
-                event.omega,
-                event.amplitude,
-                residual=event.residual,
-                multiplier=critical,
-                multiplier_error=event.critical_error,
-                stability_method=event.stability_method,
-                criticality=event.criticality,
-                stable_after=(
-                    before if id(event) in own else not before and not _others_unstable(event.multipliers, critical)
-                ),
-                uncertainty=event.uncertainty,
-                contact="" if event.contact is None else str(event.contact),
-                contact_at=np.nan if event.contact is None else event.contact.parameter,
-                parameters=dict(event.parameters),
-            )
-        )
-    return rows
-
-
-def _others_unstable(multipliers: np.ndarray, critical: complex) -> bool:
-    """Whether multipliers other than the critical one (and its conjugate) lie outside the unit circle."""
-    distance = np.minimum(np.abs(multipliers - critical), np.abs(multipliers - np.conj(critical)))
-    skip = np.argsort(distance)[: 1 if abs(critical.imag) < 1e-6 * abs(critical) else 2]
-    return bool(np.any(np.abs(np.delete(multipliers, skip)) > 1.0))
 
 
 def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -370,51 +255,3 @@ def _points(name: str, values: ArrayLike, count: int | None, kind: type = float)
         wanted = "a one-dimensional array" if count is None else f"{count} values, one for each point"
         raise InputError(f"{name}: expected {wanted}, got shape {array.shape}")
     return array
-
-
-def _event_variables(
-    events: Sequence[EventRow], names: Sequence[str], values: Mapping[str, np.ndarray]
-) -> dict[str, Any]:
-    table = np.array(
-        [[row.parameters.get(name, values[name][row.after]) for name in names] for row in events], dtype=float
-    ).reshape(len(events), len(names))
-    return {
-        "event_kind": ("event", np.array([row.kind for row in events], dtype=object)),
-        "event_after": ("event", np.array([row.after for row in events], dtype=int)),
-        "event_omega": ("event", np.array([row.omega for row in events], dtype=float)),
-        "event_amplitude": ("event", np.array([row.amplitude for row in events], dtype=float)),
-        "event_residual": ("event", np.array([row.residual for row in events], dtype=float)),
-        "event_uncertainty": (
-            "event",
-            np.array([row.uncertainty for row in events], dtype=float),
-            {"long_name": "half-width in the free parameter of what is not resolved of an event, else 0"},
-        ),
-        "event_contact": (
-            "event",
-            np.array([row.contact for row in events], dtype=object),
-            {"long_name": "the contact that grazes; empty at a smooth bifurcation"},
-        ),
-        "event_contact_at": (
-            "event",
-            np.array([row.contact_at for row in events], dtype=float),
-            {"long_name": "value of the free parameter at which that contact grazes"},
-        ),
-        "event_multiplier": (
-            "event",
-            np.array([row.multiplier for row in events], dtype=complex),
-            {"long_name": "the multiplier that crosses the unit circle"},
-        ),
-        "event_multiplier_error": (
-            "event",
-            np.array([row.multiplier_error for row in events], dtype=float),
-            {"long_name": "its estimated error"},
-        ),
-        "event_stability_method": ("event", np.array([row.stability_method for row in events], dtype=object)),
-        "event_criticality": ("event", np.array([row.criticality or "" for row in events], dtype=object)),
-        "event_stable_after": (
-            "event",
-            np.array([UNKNOWN if row.stable_after is None else int(row.stable_after) for row in events], dtype=np.int8),
-            {"long_name": "motions right after it are stable: 1, unstable: 0, not known: -1"},
-        ),
-        "event_parameters": (("event", "parameter"), table),
-    }

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path, PurePath
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from suboctave.analysis import Branch, Results, Table
-from suboctave.errors import suggest
+from suboctave.analysis.contacts import check_element, gapped_elements
+from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
-from suboctave.pictures import plot_response
+from suboctave.pictures import View, plot_response
 from suboctave.pictures.saving import SUFFIXES
+from suboctave.pictures.style import size_in_inches
 from suboctave.store import files
 from suboctave.study.steps import Step
 
@@ -24,7 +27,7 @@ _REPORT = "suboctave.pictures.report"
 
 
 class FigureSection(BaseModel):
-    """One figure of response curves; the form follows the suffix of `file`."""
+    """One figure of response curves; the form follows the suffix of `file`, what is drawn the keys of `View`."""
 
     model_config = _STRICT
 
@@ -33,7 +36,22 @@ class FigureSection(BaseModel):
     x: str | None = None
     labels: list[str] | None = None
     title: str | None = None
-    size: list[float] = Field(default=[6.4, 4.2], min_length=2, max_length=2)
+    size: Any = (6.4, 4.2)
+    quantity: str = "amplitude"
+    harmonic: int | None = Field(default=None, ge=0)
+    element: int | None = None
+    dof: int | None = None
+    frequency: str | None = None
+    omega_reference: float | None = None
+    scale: float | None = None
+    unit: str | None = None
+    xlabel: str | None = None
+    ylabel: str | None = None
+
+    @property
+    def view(self) -> View:
+        """Quantity and units; InputError where they do not go together."""
+        return View(**{field.name: getattr(self, field.name) for field in fields(View)})
 
 
 class Outputs(BaseModel):
@@ -75,8 +93,16 @@ def check_outputs(
         drawn = len(figure.analyses or curves)
         if figure.labels is not None and len(figure.labels) != drawn:
             yield (*key, "labels"), f"{len(figure.labels)} labels for {drawn} curves"
-        if min(figure.size) <= 0.2 or max(figure.size) > 100.0:
-            yield (*key, "size"), f"width and height in inches, from 0.2 to 100, not {figure.size}"
+        try:
+            size_in_inches(figure.size)
+        except InputError as error:
+            yield (*key, "size"), str(error)
+        try:
+            view = figure.view
+        except InputError as error:
+            yield key, str(error)
+        else:
+            yield from _not_in(view, system, key)
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
@@ -86,6 +112,25 @@ def check_outputs(
         elif name in seen:
             yield place, f"{name!r} is written twice: choose another name"
         seen[name] = name
+
+
+def _not_in(
+    view: View, system: System | None, key: tuple[str | int, ...]
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """What a figure shows that the system does not have."""
+    if system is None:
+        return
+    if view.dof is not None and not 0 <= view.dof < system.n:
+        yield (*key, "dof"), f"dof={view.dof} is out of range: the system has {system.n}, numbered from 0"
+    if view.element is not None:
+        gapped = gapped_elements(system) if view.quantity in ("contact_share", "impacts") else None
+        try:
+            check_element(system, view.element, gapped)
+        except InputError as error:
+            yield (*key, "element"), str(error)
+    loads = [c for c in system.load_components() if c.harmonic == 1 and c.direction.sum()]
+    if view.quantity == "transmissibility" and not loads:
+        yield (*key, "quantity"), "no force at harmonic 1 is applied, so that there is no transmissibility"
 
 
 def _wrong_suffix(
@@ -127,19 +172,19 @@ def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) 
         every = figure.analyses or list(curves)
         labels = None if figure.labels is None else [figure.labels[every.index(name)] for name in chosen]
         path = folder / figure.file
-        plot_response(
-            [curves[name].to_xarray() for name in chosen],
-            path,
-            x=figure.x,
-            labels=labels,
-            title=figure.title,
-            size=(figure.size[0], figure.size[1]),
-        )
+        view = figure.view
+        readings = [] if view.variable == "amplitude" else [view.variable]
+        drawn = [curves[name].to_xarray(readings=readings) for name in chosen]
+        plot_response(drawn, path, x=figure.x, labels=labels, title=figure.title, size=figure.size, view=view)
         yield path
     if outputs.html is not None and curves:
         path = folder / outputs.html
         report: Any = importlib.import_module(_REPORT)
-        datasets: Mapping[str, Any] = {name: branch.to_xarray() for name, branch in curves.items()}
+        datasets: Mapping[str, Any] = {
+            name: item.to_xarray().assign_attrs(seconds=results.details.get(name, {}).get("seconds", float("nan")))
+            for name, item in results.items()
+            if len(item)
+        }
         report.write_report(datasets, path, title=title or "Study", overwrite=True)
         yield path
 

@@ -1,0 +1,192 @@
+"""Response curves for the browser: Plotly traces as plain data, made without Plotly.
+
+The same strokes, markers and colours as in print. Each trace is one kind of thing in the legend: the stable part of a
+curve, its unstable part, the bifurcations of one kind.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.pictures import style
+from suboctave.pictures.strokes import line
+from suboctave.store.layout import coordinate
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["figure_data"]
+
+_SYMBOLS = {"o": "circle", "v": "triangle-down", "s": "square", "D": "diamond", "x": "x-thin", "*": "star"}
+_DASHES = ("7px,4px", "10px,3px,2px,3px", "2px,3px")
+_DIGITS = 9
+
+
+def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str) -> dict[str, Any]:
+    """Traces and layout of one figure with the curves over `horizontal`, ready for JSON."""
+    several = len(curves) > 1
+    data: list[dict[str, Any]] = []
+    for index, (label, dataset) in enumerate(curves.items()):
+        curve = style.curve_style(index) if several else style.ONE_CURVE
+        data += _lines(dataset, horizontal, html.escape(label), curve, index, several)
+    for index, (label, dataset) in enumerate(curves.items()):
+        edge = style.curve_style(index).colour if several else style.INK
+        data += _markers(dataset, horizontal, html.escape(label), edge, several)
+    first = next(iter(curves.values()))
+    across = "forcing frequency ω" if horizontal == "omega" else html.escape(horizontal)
+    one = int(first.attrs.get("dofs", 1)) == 1
+    x = "x" if one else f"x<sub>{int(first.attrs.get('observed_dof', 0))}</sub>"
+    axis = {
+        "showline": True,
+        "mirror": True,
+        "ticks": "inside",
+        "linecolor": style.INK,
+        "gridcolor": style.GRID,
+        "zeroline": False,
+    }
+    layout = {
+        "font": {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK},
+        "margin": {"l": 64, "r": 12, "t": 34, "b": 52},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "hovermode": "closest",
+        "hoverlabel": {"align": "left"},
+        "xaxis": {**axis, "title": {"text": across, "standoff": 8}, "automargin": True},
+        "yaxis": {**axis, "title": {"text": f"amplitude max |{x}|"}, "rangemode": "tozero"},
+        "legend": {
+            "orientation": "h",
+            "yref": "container",
+            "y": 0,
+            "yanchor": "bottom",
+            "x": 0,
+            "font": {"size": 12},
+        },
+    }
+    return {"data": data, "layout": layout, "name": name}
+
+
+def _lines(
+    dataset: xarray.Dataset, horizontal: str, label: str, curve: style.CurveStyle, index: int, several: bool
+) -> list[dict[str, Any]]:
+    whole = line(dataset, horizontal)
+    words = _Words(dataset)
+    verdicts = [None] if whole.stable is None else [True, False]
+    traces = []
+    for verdict in verdicts:
+        vertices = _of_verdict(whole.stable, verdict, whole.x.size)
+        if not vertices:
+            continue
+        word = "motions" if verdict is None else "stable" if verdict else "unstable"
+        x = [float(whole.x[i]) if i >= 0 else None for i in vertices]
+        y = [float(whole.y[i]) if i >= 0 else None for i in vertices]
+        told = [
+            "" if i < 0 else words.of_event(whole.event[i]) if whole.event[i] >= 0 else words.of_point(whole.point[i])
+            for i in vertices
+        ]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": f"{label}: {word}" if several else word,
+                "legendgroup": label,
+                "x": _short(x),
+                "y": _short(y),
+                "text": told,
+                "hovertemplate": f"{label}: {word}<br>%{{text}}<extra></extra>",
+                "connectgaps": False,
+                "line": {
+                    "color": curve.colour,
+                    "width": 2.2 * curve.width,
+                    "dash": _DASHES[index % len(_DASHES)] if verdict is False else "solid",
+                },
+            }
+        )
+    return traces
+
+
+def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> list[int]:
+    """Vertices of all pieces of one verdict, -1 between two strokes."""
+    if stable is None or stable.size == 0:
+        return list(range(count)) if not verdict else []
+    vertices: list[int] = []
+    for piece in np.flatnonzero(stable == verdict):
+        if not vertices or vertices[-1] != piece:
+            vertices += [-1, int(piece)] if vertices else [int(piece)]
+        vertices.append(int(piece) + 1)
+    return vertices
+
+
+def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
+    positions = coordinate(dataset, horizontal)[1]
+    words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
+    kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
+    traces = []
+    for kind in dict.fromkeys(kinds):
+        mark = style.kind_style(kind)
+        chosen = np.flatnonzero(kinds == kind)
+        named = html.escape(mark.name)
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": f"{label}: {named}" if several else named,
+                "legendgroup": label if several else named,
+                "x": _short(positions[chosen].tolist()),
+                "y": _short(heights[chosen].tolist()),
+                "text": [words.of_event(int(i)) for i in chosen],
+                "hovertemplate": f"{label}: {named}<br>%{{text}}<extra></extra>",
+                "marker": {
+                    "symbol": _SYMBOLS[mark.marker],
+                    "size": 1.5 * mark.size,
+                    "color": mark.colour,
+                    "line": {"color": edge, "width": 1.8},
+                },
+            }
+        )
+    return traces
+
+
+class _Words:
+    """What hovering over a point or an event says: omega, the free parameter, amplitude, a multiplier."""
+
+    def __init__(self, dataset: xarray.Dataset) -> None:
+        free = str(dataset.attrs["free"])
+        self.free = "" if free == "omega" else html.escape(free)
+        at, there = coordinate(dataset, free)
+        known = "multipliers" in dataset and dataset.sizes.get("multiplier", 0) > 0
+        leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(at.size, np.nan + 0.0j)
+        self.points = (dataset["omega"].to_numpy(), at, dataset["amplitude"].to_numpy(), leading)
+        self.events = (
+            dataset["event_omega"].to_numpy(),
+            there,
+            dataset["event_amplitude"].to_numpy(),
+            dataset["event_multiplier"].to_numpy(),
+        )
+
+    def of_point(self, index: int) -> str:
+        return self._told(self.points, index, "leading")
+
+    def of_event(self, index: int) -> str:
+        return self._told(self.events, index, "critical")
+
+    def _told(self, columns: tuple[np.ndarray, ...], index: int, which: str) -> str:
+        omega, free, amplitude, multiplier = (column[index] for column in columns)
+        lines = [f"ω = {omega:.{_DIGITS}g}"]
+        if self.free:
+            lines.append(f"{self.free} = {free:.{_DIGITS}g}")
+        lines.append(f"amplitude = {amplitude:.7g}")
+        mu = complex(multiplier)
+        if np.isfinite(mu):
+            shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
+            lines.append(f"{which} multiplier = {shown}, modulus {abs(mu):.5g}")
+        return "<br>".join(lines)
+
+
+def _short(values: list[Any]) -> list[float | None]:
+    """Numbers with the digits that a screen can show; null where there is none."""
+    return [None if v is None or not math.isfinite(v) else float(f"{v:.{_DIGITS}g}") for v in values]

@@ -1,0 +1,80 @@
+"""The one legend of a figure: inside the frame that has room for it, else above all frames; it covers no curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.pictures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
+    from matplotlib.lines import Line2D
+
+__all__ = ["ordered", "place_legend"]
+
+
+def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line2D], look: style.Look) -> None:
+    """Put the legend where there is room for it."""
+    if not entries:
+        return
+    drawing: dict[str, Any] = {
+        "fontsize": look.small,
+        "frameon": True,
+        "framealpha": 1.0,
+        "edgecolor": style.GRID,
+        "handlelength": 2.6,
+    }
+    for axes in frames:
+        for location in ("upper left", "upper right", "center left", "center right", "lower left", "lower right"):
+            legend = axes.legend(entries.values(), entries.keys(), loc=location, **drawing)
+            legend.set_zorder(6)
+            if not _covers(figure, axes, legend):
+                return
+            legend.remove()
+    columns = min(len(entries), 4)
+    while True:
+        legend = figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns, **drawing)
+        figure.draw_without_rendering()
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
+        columns -= 1
+
+
+def _covers(figure: Figure, axes: Axes, legend: Legend) -> bool:
+    figure.draw_without_rendering()
+    box = legend.get_window_extent().padded(figure.dpi / 72.0 * style.MARKER_SIZE)
+    frame = axes.get_window_extent()
+    if box.x0 < frame.x0 - 1 or box.x1 > frame.x1 + 1 + 2 * style.MARKER_SIZE or box.height > 0.7 * frame.height:
+        return True  # it would stick out, or leave no room for anything else
+    for line in axes.get_lines():
+        x, y = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()])).T
+        if x.size == 0:
+            continue
+        # Points every pixel or so along the line: a long piece may cross a box that holds none of its ends.
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+        if line.get_linestyle() != "None" and length[-1] > 0.0:
+            dense = np.linspace(0.0, length[-1], int(length[-1]) + 2)
+            x, y = np.interp(dense, length, x), np.interp(dense, length, y)
+        if np.any((x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1)):
+            return True
+    return False
+
+
+def ordered(entries: dict[str, Line2D]) -> dict[str, Line2D]:
+    """Curves first, then stable and unstable, then the kinds in the order of the style table, then a user's own."""
+    lines, kinds = ["stable", "unstable"], [look.name for look in style.KINDS.values()]
+
+    def rank(name: str) -> tuple[int, int]:
+        if name in lines:
+            return 1, lines.index(name)
+        if name in kinds:
+            return 2, kinds.index(name)
+        return (0, 0) if entries[name].get_marker() == "None" else (3, 0)
+
+    return {name: entries[name] for name in sorted(entries, key=rank)}

@@ -1,0 +1,89 @@
+"""`plot`: one call for branches and for datasets read from files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from suboctave.errors import InputError
+from suboctave.pictures.response import plot_response
+from suboctave.pictures.view import View
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+__all__ = ["plot"]
+
+
+def plot(
+    curves: Any,
+    path: str | Path | None = None,
+    *,
+    quantity: str | None = None,
+    harmonic: float | None = None,
+    element: int | None = None,
+    dof: int | None = None,
+    x: str | None = None,
+    frequency: str | None = None,
+    omega_reference: float | None = None,
+    scale: float | None = None,
+    unit: str | None = None,
+    xlabel: str | None = None,
+    ylabel: str | None = None,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: str | tuple[float, float] = (6.4, 4.2),
+) -> Figure:
+    """Draw one or several branches: stable parts solid, unstable ones dashed, bifurcations marked.
+
+    Parameters
+    ----------
+    curves
+        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), or a sequence of these.
+    path
+        Where the figure is saved: .png, .svg or .pdf, fonts embedded.
+    quantity
+        What is drawn: "amplitude" (default), "rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms",
+        "harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force", "transmissibility". A
+        dataset must have it: `to_xarray(readings=...)`.
+    harmonic, element, dof
+        Of which harmonic (alone: its amplitude), of which element, of which degree of freedom.
+    x
+        The horizontal axis: "omega" or a parameter; default what the curves were followed in.
+    frequency
+        "rad/s" or "Hz", where the system's time is in seconds.
+    omega_reference
+        The axis shows `omega / omega_reference`.
+    scale, unit
+        Factor on the quantity, and its unit for the label: `scale=1e3, unit="mm"`.
+    xlabel, ylabel, labels, title
+        Texts of the axes, names of the curves in the legend, title.
+    size
+        "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
+
+    Raises
+    ------
+    InputError
+        For what cannot be drawn, before anything is.
+    """
+    if quantity is None:
+        quantity = "amplitude" if harmonic is None else "harmonic"
+    view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
+    given = list(curves) if isinstance(curves, list | tuple) else [curves]
+    datasets = [_dataset(item, view) for item in given]
+    return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
+
+
+def _dataset(item: Any, view: View) -> xarray.Dataset:
+    import xarray
+
+    if isinstance(item, xarray.Dataset):
+        return item
+    if not hasattr(item, "to_xarray"):
+        raise InputError(f"plot draws branches and their datasets, not {type(item).__name__}")
+    dataset: xarray.Dataset = (
+        item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
+    )
+    return dataset

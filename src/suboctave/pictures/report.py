@@ -1,0 +1,309 @@
+"""One page per study: interactive figures, tables of bifurcations, and where the numbers come from.
+
+The page is a single file that needs no network. Without scripts (and on paper) it shows still pictures; its tables and
+texts need none. Everything that comes from a user is escaped.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.pictures import style
+from suboctave.pictures.interactive import figure_data
+from suboctave.pictures.page import POLICY, SCRIPT, STYLE, plotly_source
+from suboctave.pictures.response import plot_response
+from suboctave.pictures.saving import svg_text
+from suboctave.store.files import free_place, replace_file
+from suboctave.store.layout import check_layout, coordinate
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["write_report"]
+
+_TEXT = "text"
+#: attributes of a dataset that have a place of their own on the page
+_TOLD = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
+_RECORDS = {"record", "digest", "contents"}
+_LONG = 400
+_BESIDE = 56  # characters in a row of a table that stands beside its figure
+
+
+def write_report(
+    results: Mapping[str, Any], path: str | Path, *, title: str = "Study", overwrite: bool = False
+) -> Path:
+    """Write the report page of a study.
+
+    Parameters
+    ----------
+    results
+        Names of analyses and their curves: datasets (`to_xarray`), or branches. Datasets on the dimension `row` are
+        shown as tables.
+    path
+        A file ending in .html or .htm; written beside its place and renamed.
+    title
+        Heading of the page.
+    overwrite
+        Whether an existing file is replaced.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to show, or the file exists and is not to be replaced, or cannot be written there.
+    """
+    target = free_place(path, overwrite, (".html", ".htm"))
+    datasets = {str(name): _dataset(str(name), item) for name, item in results.items()}
+    if not datasets:
+        raise InputError("a report needs at least one result")
+    text = _page(datasets, str(title))
+    replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
+    return target
+
+
+def _dataset(name: str, item: Any) -> xarray.Dataset:
+    import xarray
+
+    dataset: Any = item.to_xarray() if hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset) else item
+    if not isinstance(dataset, xarray.Dataset):
+        raise InputError(f"{name}: expected a dataset of a curve, got {type(item).__name__}; a branch has to_xarray()")
+    if "row" not in dataset.sizes or "point" in dataset.sizes:
+        check_layout(dataset)
+    return dataset
+
+
+def _page(datasets: Mapping[str, xarray.Dataset], title: str) -> str:
+    curves = {name: data for name, data in datasets.items() if data.sizes.get("point", 0)}
+    anchors = {name: f"part-{index}" for index, name in enumerate(datasets)}
+    parts = [f"<h1>{_safe(title)}</h1>", _summary(datasets)]
+    if len(datasets) > 1:
+        links = [f'<a href="#{anchors[name]}">{_safe(name)}</a>' for name in datasets]
+        parts.append(f"<nav>{''.join(links)}</nav>")
+        parts += _overviews(curves)
+    for name, dataset in datasets.items():
+        parts.append(f'<section id="{anchors[name]}"><h2>{_safe(name)}</h2>')
+        parts.append(_curve(name, dataset) if name in curves else _table_of(dataset))
+        parts.append("</section>")
+    packed = f'<script type="text/plain" id="plotly-packed">{plotly_source()}</script>' if curves else ""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta name="generator" content="suboctave {_safe(__version__)}">\n'
+        f"<title>{_safe(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+        + "\n".join(parts)
+        + f"\n{packed}\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
+    )
+
+
+def _summary(datasets: Mapping[str, xarray.Dataset]) -> str:
+    versions = sorted({str(data.attrs["suboctave"]) for data in datasets.values() if "suboctave" in data.attrs})
+    systems = dict.fromkeys(str(data.attrs["system"]) for data in datasets.values() if data.attrs.get("system"))
+    words = [f"suboctave {', '.join(versions) or __version__}", *systems]
+    hint = "Hover over a curve for its values, drag to zoom, click in the legend to hide."
+    return f'<p class="soft">{_safe(" · ".join(words))}</p><p class="soft hint">{hint}</p>'
+
+
+def _overviews(curves: Mapping[str, xarray.Dataset]) -> list[str]:
+    """All curves over the same parameter in one figure, where there are several of one observed DOF."""
+    groups: dict[tuple[Any, ...], dict[str, xarray.Dataset]] = {}
+    for name, data in curves.items():
+        key = (str(data.attrs["free"]), int(data.attrs.get("dofs", 1)), int(data.attrs.get("observed_dof", 0)))
+        groups.setdefault(key, {})[name] = data
+    several = [(key[0], group) for key, group in groups.items() if len(group) > 1]
+    return [
+        f"<section><h2>All curves over {_safe(_spelt(free))}</h2>{_figure(group, free)}</section>"
+        for free, group in several
+    ]
+
+
+def _curve(name: str, dataset: xarray.Dataset) -> str:
+    head, rows = _bifurcations(dataset)
+    count, unstable = dataset.sizes["point"], None
+    if "stable" in dataset:
+        unstable = int(np.count_nonzero(~dataset["stable"].to_numpy().astype(bool)))
+    said = f"{count} points" + ("" if unstable is None else f", {unstable} of them unstable")
+    period = int(dataset.attrs.get("period", 1))
+    if period > 1:
+        said += f"; motions of {period} periods of the force"
+    ended = f"; {dataset.attrs['ended']}" if dataset.attrs.get("ended") else ""
+    notes = "".join(f'<p class="note">{_safe(note)}</p>' for note in _notes(dataset))
+    table = _table(head, rows) if rows else "<p>none</p>"
+    widths = [max(len(text) for text in column) for column in zip([name for name, _ in head], *rows, strict=True)]
+    wide = " wide" if sum(widths) > _BESIDE else ""
+    return (
+        f'<p class="soft">{_safe(said + ended)}.</p>'
+        f'<div class="pair{wide}"><div>{_figure({name: dataset}, str(dataset.attrs["free"]))}</div>'
+        f"<div><h3>Bifurcations, in the order met</h3>{table}</div></div>{notes}{_provenance(dataset)}"
+    )
+
+
+def _figure(curves: Mapping[str, xarray.Dataset], free: str) -> str:
+    name = re.sub(r"[^\w-]+", "_", "_".join(curves))[:60] or "figure"
+    told = json.dumps(figure_data(curves, free, name), ensure_ascii=False, separators=(",", ":"))
+    # what would end the script early, or is no line end for JSON but one for scripts
+    for bad in "<>&\u2028\u2029":
+        told = told.replace(bad, f"\\u{ord(bad):04x}")
+    labels = list(curves) if len(curves) > 1 else None
+    still = svg_text(plot_response(list(curves.values()), x=free, labels=labels, size=(6.4, 4.2)))
+    packed = base64.b64encode(still.encode("utf-8")).decode("ascii")
+    alt = f"Amplitude over {_spelt(free)}: {', '.join(curves)}"
+    return (
+        f'<div class="figure"><div class="plot"></div><div class="still"><img alt="{_safe(alt)}" '
+        f'src="data:image/svg+xml;base64,{packed}"></div><script type="application/json">{told}</script></div>'
+    )
+
+
+def _bifurcations(dataset: xarray.Dataset) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """Headings with their class, and the rows of the table."""
+    free = str(dataset.attrs["free"])
+    values = coordinate(dataset, free)[1]
+    column = {name: dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier")}
+    residual, doubt = dataset["event_residual"].to_numpy(), dataset["event_uncertainty"].to_numpy()
+    contact, critical = dataset["event_contact"].to_numpy(), dataset["event_criticality"].to_numpy()
+    head = [("kind", _TEXT), ("ω", "")] + ([(free, "")] if free != "omega" else [])
+    head += [("max |x|", ""), ("multiplier", ""), ("residual", "")]
+    remarks = []
+    for i in range(len(values)):
+        words = [str(critical[i])] if str(critical[i]) else []
+        words += [f"± {doubt[i]:.0e} in {_spelt(free)}"] if doubt[i] else []
+        words += [f"contact: {contact[i]}"] if str(contact[i]) else []
+        remarks.append("; ".join(words))
+    if any(remarks):
+        head.append(("remark", "long"))
+    rows = []
+    for i in range(len(values)):
+        kind = str(column["kind"][i])
+        name = style.kind_style(kind).name
+        row = [f"{kind} ({name})" if kind.isupper() and name != kind else name, f"{column['omega'][i]:.9g}"]
+        row += [f"{values[i]:.9g}"] if free != "omega" else []
+        row += [f"{column['amplitude'][i]:.7g}", _complex(complex(column["multiplier"][i])), _small(residual[i])]
+        rows.append(row + ([remarks[i]] if any(remarks) else []))
+    return head, rows
+
+
+def _notes(dataset: xarray.Dataset) -> list[str]:
+    """What the reader must know: warnings, and what stayed unsettled."""
+    notes = [note for note in str(dataset.attrs.get("warnings", "")).splitlines() if note.strip()]
+    if "multiplier_errors" in dataset and dataset.sizes.get("multiplier"):
+        near = np.abs(np.abs(dataset["multipliers"].to_numpy()) - 1.0) <= dataset["multiplier_errors"].to_numpy()
+        open_points = int(np.count_nonzero(near.any(axis=1)))
+        if open_points:
+            notes.append(
+                f"Unsettled: at {open_points} of {near.shape[0]} points a multiplier is closer to the unit circle than "
+                "its estimated error, so that the verdict there could be the other one."
+            )
+    doubtful = int(np.count_nonzero(dataset["event_uncertainty"].to_numpy() > 0.0))
+    if doubtful:
+        what = "bifurcation is" if doubtful == 1 else "bifurcations are"
+        notes.append(f"{doubtful} {what} located to a stated uncertainty: see the remarks in the table.")
+    return notes
+
+
+def _provenance(dataset: xarray.Dataset) -> str:
+    attrs = dataset.attrs
+    pairs: list[tuple[str, str]] = [
+        ("computed by", f"suboctave {attrs.get('suboctave', '(unknown version)')}"),
+        ("system", str(attrs.get("system") or "(no name)")),
+        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {attrs.get('observed_dof', 0)}"),
+        ("free parameter", _spelt(str(attrs["free"]))),
+        ("fixed parameters", _fixed(dataset) or "none"),
+    ]
+    if "harmonics" in dataset:
+        used = dataset["harmonics"].to_numpy()
+        pairs.append(("harmonics used", f"{used.min()} to {used.max()}" if np.ptp(used) else f"{used[0]}"))
+    for name, words in (("error", "largest neglected part of the motion"), ("residual", "largest residual")):
+        if name in dataset:
+            pairs.append((words, _small(float(np.nanmax(dataset[name].to_numpy())))))
+    if "stability_method" in dataset:
+        methods = dict.fromkeys(str(method) for method in dataset["stability_method"].to_numpy())
+        pairs.append(("stability from", "; ".join(methods)))
+    longer = []
+    for name, value in attrs.items():
+        untold = name == "seconds" and not _finite(value)
+        if name in _TOLD or name in _RECORDS or str(value) == "" or untold:
+            continue
+        shown = f"{float(value):.3g} s" if name == "seconds" else str(value)
+        if len(shown) > _LONG or "\n" in shown:
+            longer.append((str(name), shown))
+        else:
+            pairs.append(("time taken" if name == "seconds" else str(name), shown))
+    listed = "".join(f"<dt>{_safe(name)}</dt><dd>{_safe(value)}</dd>" for name, value in pairs)
+    more = "".join(
+        f"<details><summary>{_safe(name)}</summary><pre>{_safe(value)}</pre></details>" for name, value in longer
+    )
+    return f"<h3>Where these numbers come from</h3><dl>{listed}</dl>{more}"
+
+
+def _fixed(dataset: xarray.Dataset) -> str:
+    table = dataset["parameters"].to_numpy()
+    names = [str(name) for name in dataset["parameter"].to_numpy()]
+    constant = [f"{n} = {table[0, i]:.9g}" for i, n in enumerate(names) if np.ptp(table[:, i]) == 0.0]
+    if str(dataset.attrs["free"]) != "omega" and np.ptp(dataset["omega"].to_numpy()) == 0.0:
+        constant.insert(0, f"ω = {float(dataset['omega'].values[0]):.9g}")
+    return ", ".join(constant)
+
+
+def _table_of(dataset: xarray.Dataset) -> str:
+    """A result that is no curve: its columns as they are."""
+    if "row" not in dataset.sizes:
+        return "<p>a curve without points</p>"
+    columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
+    kinds = [_TEXT if column.dtype.kind in "OU" else "" for column in columns.values()]
+    rows = [[_cell(column[i]) for column in columns.values()] for i in range(dataset.sizes["row"])]
+    heading = f"<p>{_safe(str(dataset.attrs['title']))}</p>" if dataset.attrs.get("title") else ""
+    return heading + _table(list(zip(columns, kinds, strict=True)), rows)
+
+
+def _table(head: Sequence[tuple[str, str]], rows: Sequence[Sequence[str]]) -> str:
+    def cell(tag: str, kind: str, text: str) -> str:
+        named = f' class="{kind}"' if kind else ""
+        return f"<{tag}{named}>{_safe(text)}</{tag}>"
+
+    top = "".join(cell("th", "text" if kind == "long" else kind, name) for name, kind in head)
+    body = "".join(
+        "<tr>" + "".join(cell("td", kind, text) for (_, kind), text in zip(head, row, strict=True)) + "</tr>"
+        for row in rows
+    )
+    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, complex | np.complexfloating):
+        return _complex(complex(value))
+    return f"{float(value):.9g}" if isinstance(value, float | np.floating) else str(value)
+
+
+def _complex(value: complex) -> str:
+    if not np.isfinite(value):
+        return "–"
+    return f"{value.real:.6f}" + (f" {value.imag:+.6f}i" if abs(value.imag) > 1e-7 else "")
+
+
+def _small(value: float) -> str:
+    return f"{value:.1e}" if math.isfinite(value) else "–"
+
+
+def _finite(value: Any) -> bool:
+    try:
+        return math.isfinite(float(value))
+    except (TypeError, ValueError):
+        return False
+
+
+def _spelt(name: str) -> str:
+    return "ω" if name == "omega" else name
+
+
+def _safe(text: str) -> str:
+    return html.escape(str(text), quote=True)

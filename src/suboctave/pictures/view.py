@@ -1,0 +1,144 @@
+"""What a frame shows: which quantity over which frequency axis, in which units, and what the axes say of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from suboctave.errors import InputError, suggest
+from suboctave.store.layout import coordinate
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["QUANTITIES", "View"]
+
+# What the axis says, with {x} the observed displacement, {k} the harmonic, {e} the element.
+QUANTITIES = {
+    "amplitude": r"amplitude $\max\,|{x}|$",
+    "rms": r"RMS of ${x}$",
+    "velocity": r"velocity $\max\,|\dot{{{x}}}|$",
+    "velocity_rms": r"RMS of $\dot{{{x}}}$",
+    "acceleration": r"acceleration $\max\,|\ddot{{{x}}}|$",
+    "acceleration_rms": r"RMS of $\ddot{{{x}}}$",
+    "harmonic": r"harmonic {k} of ${x}$",
+    "phase": r"phase of harmonic {k} of ${x}$",
+    "peak_force": r"peak force, element {e}",
+    "contact_share": r"share of period in contact, element {e}",
+    "impacts": r"impacts per period, element {e}",
+    "transmitted_force": "peak force on the ground",
+    "transmissibility": "transmissibility",
+}
+_FREQUENCIES = ("rad/s", "Hz")
+_NUMBERED = {"harmonic": "harmonic", "phase": "harmonic"} | dict.fromkeys(
+    ("peak_force", "contact_share", "impacts"), "element"
+)
+_OF_A_DOF = frozenset(list(QUANTITIES)[:8])
+
+
+@dataclass(frozen=True)
+class View:
+    """What is drawn and in which units.
+
+    Attributes
+    ----------
+    quantity
+        What is drawn upwards: "amplitude", or a reading such as "rms", "velocity", "harmonic", "phase", "peak_force".
+    harmonic, element, dof
+        Of which harmonic (default 1), of which element, of which degree of freedom (default: the observed one).
+    frequency
+        "rad/s" or "Hz" (where time is in seconds); None leaves omega without a unit.
+    omega_reference
+        The axis shows `omega / omega_reference`.
+    scale, unit
+        Values are multiplied by `scale`, and the label ends in `(unit)`: `scale=1e3, unit="mm"` for lengths in m, or
+        `scale=1/0.02` for a displacement in units of 0.02. Phases are in degrees unless scaled.
+    xlabel, ylabel
+        Instead of the labels that follow from the above.
+    """
+
+    quantity: str = "amplitude"
+    harmonic: float | None = None
+    element: int | None = None
+    dof: int | None = None
+    frequency: str | None = None
+    omega_reference: float | None = None
+    scale: float | None = None
+    unit: str | None = None
+    xlabel: str | None = None
+    ylabel: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity not in QUANTITIES:
+            raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), QUANTITIES)}")
+        needs = _NUMBERED.get(self.quantity)
+        for name, given in (("harmonic", self.harmonic), ("element", self.element)):
+            if given is not None and needs != name:
+                raise InputError(f"{name}={given!r} says nothing about the quantity {self.quantity!r}; leave it out")
+        if needs == "element" and (isinstance(self.element, bool) or not isinstance(self.element, int | np.integer)):
+            raise InputError(f"the quantity {self.quantity!r} is one of an element: give element=, its index")
+        if self.dof is not None and self.quantity not in _OF_A_DOF:
+            raise InputError(f"the quantity {self.quantity!r} is not one of a degree of freedom: leave dof= out")
+        if self.frequency is not None and self.frequency not in _FREQUENCIES:
+            raise InputError(
+                f"frequency is 'rad/s' or 'Hz', not {self.frequency!r}{suggest(str(self.frequency), _FREQUENCIES)}"
+            )
+        for name, value in (("omega_reference", self.omega_reference), ("scale", self.scale)):
+            if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+                raise InputError(f"{name} must be a positive number, not {value!r}")
+        if self.frequency is not None and self.omega_reference is not None:
+            raise InputError("frequency= gives the axis a unit, omega_reference= takes it away: choose one")
+
+    @property
+    def variable(self) -> str:
+        """The variable of the dataset that is drawn: the name of a reading."""
+        needs = _NUMBERED.get(self.quantity)
+        number = "" if needs is None else f"_{(self.element if needs == 'element' else self.harmonic or 1):g}"
+        return f"{self.quantity}{number}" + ("" if self.dof is None else f"_dof{self.dof}")
+
+    def check(self, dataset: xarray.Dataset) -> None:
+        """Raises InputError where the dataset does not have what is drawn."""
+        if self.variable not in dataset or f"event_{self.variable}" not in dataset:
+            raise InputError(
+                f"this dataset has no {self.variable!r}: draw the branch itself, or lay it out with "
+                f"branch.to_xarray(readings=[{self.variable!r}])"
+            )
+
+    def factors(self, horizontal: str) -> tuple[float, float]:
+        """What values to the right and upwards are multiplied by."""
+        across = 1.0
+        if horizontal == "omega":
+            across = 1.0 / (2.0 * math.pi) if self.frequency == "Hz" else 1.0 / (self.omega_reference or 1.0)
+        upwards = 180.0 / math.pi if self.quantity == "phase" and self.scale is None else float(self.scale or 1.0)
+        return across, upwards
+
+    def values(self, dataset: xarray.Dataset, horizontal: str) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (events, 2) of the events and (points, 2) of the points in the frame, in this order."""
+        across, upwards = self.factors(horizontal)
+        x, event_x = coordinate(dataset, horizontal)
+        y, event_y = dataset[self.variable].to_numpy(), dataset[f"event_{self.variable}"].to_numpy()
+        scale = np.array([across, upwards])
+        return np.column_stack([event_x, event_y]) * scale, np.column_stack([x, y]) * scale
+
+    def labels(self, dataset: xarray.Dataset, horizontal: str) -> tuple[str, str]:
+        """What the two axes say."""
+        if horizontal != "omega":
+            across = horizontal
+        elif self.frequency == "Hz":
+            across = "forcing frequency (Hz)"
+        elif self.omega_reference is not None:
+            across = r"frequency ratio $\omega/\omega_0$"
+        else:
+            across = r"forcing frequency $\omega$" + (" (rad/s)" if self.frequency else "")
+        one = int(dataset.attrs.get("dofs", 1)) == 1
+        dof = dataset.attrs.get("observed_dof", 0) if self.dof is None else self.dof
+        upwards = QUANTITIES[self.quantity].format(
+            x="x" if one else f"x_{{{dof}}}", k=f"{self.harmonic or 1:g}", e=self.element
+        )
+        unit = "°" if self.quantity == "phase" and self.scale is None and self.unit is None else self.unit
+        if unit:
+            upwards += f" ({unit})"
+        return self.xlabel or across, self.ylabel or upwards

@@ -1,0 +1,171 @@
+"""The report page: whole, self-contained, escaped, and never over another file without leave."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html.parser
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+from suboctave.errors import InputError
+from suboctave.pictures.report import write_report
+from suboctave.store.layout import curve_dataset
+
+EVIL = "</script><script>alert('x')</script> & <b>\"bold\"</b>"
+
+
+class Page(html.parser.HTMLParser):
+    """Elements, texts and links of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.links, self.scripts, self.cells, self.words, self._open = [], [], [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self._open.append(tag)
+        self.links += [value for name, value in attrs if name in ("href", "src")]
+        if tag == "script":
+            self.scripts.append(["" if not attrs else dict(attrs).get("type", ""), ""])
+        if tag in ("td", "th"):
+            self.cells.append("")
+
+    def handle_endtag(self, tag):
+        if tag in self._open:
+            while self._open.pop() != tag:
+                pass
+
+    def handle_data(self, data):
+        if self._open and self._open[-1] == "script":
+            self.scripts[-1][1] += data
+        elif self._open and self._open[-1] in ("td", "th"):
+            self.cells[-1] += data
+        elif "style" not in self._open:
+            self.words.append(data)
+
+
+@pytest.fixture(name="page")
+def _page(duffing, tmp_path):
+    def make(results=None, title="Study", **options):
+        path = write_report(results or {"curve": duffing()}, tmp_path / "report.html", title=title, **options)
+        return Page(path.read_text(encoding="utf-8"))
+
+    return make
+
+
+def test_the_page_needs_nothing_from_outside(page, tmp_path):
+    read = page()
+    assert all(link.startswith(("data:", "#")) for link in read.links)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in text
+    assert "@import" not in text
+    kinds = [kind for kind, _ in read.scripts]
+    assert kinds == ["application/json", "text/plain", ""]
+    plotly = gzip.decompress(base64.b64decode(read.scripts[1][1])).decode()
+    assert "newPlot" in plotly
+    assert len(text) < 3_000_000
+
+
+def test_figures_hold_the_curve_and_its_bifurcations(page, duffing):
+    data = duffing()
+    told = json.loads(page({"curve": data}).scripts[0][1])
+    by_name = {trace["name"]: trace for trace in told["data"]}
+    assert set(by_name) == {"stable", "unstable", "limit point"}
+    np.testing.assert_allclose(by_name["limit point"]["x"], data["event_omega"], rtol=1e-8)
+    drawn = {(x, y) for n in ("stable", "unstable") for x, y in zip(by_name[n]["x"], by_name[n]["y"], strict=True)}
+    pairs = zip(data["omega"].values, data["amplitude"].values, strict=True)
+    assert {(float(f"{x:.9g}"), float(f"{y:.9g}")) for x, y in pairs} <= drawn
+    # between two stable strokes the line is broken, and so are the texts
+    stable = by_name["stable"]
+    assert stable["x"].count(None) == 1
+    assert len(stable["text"]) == len(stable["x"])
+    first = stable["text"][0]
+    assert first.startswith("ω = ")
+    assert "amplitude = " in first
+    assert "critical multiplier = 1" in by_name["limit point"]["text"][0]
+
+
+def test_the_table_needs_no_script(page, duffing):
+    data = duffing()
+    cells = page({"curve": data}).cells
+    assert cells[:5] == ["kind", "ω", "max |x|", "multiplier", "residual"]
+    assert cells[5] == "LP (limit point)"
+    assert [float(cells[6]), float(cells[11])] == pytest.approx(data["event_omega"].values, rel=1e-8)
+
+
+def test_what_users_write_is_text(duffing, tmp_path):
+    data = duffing(named="F").assign_attrs(system=EVIL, warnings=EVIL, note=EVIL, ended=EVIL)
+    data["event_kind"] = ("event", np.array([EVIL] * data.sizes["event"], dtype=object))
+    results = {EVIL: data, "other": duffing(), "table": xarray.Dataset({EVIL: ("row", [EVIL])}, attrs={"title": EVIL})}
+    path = write_report(results, tmp_path / "evil.html", title=EVIL)
+    read = Page(path.read_text(encoding="utf-8"))
+    assert "b" not in read.tags
+    assert len(read.scripts) == 3 + 2  # two curves, one overview, Plotly, ours
+    assert not any("alert(" in text for kind, text in read.scripts if kind == "")
+    for kind, text in read.scripts:
+        if kind == "application/json":
+            assert "<" not in text
+            for trace in json.loads(text)["data"]:
+                for words in (trace["name"], trace["hovertemplate"], *trace["text"]):
+                    assert "<script" not in words
+                    assert "<b>" not in words
+    assert "".join(read.words).count(EVIL) >= 5
+    assert EVIL in read.cells
+
+
+def test_origin_and_doubts_are_stated(page, duffing):
+    data = duffing().assign_attrs(warnings="first warning\nsecond warning", seconds=1.25, newton="tolerance 1e-10")
+    points = data.sizes["point"]
+    errors = np.full((points, 2), 1e-9)
+    multipliers = np.full((points, 2), 0.5 + 0.0j)
+    multipliers[7, 0] = 1.0 - 1e-12
+    data["multipliers"] = (("point", "multiplier"), multipliers)
+    data["multiplier_errors"] = (("point", "multiplier"), errors)
+    words = " ".join(page({"curve": data}).words)
+    for expected in ("first warning", "second warning", "1.25 s", "tolerance 1e-10", "c = 0.1", "suboctave 0"):
+        assert expected in words
+    assert f"at 1 of {points} points" in words
+
+
+def test_curves_over_different_parameters_and_tables(page, duffing):
+    p = np.linspace(0.0, 1.0, 5)
+    along = curve_dataset(np.full(5, 2.0), p, parameters={"p": p}, free="p")
+    table = xarray.Dataset({"omega": ("row", [1.0]), "mu": ("row", [0.5 + 0.25j]), "note": ("row", ["fine"])})
+    read = page({"a": duffing(), "b": duffing(force=0.2), "c": along, "d": table})
+    figures = [json.loads(text) for kind, text in read.scripts if kind == "application/json"]
+    assert [len({t["legendgroup"] for t in f["data"]}) for f in figures[:1]] == [2]
+    assert len(figures) == 1 + 3
+    assert [f["layout"]["xaxis"]["title"]["text"] for f in figures][-1] == "p"
+    assert {"0.500000 +0.250000i", "fine"} <= set(read.cells)
+
+
+def test_an_existing_file_is_left_alone(duffing, tmp_path):
+    path = tmp_path / "report.html"
+    path.write_text("mine")
+    with pytest.raises(InputError, match="exists"):
+        write_report({"curve": duffing()}, path)
+    assert path.read_text() == "mine"
+    write_report({"curve": duffing()}, path, overwrite=True)
+    first = path.read_bytes()
+    write_report({"curve": duffing()}, path, overwrite=True)
+    assert path.read_bytes() == first  # no time stamp, no random names
+    assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_wrong_input_is_refused(duffing, tmp_path):
+    with pytest.raises(InputError, match="at least one result"):
+        write_report({}, tmp_path / "a.html")
+    with pytest.raises(InputError, match="got int"):
+        write_report({"curve": 3}, tmp_path / "a.html")
+    with pytest.raises(InputError, match=r"\.html"):
+        write_report({"curve": duffing()}, tmp_path / "a.pdf")
+    with pytest.raises(InputError, match="is no folder"):
+        write_report({"curve": duffing()}, tmp_path / "nowhere" / "a.html")
+    with pytest.raises(InputError, match="not laid out by suboctave"):
+        write_report({"curve": duffing().drop_attrs()}, tmp_path / "a.html")
+    assert not list(tmp_path.iterdir())
