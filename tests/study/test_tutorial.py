@@ -57,6 +57,7 @@ def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().out
     printed = blocks("text")[1]
     assert said.splitlines()[0] == printed.splitlines()[0]
+    assert said.splitlines()[2:] == printed.splitlines()[2:]
     assert "Verification: agrees" in said
     # before the stop is touched the oscillator is linear
     low, high = touches(0.5, force=0.1, zeta=0.02)
