@@ -76,11 +76,27 @@ def size_in_inches(size: str | tuple[float, float]) -> tuple[float, float]:
         if any(isinstance(value, str | bool) for value in size):
             raise TypeError
         width, height = (float(value) for value in size)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"size is a name ({', '.join(SIZES)}) or width and height in inches, not {size!r}") from None
     if not (0.2 < width <= 100.0 and 0.2 < height <= 100.0):
         raise InputError(f"size: width and height in inches, from 0.2 to 100, not {size!r}")
     return width, height
+
+
+def check_text(text: str) -> None:
+    """Refuse a text with formulas between dollar signs that cannot be drawn; InputError."""
+    if "$" not in text:
+        return
+    from matplotlib.cbook import is_math_text
+    from matplotlib.mathtext import MathTextParser
+
+    if not is_math_text(text):  # a single dollar sign is itself
+        return
+    try:
+        MathTextParser("agg").parse(text)
+    except ValueError as error:
+        reason = str(error).strip().splitlines()[-1]
+        raise InputError(f"the formula in {text!r} cannot be drawn: {reason}; a plain dollar sign is \\$") from None
 
 
 def look_of(width: float) -> Look:

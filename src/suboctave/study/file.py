@@ -27,6 +27,8 @@ __all__ = ["Study", "read_study"]
 
 #: a study file is written by hand; anything longer is something else
 _LONGEST = 5_000_000
+#: characters of the name of an analysis: files are called after it
+_LONGEST_NAME = 60
 
 
 class StudyFile(BaseModel):
@@ -207,6 +209,8 @@ def _steps(
             continue
         if name in names:
             mistakes.add((*place, "name"), f"two analyses are called {name!r}; give each a name of its own")
+        elif len(name) > _LONGEST_NAME:
+            mistakes.add((*place, "name"), f"is too long; at most {_LONGEST_NAME} characters")
         elif not re.fullmatch(r"[^\W][\w .-]*", name):
             mistakes.add((*place, "name"), f"{name!r} will not do: letters, digits, spaces, and . - _, no slash")
         names.add(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path, PurePath
@@ -16,13 +17,15 @@ from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_response
 from suboctave.pictures.saving import SUFFIXES
-from suboctave.pictures.style import size_in_inches
+from suboctave.pictures.style import check_text, size_in_inches
 from suboctave.store import files
 from suboctave.study.steps import Step
 
 __all__ = ["FigureSection", "Outputs", "check_outputs", "csv_names", "places", "write_outputs"]
 
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+#: bytes of a file name: disks take 255, and half a name more is needed while it is written
+_LONGEST = 200
 _REPORT = "suboctave.pictures.report"
 
 
@@ -52,6 +55,15 @@ class FigureSection(BaseModel):
     def view(self) -> View:
         """Quantity and units; InputError where they do not go together."""
         return View(**{field.name: getattr(self, field.name) for field in fields(View)})
+
+    @property
+    def texts(self) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """What is written on it, with the key of each."""
+        for key in ("title", "unit", "xlabel", "ylabel"):
+            if getattr(self, key) is not None:
+                yield (key,), getattr(self, key)
+        for i, label in enumerate(self.labels or ()):
+            yield ("labels", i), label
 
 
 class Outputs(BaseModel):
@@ -93,6 +105,11 @@ def check_outputs(
         drawn = len(figure.analyses or curves)
         if figure.labels is not None and len(figure.labels) != drawn:
             yield (*key, "labels"), f"{len(figure.labels)} labels for {drawn} curves"
+        for where, text in figure.texts:
+            try:
+                check_text(text)
+            except InputError as error:
+                yield (*key, *where), str(error)
         try:
             size_in_inches(figure.size)
         except InputError as error:
@@ -106,12 +123,22 @@ def check_outputs(
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
+    if outputs.folder is not None and not _printable(outputs.folder):
+        yield ("folder",), f"{outputs.folder!r} has characters that no name has"
     for place, name in names:
         if PurePath(name).name != name or name in (".", ".."):
             yield place, f"{name!r} is a name inside the folder of the outputs, without slashes"
+        elif not _printable(name):
+            yield place, f"{name!r} has characters that no name has"
+        elif len(os.fsencode(name)) > _LONGEST:
+            yield place, f"a name of {len(name)} characters is too long for a file: at most {_LONGEST}"
         elif name in seen:
             yield place, f"{name!r} is written twice: choose another name"
         seen[name] = name
+
+
+def _printable(name: str) -> bool:
+    return all(character.isprintable() for character in name)
 
 
 def _not_in(
