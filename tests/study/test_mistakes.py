@@ -481,6 +481,16 @@ class Brittle(so.CubicSpring):
 """
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("alpha = 1.0", "alpha = 1e300"), ("omega = [3.0, 0.5]", "omega = [3.0, 1e300]")]
+)
+def test_sizes_beyond_numbers_are_a_failure_in_words(old, new, study_file, suboctave):
+    text = DUFFING.split('[[analyses]]\nname = "up"')[0].replace(old, new)
+    status, out, err = suboctave("run", study_file(text))
+    assert status == 1, err
+    assert "choose units" in " ".join(out.split())
+
+
 def test_a_force_that_is_no_number_midway_ends_the_curve_with_a_reason(study_file, suboctave, tmp_path, monkeypatch):
     (tmp_path / "brittle_of_a_test.py").write_text(OWN)
     monkeypatch.syspath_prepend(tmp_path)

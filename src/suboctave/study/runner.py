@@ -224,6 +224,8 @@ def _one(
             failure = str(error)
         except InputError as error:
             failure, wrong = str(error), True
+        except ArithmeticError as error:  # a size of 1e200 whose square is no number
+            failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
     seconds = perf_counter() - begin
     if isinstance(outcome, Branch) and outcome.ended.startswith("interrupted"):
         interrupted = True
