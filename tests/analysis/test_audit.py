@@ -335,3 +335,24 @@ def test_what_is_unsettled_is_said_in_words():
         assert at == pytest.approx([stretch.first, stretch.last], abs=1e-9)
         assert any(note.startswith(str(stretch)) for note in curve.warnings)
         assert str(stretch) in repr(curve.audit)
+
+
+@pytest.mark.parametrize("max_step", [None, 0.1, 0.3])
+@pytest.mark.parametrize("omega", [(0.5682, 0.7), (0.7, 0.5682)])
+def test_a_pair_right_before_a_contact_ceases(omega, max_step):
+    """Behind a grazing that lies just beyond a step nothing foretells the square root: two masses and a stop."""
+    system = so.System(
+        np.diag([0.7049123, 1.18393191]),
+        [[0.10397774, -0.04522106], [-0.04522106, 0.0630743]],
+        [[3.62325192, -1.75523209], [-1.75523209, 1.75523209]],
+        [so.ElasticStop(dof=0, stiffness=4.504318617, gap=-0.3697493876)],
+        [so.HarmonicLoad(dof=0, amplitude=0.427502387669)],
+    )
+    curve = so.frequency_response(system, omega, max_step=max_step)
+    found = sorted(b.omega for b in curve.bifurcations)
+    assert [b.kind for b in curve.bifurcations] == ["PD", "PD"]
+    assert found == pytest.approx([0.570918, 0.579010], abs=2e-6)
+    # shooting on either side of each: stable, unstable, stable
+    sides = [found[0] - 1e-4, 0.5 * (found[0] + found[1]), found[1] + 1e-4]
+    starts = [min(curve.points, key=lambda p: abs(p.orbit.omega - side)).orbit.start() for side in sides]
+    assert [shoot(system, start, side).stable for start, side in zip(starts, sides, strict=True)] == [True, False, True]

@@ -25,7 +25,7 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import first_doubtful
-from suboctave.analysis.nearing import nears_grazing
+from suboctave.analysis.nearing import nearing_share
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Sample
 from suboctave.bifurcation.grazing import touches
@@ -220,8 +220,9 @@ class _Step:
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
         if self.grazes(p, q):
             return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
-        if h > _LAYER and nears_grazing(p, q):
-            return 0.5, "a contact that is about to begin or cease changes everything like a square root"
+        near = nearing_share(p, q) if h > _LAYER else None
+        if near is not None:
+            return near, "a contact that is about to begin or cease changes everything like a square root"
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"

@@ -16,15 +16,22 @@ from suboctave.compiled import kernel
 YOUNG = 0.05
 #: share to which an excursion may shrink in an interval
 SHRINKS = 0.3
+#: where an interval is cut, from the end near the grazing
+_CUT = 0.35
 
 
-def nears_grazing(p: Sample, q: Sample) -> bool:
-    """Whether an excursion across a gap shrinks so much between two samples that it may end just beyond one."""
-    return any(
-        _shrinks(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
-        or _shrinks(b.tau, b.value, b.curve, b.level, a.tau, a.value, a.curve, a.level)
-        for a, b in zip(p.gaps, q.gaps, strict=True)
-    )
+def nearing_share(p: Sample, q: Sample) -> float | None:
+    """Where to cut an interval in which an excursion across a gap shrinks so much that it may end just beyond an end.
+
+    As a fraction of the interval, closer to that end: towards it the intervals shorten like the excursion. None if
+    there is no such excursion.
+    """
+    for a, b in zip(p.gaps, q.gaps, strict=True):
+        if _shrinks(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level):
+            return _CUT
+        if _shrinks(b.tau, b.value, b.curve, b.level, a.tau, a.value, a.curve, a.level):
+            return 1.0 - _CUT
+    return None
 
 
 @kernel()
@@ -50,4 +57,4 @@ def _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, othe
     return False
 
 
-__all__ = ["nears_grazing"]
+__all__ = ["nearing_share"]

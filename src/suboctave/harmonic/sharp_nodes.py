@@ -88,7 +88,7 @@ def _roots(x, d, s, point, width):
     return 2.0 * target / q, far
 
 
-@kernel(at_once=True)
+@kernel(patience=QUICK)
 def singular_instants(c, points, widths, reach, zr, zi):
     """Complex instants `s + i d`, d > 0 and below `reach`, at which the motion meets point +- i width; ascending in s.
 
@@ -221,7 +221,7 @@ def _with_motion(c, zr, zi, w):
     return out
 
 
-@kernel(at_once=True)
+@kernel(patience=QUICK)
 def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
     """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion and its derivative by
     tau there; (5, N).

@@ -29,7 +29,7 @@ _REACH, _MOST = 4.0, 10000
 _EXACT, _CLOSE = 1e-15, 1e-11
 
 
-@kernel(at_once=True)
+@kernel()
 def propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force, kick, powers, nodes):
     """Monodromy matrix and, where there is a force, what `_respond` needs.
 
