@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import Any, ParamSpec, Protocol, TypeVar
 
-from suboctave.errors import InputError
+from suboctave.errors import ConvergenceError, InputError
 
 Report = Callable[[float, str], None]
 
@@ -24,12 +24,18 @@ class Timed(Protocol):
 
 
 def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
-    """A verb whose result says in `seconds` how long it took."""
+    """A verb whose result says in `seconds` how long it took, and whose failures are told in words."""
 
     @functools.wraps(verb)
     def measured(*positional: Arguments.args, **named: Arguments.kwargs) -> Curve:
         begin = perf_counter()
-        result = verb(*positional, **named)
+        try:
+            result = verb(*positional, **named)
+        except (ZeroDivisionError, OverflowError) as failure:
+            raise ConvergenceError(
+                f"the numbers left the range of floating point ({failure}): look at the sizes of parameters, loads and "
+                "ranges, or choose units in which they are near one"
+            ) from failure
         result.seconds = perf_counter() - begin
         return result
 
