@@ -7,9 +7,10 @@ most cost less there than their compilation would. So a kernel first runs as the
 - within the first computation of a process, compiling may take `BUDGET` seconds in all;
 - from the second computation on everything is compiled when it is called.
 
-What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Arithmetic is
-the same bit by bit in both; kernels for which that does not hold (sums that the compiler may reorder, complex roots,
-sines and cosines of the same angle) are compiled at once.
+What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Small
+kernels whose arithmetic would differ (sums that the compiler may reorder, complex roots, sines and cosines of the
+same angle) are compiled at once, so that both forms agree bit by bit; but where a kernel is compiled into a larger
+one the last bit may still change, for rounded laws and several degrees of freedom, until everything is compiled.
 """
 
 from __future__ import annotations
