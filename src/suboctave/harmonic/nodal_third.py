@@ -19,7 +19,7 @@ from suboctave.harmonic.nodal import _BESIDE, NodalForce
 from suboctave.harmonic.third_weights import Third
 
 #: step in the phase of the load by which the jump of a slope is differentiated
-_PHASE = 1e-4
+_PHASE = 1e-3
 
 
 def nodal_third(force: NodalForce) -> list[Third]:
@@ -53,7 +53,8 @@ def _corner(force: NodalForce, row: int, level: float, zr: Array, zi: Array) -> 
     by[row] *= 0.5
     along = np.einsum("sn,sn->n", by, rates[0])
     if force.own.harmonic:
-        along += force.basis.nu * (jump(1, theta + _PHASE) - jump(1, theta - _PHASE)) / (2.0 * _PHASE)
+        near, far = (jump(1, theta + h) - jump(1, theta - h) for h in (_PHASE, 2.0 * _PHASE))
+        along += force.basis.nu * (8.0 * near - far) / (12.0 * _PHASE)
     slope = rates[0][row]
     least = 1e-12 * scale
     slope = np.where(np.abs(slope) < least, least, slope)
