@@ -33,6 +33,8 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
 
 SUPERCRITICAL, SUBCRITICAL = "supercritical", "subcritical"
+#: the kinds that have one, and the operators that are singular there
+FORMS = {"LP": Kind.INTEGER, "BP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
 #: share of the terms that add up to it below which a number counts as zero whatever its estimated error
 ROUNDING = 1e-9
 
@@ -105,8 +107,7 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
     """
     from suboctave.bifurcation import normal_form_branch, normal_form_real, normal_form_torus
 
-    operators = {"LP": Kind.INTEGER, "BP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
-    if kind not in operators:
+    if kind not in FORMS:
         raise InputError(f"a {kind!r} has no normal form; it is for LP, BP, PD and NS")
     terms = {
         "LP": normal_form_real.limit_point,
@@ -115,7 +116,7 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
         "NS": normal_form_torus.torus,
     }[kind]
     found = terms(state, vectors, name, kappa)
-    coarse = _coarser(state, vectors, operators[kind], kappa)
+    coarse = _coarser(state, vectors, FORMS[kind], kappa)
     other = None if coarse is None else terms(*coarse, name, kappa)
     errors = {}
     for key, size in found.sizes.items():
