@@ -83,7 +83,7 @@ class NormalForm:
 
 @dataclass(frozen=True)
 class Terms:
-    """What a kind computes at one motion: coefficients, and the sizes of the sums that those which decide are made of."""
+    """Coefficients at one motion, and the sizes of the sums that those which decide are made of."""
 
     coefficients: dict[str, float]
     sizes: dict[str, float]
@@ -135,8 +135,8 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
 def with_criticality(form: NormalForm) -> NormalForm:
     """The same with the sign of c3 read, where it is certain."""
     for key, words in (
-        ("g", "the critical multiplier is (nearly) a double one: without damping there is no super- or subcritical"),
-        ("c3", "the cubic coefficient is zero within its error: neither super- nor subcritical"),
+        ("g", "a double multiplier: neither super- nor subcritical"),
+        ("c3", "cubic coefficient zero within its error"),
     ):
         value, error = form.coefficients.get(key), form.errors.get(key)
         if value is None or error is None:

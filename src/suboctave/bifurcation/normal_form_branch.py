@@ -5,8 +5,8 @@ branches solve
 
     c s^2 + 2 b s r + a r^2 = 0,    a = psi.R''[v, v], b = psi.R''[v, phi], c = psi.R''[phi, phi].
 
-`c = 0` is a pitchfork: the other branch leaves along phi, as `p = p_0 + curvature eps^2`, `curvature = -c3 / b`, with c3
-as at a period doubling. A symmetry of the system is the reason as a rule.
+`c = 0` is a pitchfork: the other branch leaves along phi, as `p = p_0 + curvature eps^2`, `curvature = -c3 / b`, with
+c3 as at a period doubling. A symmetry of the system is the reason as a rule.
 """
 
 from __future__ import annotations

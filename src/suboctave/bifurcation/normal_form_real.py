@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import Terms, unweighted
+from suboctave.bifurcation.normal_form import ROUNDING, Terms, unweighted
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient
@@ -20,8 +20,8 @@ from suboctave.harmonic.waves import Frequencies, Waves
 class Expansion:
     """Null vectors of an operator at a motion in the coefficients' own units, psi turned so that g > 0.
 
-    `by_parameter` is `psi.J_p phi`, `by_motion` the gradient of `psi.J phi` by the motion, (2 H + 1, size); `g_size` the
-    sum of the moduli that g is made of.
+    `by_parameter` is `psi.J_p phi`, `by_motion` the gradient of `psi.J phi` by the motion, (2 H + 1, size); `g_size`
+    the sum of the moduli that g is made of.
     """
 
     state: BalanceState
@@ -40,7 +40,9 @@ class Expansion:
         phi, psi = unweighted(state, vectors.right), unweighted(state, vectors.left)
         slope = bilinear_gradient(state, kind, psi, phi, (name,))
         g, size = float((1j * slope.kappa).real), growth_size(state, kind, psi, phi)
-        turn = -1.0 if g < 0.0 else 1.0
+        # without damping g is rounding, and the parameter tells the sense
+        certain = abs(g) > ROUNDING * size
+        turn = -1.0 if (g if certain else slope.rates[name].real) < 0.0 else 1.0
         by_parameter = turn * slope.rates[name].real
         return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, Multilinear(state))
 

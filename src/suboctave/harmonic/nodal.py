@@ -264,15 +264,30 @@ class NodalForce:
             if row:
                 motion = 1j * self.rate * np.arange(len(motion)) * motion
             rates = kernels.motion(motion, zr, zi)[1]
-            scale = float(np.abs(self.path[0][row]).max()) or 1.0
-            sides = []
-            for sign in (1.0, -1.0):
-                there[row] = level + sign * _BESIDE * scale
-                sides.append(self.own.law.tangent(there, phase, self.c)[1][row])
             # the rate is kept from zero where the motion only touches the corner
-            weights = (sides[0] - sides[1]) / np.maximum(np.abs(rates), 1e-12 * scale)
+            weights = self.jump(row, level, there, phase) / np.maximum(np.abs(rates), 1e-12 * self.size(row))
             found.append(Comb(number, row, zr, zi, weights))
         return found
+
+    def size(self, row: int) -> float:
+        """Largest value that a row of q takes along the motion."""
+        return float(np.abs(self.path[0][row]).max()) or 1.0
+
+    def jump(self, row: int, level: float, q: Array, theta: Array) -> Array:
+        """Jump of `f_r` where row r of q passes a corner; q (Q, N), theta (N,) at the instants of passing."""
+
+        def across(distance: float) -> Array:
+            sides = []
+            for sign in (1.0, -1.0):
+                there = q.copy()
+                there[row] = level + sign * distance * self.size(row)
+                sides.append(self.own.law.tangent(there, theta, self.c)[1][row])
+            jump: Array = sides[0] - sides[1]
+            return jump
+
+        near = across(_BESIDE)
+        # half powers that begin at the corner are no jump
+        return 2.0 * near - across(4.0 * _BESIDE) if getattr(self.kind, "rough", False) else near
 
     @lazy
     def bend(self) -> Bend:
