@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.nodal import _BESIDE, _GAUSS, NodalForce
+from suboctave.harmonic.nodal import BESIDE, GAUSS, NodalForce
 from suboctave.harmonic.third_weights import Third
 from suboctave.model.sampling import CornerSampling
 
@@ -32,7 +32,7 @@ def nodal_third(force: NodalForce) -> list[Third]:
     third = np.asarray(force.own.law.third(q, theta, force.c))
     found = [Third(nodes.zr, nodes.zi, nodes.weights * third, None)]
     rough = isinstance(force.kind, CornerSampling) and force.kind.rough
-    for row, level, at in force._corner_rows:
+    for row, level, at in force.corner_rows:
         if len(at):
             found.append(_corner(force, row, level, at))
             if rough:
@@ -47,7 +47,7 @@ def _finite_part(force: NodalForce, row: int, level: float, at: Array) -> Third:
     `E(0) = 2 K |q_r'|^(-3/2) / sqrt(length)`. Its finite part over [0, 1] is `int (E(s) - E(0)) / s^2 ds - E(0)`; the
     rule takes `sum_i w_i / s_i^2` for the -1.
     """
-    s, share = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
+    s, share = 0.5 + 0.5 * GAUSS[0], 0.5 * GAUSS[1]
     zr, zi = np.cos(at), np.sin(at)
     q, theta = force.state_at(zr, zi)
     slope = _rates_of_state(force, zr, zi)[0][row]
@@ -100,14 +100,12 @@ def _corner(force: NodalForce, row: int, level: float, at: Array) -> Third:
         # a jump between half powers: those of -1/2 and 1/2 in the distance cancel
         by = -2.0 * bend(_NEAR) + 5.0 * bend(4.0 * _NEAR) - 2.0 * bend(16.0 * _NEAR)
     else:
-        by = bend(_BESIDE)
+        by = bend(BESIDE)
     by[row] *= 0.5
     along = np.einsum("sn,sn->n", by, rates[0])
     if force.own.harmonic:
-        near, far = (
-            force.jump(row, level, q, theta + h) - force.jump(row, level, q, theta - h) for h in (_PHASE, 2.0 * _PHASE)
-        )
-        along += force.basis.nu * (8.0 * near - far) / (12.0 * _PHASE)
+        jumps = [force.jump(row, level, q, theta + share * _PHASE) for share in (1.0, -1.0, 2.0, -2.0)]
+        along += force.basis.nu * (8.0 * (jumps[0] - jumps[1]) - (jumps[2] - jumps[3])) / (12.0 * _PHASE)
     slope = rates[0][row]
     least = 1e-12 * scale
     slope = np.where(np.abs(slope) < least, least, slope)
