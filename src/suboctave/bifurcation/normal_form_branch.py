@@ -54,7 +54,7 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     c = float(own.psi @ squared)
     c3, cubic_size = own.cubic(solve(-0.5 * squared))
     coefficients = {"a": a, "b": b, "c": c, "g": own.g, "c3": c3, "curvature": -c3 / b if b else float("nan")}
-    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": _quadratic_size(own)})
+    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": _quadratic_size(own)}, own.g_size)
 
 
 def labelled(form: NormalForm, found: Terms) -> NormalForm:

@@ -68,14 +68,15 @@ def limit_point(state: BalanceState, vectors: NullVectors, name: str, kappa: flo
     """a, b, g and the curvature: along the branch `p = p_0 + curvature eps^2`."""
     own = Expansion.of(state, Kind.INTEGER, vectors, name)
     a, b = 0.5 * float(own.psi @ own.squared()), float(own.psi @ state.residual_by(name))
-    return Terms({"a": a, "b": b, "g": own.g, "curvature": _ratio(-a, b)}, {"a": abs(a), "b": abs(b)})
+    return Terms({"a": a, "b": b, "g": own.g, "curvature": _ratio(-a, b)}, {"a": abs(a), "b": abs(b)}, own.g_size)
 
 
 def period_doubling(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
     """c3, d, g and the curvature."""
     own = Expansion.of(state, Kind.HALF, vectors, name)
     c3, d, size, _ = doubled(own, name)
-    return Terms({"c3": c3, "d": d, "g": own.g, "curvature": _ratio(-c3, d)}, {"c3": size, "g": own.g_size})
+    coefficients = {"c3": c3, "d": d, "g": own.g, "curvature": _ratio(-c3, d)}
+    return Terms(coefficients, {"c3": size, "g": own.g_size}, own.g_size)
 
 
 def doubled(own: Expansion, name: str) -> tuple[float, float, float, Array]:

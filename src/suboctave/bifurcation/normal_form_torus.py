@@ -64,7 +64,7 @@ def torus(state: BalanceState, vectors: NullVectors, name: str, kappa: float) ->
         "d_frequency": d.imag,
         "curvature": -c3.real / d.real if d.real else float("nan"),
     }
-    return Terms(coefficients, {"c3": float(np.abs(parts).sum() / abs(g))})
+    return Terms(coefficients, {"c3": float(np.abs(parts).sum() / abs(g))}, 1.0)
 
 
 def labelled(form: NormalForm, share: float) -> NormalForm:
