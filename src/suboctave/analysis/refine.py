@@ -66,7 +66,7 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     guess = _guess_from(solution, curve)
     state = solution.state
     layer = layer_of(located.kind, solution, guess)
-    orbit = as_orbit(state, solution.residual, truncation(state), curve)
+    orbit = as_orbit(state, solution.balance_residual, truncation(state), curve)
     return Bifurcation(
         located.kind.name,
         orbit,

@@ -67,6 +67,7 @@ class _HalfFrequency(NullVectorEquation):
 
     def __init__(self, row: ComplexArray, b: float) -> None:
         super().__init__(Kind.FREE)
+        self.free = False
         self.row, self.b = row, b
 
     def kappa(self, state: BalanceState, free: float) -> float:
@@ -88,7 +89,7 @@ class _HalfFrequency(NullVectorEquation):
             raise ConvergenceError("the system does not tell where on the curve to look")
         return np.array([-(g[1].conjugate() * g[0]).real / slope])
 
-    def misses(self, value: np.ndarray, steep: np.ndarray) -> float:
+    def missed(self, value: np.ndarray) -> float:
         """Nothing: what is left of N phi is orthogonal to what a step can change, and steps tell when that is so."""
         return 0.0
 

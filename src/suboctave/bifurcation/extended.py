@@ -50,6 +50,8 @@ class NullVectorEquation:
 
     def __init__(self, kind: Kind) -> None:
         self.kind = kind
+        #: whether kappa is an unknown
+        self.free = kind is Kind.FREE
 
     def kappa(self, state: BalanceState, free: float) -> float:
         """Frequency of the perturbation; `free`: the unknown, where it is one."""
@@ -65,7 +67,7 @@ class NullVectorEquation:
 
     def combination(self, g: np.ndarray) -> Array:
         """The way along the tangent (and dkappa) that makes `g_0 + s g_1 (+ dkappa g_2)` vanish."""
-        if self.kind is not Kind.FREE:
+        if not self.free:
             return np.array([-g[0] / g[1]])
         matrix = np.array([[g[1].real, g[2].real], [g[1].imag, g[2].imag]])
         try:
@@ -74,8 +76,8 @@ class NullVectorEquation:
             raise ConvergenceError("the extended system is singular") from None
         return found
 
-    def misses(self, value: np.ndarray, steep: np.ndarray) -> float:
-        """How far `J phi` is from what it should be, in units of omega^2; `steep`: its change along the tangent."""
+    def missed(self, value: np.ndarray) -> float:
+        """How far `J phi`, in units of omega^2, is from what the system makes of it."""
         return float(np.linalg.norm(value))
 
 
@@ -149,21 +151,19 @@ def solve_extended(
                 raise ConvergenceError("omega left the positive axis")
             state = guess.balance.at(x, omega, values)
         kappa = equation.kappa(state, free)
-        blocks = _Blocks(state, kind, name, guess.span, kappa, phi, left, equation.normalisation(phi)[0], tangent)
+        row, amount = equation.normalisation(phi)
+        blocks = _Blocks(state, kind, name, guess.span, kappa, phi, left, row, tangent)
         d, t = blocks.along_curve()
         tangent = t
         directions = [blocks.direction(d), blocks.direction(t)]
         shifts = [equation.shift(a.omega, state.basis.nu) for a in directions]
-        if type(equation).shift is NullVectorEquation.shift and kind is Kind.FREE:
+        if equation.free:
             directions.append(Direction(np.zeros_like(state.x)))
             shifts.append(1.0)
         changes = operator_along(state, kind, phi * blocks.scale, directions, kappa, shifts)
         changes = changes * blocks.scale[:, None]
-        value = blocks.matrix @ phi
-        size = state.omega**2
-        amount = equation.normalisation(phi)[1]
-        missed = equation.misses(value / size, changes[:, 1] / size)
-        error = max(blocks.residual, missed, abs(amount))
+        value, size = blocks.matrix @ phi, state.omega**2
+        error = max(blocks.residual, equation.missed(value / size), abs(amount))
         if not (np.isfinite(error) and np.isfinite(changes).all()):
             raise ConvergenceError("the extended system is not finite")
         last = lengths[-1] if lengths else np.inf
