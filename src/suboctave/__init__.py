@@ -23,7 +23,7 @@ from suboctave.version import __version__
 
 if TYPE_CHECKING:
     from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, verify
-    from suboctave.bifurcation import Bifurcation
+    from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
     from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
@@ -82,6 +82,9 @@ _HOME = {
     "SteppingOptions": "suboctave.continuation",
     "Event": "suboctave.continuation",
     "Bifurcation": "suboctave.bifurcation",
+    "BorderedSystem": "suboctave.bifurcation",
+    "ExtendedSystem": "suboctave.bifurcation",
+    "Alcorta2019": "suboctave.bifurcation",
     "Branch": "suboctave.analysis",
     "frequency_response": "suboctave.analysis",
     "continue_branch": "suboctave.analysis",
@@ -102,10 +105,12 @@ _HOME = {
 
 __all__ = [
     "AdaptiveHarmonics",
+    "Alcorta2019",
     "Arbitration",
     "BaseAcceleration",
     "BaseDisplacement",
     "Bifurcation",
+    "BorderedSystem",
     "Branch",
     "Callable",
     "Clearance",
@@ -116,6 +121,7 @@ __all__ = [
     "Element",
     "Event",
     "Expression",
+    "ExtendedSystem",
     "Freeplay",
     "Gravity",
     "HarmonicBalance",

@@ -205,7 +205,7 @@ def test_operator_along_directions(case, kind):
     right = case.random.normal(size=len(matrix)).astype(matrix.dtype)
     if kind is Kind.FREE:
         right = right + 1j * case.random.normal(size=len(matrix))
-    rates = [{"omega": 0.7}, {"omega": -0.2, **{name: 0.3 for name in NAMES}}]
+    rates = [{"omega": 0.7}, {"omega": -0.2, **dict.fromkeys(NAMES, 0.3)}]
     shifts = [0.4, -0.9]
     directions = [Direction(case.vector(), change) for change in rates]
     found = operator_along(state, kind, right, directions, KAPPA, shifts)

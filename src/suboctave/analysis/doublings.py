@@ -19,7 +19,7 @@ from suboctave.bifurcation.kinds import PERIOD_DOUBLING
 
 _MISSED = (
     "a period doubling lies there (a multiplier passes -1), which the test function {test!r} of the formulation "
-    "does not show"
+    'does not show (formulation="bordered" finds it)'
 )
 _UNSOLVED = "a multiplier passes -1, but the published system of period doublings did not lead there"
 

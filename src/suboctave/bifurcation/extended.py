@@ -172,7 +172,9 @@ def solve_extended(
         rounding = np.finfo(float).eps * float(np.linalg.norm(changes[:, 1])) / size
         if settled and error <= max(_TOLERANCE, rounding if last <= _STEP else 0.0):
             defect = float(np.linalg.norm(value)) / size
-            return Solved(state, NullVectors(phi / np.linalg.norm(phi), blocks.left()), kappa, error, defect, (*lengths,))
+            return Solved(
+                state, NullVectors(phi / np.linalg.norm(phi), blocks.left()), kappa, error, defect, (*lengths,)
+            )
         if iteration == iterations:
             break
         rhs = -changes

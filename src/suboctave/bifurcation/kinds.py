@@ -21,8 +21,8 @@ import numpy as np
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.branch import locate_branch_point
 from suboctave.bifurcation.contact import GrazingContact
-from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.formulation import BORDERED, Formulation
+from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint

@@ -59,16 +59,16 @@ def operator_along(
         if damping.size:
             response = response + _toeplitz_apply(damping, rate_ve)
         drive += np.multiply.outer(response, group.direction)
-        local = _group_along(bend, motion, state, group.direction, ve, rate_ve, directions)
+        waves = _group_along(bend, motion, state, group.direction, ve, rate_ve, directions)
         for j, turn in enumerate(turned):
             if damping.size and turn.any():
-                local[j] += _toeplitz_apply(damping, 1j * turn * ve)
-        forces += local[:, :, None] * group.direction
+                waves[j] += _toeplitz_apply(damping, 1j * turn * ve)
+        forces += waves[:, :, None] * group.direction
     for nodal in state.nodal:
         drive += np.multiply.outer(nodal_second.operator_applied(nodal, v, frequency, _toeplitz_apply), nodal.own.out)
         for j, a in enumerate(directions):
-            local = nodal_second.operator_along(nodal, v, frequency, turned[j], state.values, a, _toeplitz_apply)
-            forces[j] += np.multiply.outer(local, nodal.own.out)
+            own = nodal_second.operator_along(nodal, v, frequency, turned[j], state.values, a, _toeplitz_apply)
+            forces[j] += np.multiply.outer(own, nodal.own.out)
     for element, local in zip(state.balance.elements, state.local_motions, strict=True):
         for j, a in enumerate(directions):
             change = coefficient_rates(element, state.values, a.parameters)
