@@ -14,7 +14,8 @@ serves condensed structures and motions of several periods as well. In real numb
 As it stands the system cannot be solved by Newton's method. The frequencies of N, -H + 1/2 .. H + 1/2, are not closed
 under conjugation: det N is complex and, at real omega, comes near zero but for the harmonics left out does not reach
 it. And where phi solves it so does `exp(i theta) phi`, of which the normalisation fixes one real number of two: the
-Jacobian (Eq. 20) is singular to the same accuracy, whatever q. Its steps never become small.
+Jacobian (Eq. 20) is singular to the same accuracy, whatever q, and exactly where |det N| is least. Its steps never
+become small.
 
 Here it is completed by the missing phase, `q . phi_R = 0`. That is one equation more than unknowns; R = 0 and the
 normalisation are kept exactly, and N phi = 0 in the sense of least squares: with the bordered scalar g of N, zero where

@@ -23,11 +23,12 @@ R_X and phi completes it: one factorisation serves both halves.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import NullVectors, at_values, null_vectors, weighted_operator
+from suboctave.bifurcation.bordered import NullVectors, at_values, null_vectors, residual_scale, weighted_operator
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation.linear import Factor
 from suboctave.errors import ConvergenceError
@@ -37,6 +38,7 @@ from suboctave.harmonic.perturbation_rate import operator_along
 from suboctave.harmonic.second import Direction
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
 
 #: residual and step at which an iteration has arrived, as for the bordered system
 _TOLERANCE = 1e-10
@@ -139,70 +141,61 @@ def solve_extended(
         If it leaves the neighbourhood of the guess or does not converge. An iteration that stands still with a residual
         that rounding of its unknowns explains has converged.
     """
-    kind, name = equation.kind, guess.name
     x, parameter, free = guess.x.ravel().copy(), guess.parameter, guess.kappa
     phi, left = vectors.right, vectors.left
-    state, tangent = begin, None
+    state, tangent, steepest = begin, None, 0.0
     lengths: list[float] = []
     for iteration in range(iterations + 1):
         if iteration > 0:
-            omega, values = at_values(guess.values, name, parameter, guess.omega)
+            omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
             if omega <= 0.0:
                 raise ConvergenceError("omega left the positive axis")
             state = guess.balance.at(x, omega, values)
-        kappa = equation.kappa(state, free)
-        row, amount = equation.normalisation(phi)
-        blocks = _Blocks(state, kind, name, guess.span, kappa, phi, left, row, tangent)
-        d, t = blocks.along_curve()
-        tangent = t
-        directions = [blocks.direction(d), blocks.direction(t)]
-        shifts = [equation.shift(a.omega, state.basis.nu) for a in directions]
-        if equation.free:
-            directions.append(Direction(np.zeros_like(state.x)))
-            shifts.append(1.0)
-        changes = operator_along(state, kind, phi * blocks.scale, directions, kappa, shifts)
-        changes = changes * blocks.scale[:, None]
-        value, size = blocks.matrix @ phi, state.omega**2
-        error = max(blocks.residual, equation.missed(value / size), abs(amount))
-        if not (np.isfinite(error) and np.isfinite(changes).all()):
+        blocks = _Blocks(state, equation, guess, equation.kappa(state, free), phi, left, tangent)
+        value = blocks.matrix @ phi / state.omega**2
+        error = max(blocks.residual, equation.missed(value), abs(blocks.amount))
+        if not np.isfinite(error):
             raise ConvergenceError("the extended system is not finite")
         last = lengths[-1] if lengths else np.inf
         settled = last <= _STEP or (last <= 1e-5 and error <= 1e-3 * _TOLERANCE)
         # right behind a grazing the last digit of an unknown is more than tolerated
-        rounding = np.finfo(float).eps * float(np.linalg.norm(changes[:, 1])) / size
-        if settled and error <= max(_TOLERANCE, rounding if last <= _STEP else 0.0):
-            defect = float(np.linalg.norm(value)) / size
-            return Solved(
-                state, NullVectors(phi / np.linalg.norm(phi), blocks.left()), kappa, error, defect, (*lengths,)
-            )
+        tolerance = max(_TOLERANCE, np.finfo(float).eps * steepest if last <= _STEP else 0.0)
+        if settled and error <= tolerance:
+            found = NullVectors(phi / np.linalg.norm(phi), blocks.left())
+            return Solved(state, found, blocks.kappa, error, float(np.linalg.norm(value)), (*lengths,))
         if iteration == iterations:
             break
-        rhs = -changes
-        rhs[:, 0] -= value
-        solved = blocks.beside(rhs, amount)
-        share = equation.combination(solved[-1])
-        way = d + share[0] * t
-        turn = solved[:-1, 0] + solved[:-1, 1:] @ share
-        extra = float(share[1]) if len(share) > 1 else 0.0
-        length = float(np.sqrt(way @ way + np.vdot(turn, turn).real + (extra / state.rate) ** 2))
-        if not np.isfinite(length):
+        step = blocks.step(value)
+        if not np.isfinite(step.length):
             raise ConvergenceError("the extended system is singular")
-        if iteration > 0 and length > _AWAY:
+        if iteration > 0 and step.length > _AWAY:
             raise ConvergenceError("the extended system leads away from its start")
-        if iteration > 3 and length > 0.5 * last and last > 1e-6:
+        if iteration > 3 and step.length > 0.5 * last and last > 1e-6:
             raise ConvergenceError("the extended system does not contract")
-        damp = min(1.0, 0.5 / length) if length > 0.0 else 1.0
-        x += damp * blocks.direction(way).x.ravel()
-        parameter += damp * way[-1] * guess.span
-        phi = phi + damp * turn
-        free += damp * extra
-        left = blocks.left()
-        lengths.append(length)
+        damp = min(1.0, 0.5 / step.length) if step.length > 0.0 else 1.0
+        x += damp * blocks.direction(step.way).x.ravel()
+        parameter += damp * step.way[-1] * guess.span
+        phi = phi + damp * step.turn
+        free += damp * step.kappa
+        left, tangent, steepest = blocks.left(), step.tangent, step.steepest
+        lengths.append(step.length)
     raise ConvergenceError(f"the extended system did not converge (residual {error:.1e})")
 
 
+@dataclass(frozen=True)
+class _Step:
+    """A Newton step: way along the curve, change of phi and of kappa; the tangent, how steep J phi is along it, length."""
+
+    way: Array
+    turn: np.ndarray
+    kappa: float
+    tangent: Array
+    steepest: float
+    length: float
+
+
 class _Blocks:
-    """The two small blocks at one iterate, bordered and factorised, in weighted and dimensionless unknowns.
+    """The two small blocks at one iterate, in weighted and dimensionless unknowns, bordered and factorised when needed.
 
     Ways along the curve are (dimension + 1,) in units of the motion and of the parameter's range.
     """
@@ -210,73 +203,98 @@ class _Blocks:
     def __init__(
         self,
         state: BalanceState,
-        kind: Kind,
-        name: str,
-        span: float,
+        equation: NullVectorEquation,
+        guess: Guess,
         kappa: float,
         phi: np.ndarray,
         left: np.ndarray,
-        row: np.ndarray,
         tangent: Array | None,
     ) -> None:
-        self.state, self.kind, self.name, self.span = state, kind, name, span
-        self.matrix, self.scale = weighted_operator(state, kind, kappa)
-        n = state.balance.dimension
-        rows = self.scale if kind is Kind.INTEGER else np.tile(state.balance.scales()[1], state.basis.size)
+        self.state, self.equation, self.guess, self.kappa = state, equation, guess, kappa
+        self.phi, self._border, self._tangent = phi, left, tangent
+        self.matrix, self.scale = weighted_operator(state, equation.kind, kappa)
+        self.row, self.amount = equation.normalisation(phi)
+        self.rows = residual_scale(state)
         self.unit = max(motion_size(state), _NOTHING)
-        self.rows = rows
-        force = max(state.force_scale(), _NOTHING)
-        self.residual = float(np.linalg.norm(state.residual * rows)) / force
-        #: factors of the unknowns' and of the equations' units
-        self._per_row = self.unit * state.omega**2
-        column = state.residual_by(name) * rows * span / self._per_row
-        self._column_size = float(np.linalg.norm(column)) or 1.0
-        first = np.zeros((n + 1, n + 1), order="F")
-        if kind is Kind.INTEGER:
-            first[:n, :n] = self.matrix / state.omega**2
-            first[:n, n] = column / self._column_size
-            first[n, :n] = phi
-            self._curve = self._operator = _factor(first)
-            return
-        first[:n, :n] = state.jacobian * np.multiply.outer(rows, rows) / state.omega**2
-        first[:n, n] = column / self._column_size
-        if tangent is None:
-            first[n, n] = 1.0
-        else:
-            first[n] = tangent
-            first[n, n] *= 1.0 / self._column_size
-        self._curve = _factor(first)
-        m = len(self.matrix)
-        second = np.zeros((m + 1, m + 1), dtype=self.matrix.dtype, order="F")
-        second[:m, :m] = self.matrix / state.omega**2
-        second[:m, m], second[m, :m] = left, row
-        self._operator = _factor(second)
+        self.residual = float(np.linalg.norm(state.residual * self.rows)) / max(state.force_scale(), _NOTHING)
+        #: the size of an equation of motion
+        self._force = self.unit * state.omega**2
 
-    def along_curve(self) -> tuple[Array, Array]:
+    @lazy
+    def _column(self) -> tuple[Array, float]:
+        """R differentiated by the parameter, of unit length, and its length."""
+        column = self.state.residual_by(self.guess.name) * self.rows * self.guess.span / self._force
+        size = float(np.linalg.norm(column)) or 1.0
+        return column / size, size
+
+    @lazy
+    def _curve(self) -> Factor:
+        """`[R_X R_p]`, completed by phi at a limit point, by the last tangent elsewhere."""
+        column, size = self._column
+        jacobian = self.state.jacobian * np.multiply.outer(self.rows, self.rows) / self.state.omega**2
+        n = len(jacobian)
+        matrix = np.zeros((n + 1, n + 1), order="F")
+        matrix[:n, :n], matrix[:n, n] = jacobian, column
+        if self.equation.kind is Kind.INTEGER:
+            matrix[n, :n] = self.phi
+        elif self._tangent is None:
+            matrix[n, n] = 1.0
+        else:
+            matrix[n] = self._tangent
+            matrix[n, n] /= size
+        return _factor(matrix)
+
+    @lazy
+    def _operator(self) -> Factor:
+        """`[J b; row 0]`; at a limit point the same as `[R_X R_p; phi 0]`."""
+        if self.equation.kind is Kind.INTEGER:
+            return self._curve
+        m = len(self.matrix)
+        matrix = np.zeros((m + 1, m + 1), dtype=self.matrix.dtype, order="F")
+        matrix[:m, :m] = self.matrix / self.state.omega**2
+        matrix[:m, m], matrix[m, :m] = self._border, self.row
+        return _factor(matrix)
+
+    def step(self, value: np.ndarray) -> _Step:
+        """The Newton step; `value` is J phi in units of omega^2."""
+        state, equation = self.state, self.equation
+        d, t = self._along_curve()
+        directions = [self.direction(d), self.direction(t)]
+        shifts = [equation.shift(a.omega, state.basis.nu) for a in directions]
+        if equation.free:
+            directions.append(Direction(np.zeros_like(state.x)))
+            shifts.append(1.0)
+        changes = operator_along(state, equation.kind, self.phi * self.scale, directions, self.kappa, shifts)
+        m = len(self.matrix)
+        rhs = np.zeros((m + 1, len(directions)), dtype=self.matrix.dtype, order="F")
+        rhs[:m] = -changes * self.scale[:, None] / state.omega**2
+        steepest = float(np.linalg.norm(rhs[:m, 1]))
+        rhs[:m, 0] -= value
+        rhs[m, 0] = self.amount
+        solved = self._operator.solve(rhs)
+        share = equation.combination(solved[m])
+        way, turn = d + share[0] * t, solved[:m, 0] + solved[:m, 1:] @ share
+        kappa = float(share[1]) if equation.free else 0.0
+        length = math.sqrt(way @ way + np.vdot(turn, turn).real + (kappa / state.rate) ** 2)
+        return _Step(way, turn, kappa, t, steepest, length)
+
+    def _along_curve(self) -> tuple[Array, Array]:
         """What solves `R + R' d = 0`, and the tangent of R = 0, of unit length."""
         n = self.state.balance.dimension
         rhs = np.zeros((n + 1, 2), order="F")
-        rhs[:n, 0] = -self.state.residual * self.rows / self._per_row
+        rhs[:n, 0] = -self.state.residual * self.rows / self._force
         rhs[n, 1] = 1.0
         found = self._curve.solve(rhs)
-        found[n] /= self._column_size
+        found[n] /= self._column[1]
         length = float(np.linalg.norm(found[:, 1]))
-        if not np.isfinite(length) or length == 0.0:
+        if not math.isfinite(length) or length == 0.0:
             raise ConvergenceError("the curve has no tangent here")
         return found[:, 0], found[:, 1] / length
 
     def direction(self, way: Array) -> Direction:
         """A way along the curve as changes of coefficients and of the free parameter."""
         x = (way[:-1] * self.rows * self.unit).reshape(self.state.x.shape)
-        return Direction(x, {self.name: float(way[-1]) * self.span})
-
-    def beside(self, rhs: np.ndarray, amount: complex) -> np.ndarray:
-        """dphi with g below it, (rows + 1, columns), for changes of J phi; the first column has the amount besides."""
-        m = len(self.matrix)
-        whole = np.zeros((m + 1, rhs.shape[1]), dtype=self.matrix.dtype, order="F")
-        whole[:m] = rhs / self.state.omega**2
-        whole[m, 0] = amount
-        return self._operator.solve(whole)
+        return Direction(x, {self.guess.name: float(way[-1]) * self.guess.span})
 
     def left(self) -> np.ndarray:
         """The left counterpart of phi, of unit length."""
