@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -23,7 +24,8 @@ from threadpoolctl import threadpool_limits
 import suboctave as so
 from suboctave.bifurcation.alcorta import PublishedDoubling, equations, jacobian, locate_published
 from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.bifurcation.extended import locate_extended
+from suboctave.bifurcation.solve import Guess, locate_singular
 from suboctave.harmonic.perturbation import Kind
 
 REPEATS, STEPS, AWAY = 20, 50, 5e-3
@@ -31,7 +33,6 @@ REPEATS, STEPS, AWAY = 20, 50, 5e-3
 EXACT = (2.2937534169, 3.9697105128)
 SHARP = (2.3031529690, 3.9934523291)
 CASES = [("exact law", None, h, EXACT) for h in (7, 15, 31, 63)] + [("s = 3000", 3000.0, 63, SHARP)]
-FORMULATIONS = (so.BorderedSystem(), so.ExtendedSystem(), so.Alcorta2019())
 
 
 def start(regularization: float | None, harmonics: int, omega: float) -> Guess:
@@ -41,7 +42,7 @@ def start(regularization: float | None, harmonics: int, omega: float) -> Guess:
     return Guess(orbit.balance, orbit.coefficients, orbit.omega, orbit.values, "omega", 3.2)
 
 
-def timed(solve: Callable[[], Singular]) -> tuple[Singular, float]:
+def timed(solve: Callable[[], Any]) -> tuple[Any, float]:
     """What was found, and the shortest time in ms."""
     found, times = solve(), []
     for _ in range(REPEATS):
@@ -104,15 +105,17 @@ def main() -> None:
     for law, regularization, harmonics, places in CASES:
         for omega in places:
             guess = start(regularization, harmonics, omega)
-            for formulation in FORMULATIONS:
-                found, ms = timed(lambda f=formulation, g=guess: f.locate(g, Kind.HALF))  # type: ignore[misc]
+            published = locate_published(guess)
+            bare, completed = singular_values(published)
+            more = f"| {bare:.0e} | {completed:.2f} | {plain(guess, published)} | {misfit(published):.0e} |"
+            for name, solve, extra in (
+                ("bordered", lambda g=guess: locate_singular(g, Kind.HALF), "| | | | |"),
+                ("extended", lambda g=guess: locate_extended(g, Kind.HALF), "| | | | |"),
+                ("alcorta2019", lambda g=guess: locate_published(g).solved, more),
+            ):
+                found, ms = timed(solve)
                 at = found.state.omega
-                row = f"{formulation.name} | {at:.10f} | {at - omega:+.1e} | {found.iterations} | {ms:.1f}"
-                extra = "| | | |"
-                if isinstance(formulation, so.Alcorta2019):
-                    published = locate_published(guess)
-                    bare, completed = singular_values(published)
-                    extra = f"| {bare:.0e} | {completed:.2f} | {plain(guess, published)} | {misfit(published):.0e} |"
+                row = f"{name} | {at:.10f} | {at - omega:+.1e} | {found.iterations} | {ms:.1f}"
                 print(f"| {law} | {harmonics} | {omega:.10f} | {row} {extra}", flush=True)
 
 

@@ -26,23 +26,24 @@ as in `extended` takes the steps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.extended import NullVectorEquation, Solved, solve_extended
-from suboctave.bifurcation.solve import Guess, Singular
+from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import Factor
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.perturbation import Kind, operator
 from suboctave.harmonic.perturbation_rate import operator_along
 from suboctave.harmonic.second import Direction
+from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
 
-#: distance of a real multiplier from -1 beyond which a minimum of |g| is no period doubling
-_CRITICAL = 0.1
+#: way, in units of the motion and of the parameter's range, from a solution to where J_half must be singular
+_BESIDE = 0.05
 
 
 @dataclass(frozen=True)
@@ -135,17 +136,23 @@ def locate_doubling(guess: Guess) -> Singular:
     Raises
     ------
     ConvergenceError
-        If Newton's method does not converge, or to a place where no real multiplier is near -1 (|g| is least there too
-        where a complex pair passes -1 by).
+        If Newton's method does not converge, or to a place where J_half is not singular: |g| may be least as well where
+        multipliers only come near -1.
     """
     found = locate_published(guess).solved
-    vectors = null_vectors(found.state, Kind.HALF)
-    result = Singular(found.state, vectors, 0.0, max(found.residual, found.defect), found.iterations)
-    mu = result.floquet.multipliers
-    real = mu[np.abs(mu.imag) < 1e-7 * np.abs(mu)].real
-    if not real.size or float(np.abs(real + 1.0).min()) > _CRITICAL:
-        raise ConvergenceError("no period doubling: no real multiplier is near -1 where the system is nearly solved")
-    return result
+    state = found.state
+    beside = replace(guess, x=state.x, omega=state.omega, values=state.values, vectors=null_vectors(state, Kind.HALF))
+    try:
+        confirmed = locate_singular(beside, Kind.HALF)
+    except ConvergenceError as failure:
+        raise ConvergenceError(f"no period doubling where the system is nearly solved: {failure}") from None
+    scale = state.balance.scales()[0] / max(motion_size(state), np.finfo(float).tiny)
+    away = float(np.linalg.norm((confirmed.state.x - state.x) * scale))
+    moved = replace(beside, omega=confirmed.state.omega, values=confirmed.state.values).parameter - beside.parameter
+    if max(away, abs(moved) / guess.span) > _BESIDE:
+        raise ConvergenceError("no period doubling where the system is nearly solved: J_half is singular elsewhere")
+    residual = max(found.residual, found.defect)
+    return Singular(state, confirmed.vectors, 0.0, residual, found.iterations)
 
 
 def log_determinant(state: BalanceState) -> float:

@@ -184,7 +184,7 @@ def solve_extended(
 
 @dataclass(frozen=True)
 class _Step:
-    """A Newton step: way along the curve, change of phi and of kappa; the tangent, how steep J phi is along it, length."""
+    """A Newton step: way along the curve, changes of phi and kappa; tangent, how steep J phi is along it; length."""
 
     way: Array
     turn: np.ndarray
