@@ -10,16 +10,15 @@ from suboctave.analysis.count import CountCheck
 from suboctave.errors import InputError
 from suboctave.study.options import as_formulation
 
-#: omega scales with the second oscillator's time
+#: period doublings of one rattling oscillator with 7 harmonics
+UPPER, LOWER = 3.9697276189, 2.2937474090
+#: and of two, the time of one running faster by this factor
 FASTER = 1.2
-#: period doublings of one rattling oscillator with 7 harmonics, and of one whose time runs faster by that factor
-PLACES = [FASTER * 3.9697276189, 3.9697276189, FASTER * 2.2937474090, 2.2937474090]
+PLACES = [FASTER * UPPER, UPPER, FASTER * LOWER, LOWER]
 
 
-@pytest.fixture(scope="module")
-def two():
-    """Two rattling oscillators that know nothing of each other, one in faster time: while one is unstable beyond -1 the
-    other passes -1."""
+def two_oscillators(faster):
+    """Two that know nothing of each other, one in faster time: while one is unstable beyond -1 the other passes -1."""
 
     def elements(dof, k):
         return [
@@ -28,14 +27,19 @@ def two():
             so.ElasticStop(dof, stiffness=4.7 * k, gap=-1.0),
         ]
 
-    k = FASTER**2
+    k = faster**2
     return so.System(
         np.eye(2),
-        np.diag([0.06, 0.06 * FASTER]),
+        np.diag([0.06, 0.06 * faster]),
         np.diag([1.0, k]),
         elements(0, 1.0) + elements(1, k),
         [so.HarmonicLoad(0, 0.55), so.HarmonicLoad(1, 0.55 * k)],
     )
+
+
+@pytest.fixture(scope="module")
+def two():
+    return two_oscillators(FASTER)
 
 
 def places(curve):
@@ -56,6 +60,16 @@ def test_a_test_of_the_leading_multiplier_misses_what_another_hides(two):
     assert len(curve.warnings) == 2
     # what the branch knows of stability is not touched by what its tests miss
     assert curve.stable.tolist() == whole.stable.tolist()
+
+
+def test_what_is_missed_beside_what_is_found():
+    """Period doublings in neighbouring steps: each passage of -1 is matched with its own."""
+    faster = 1.008
+    curve = so.frequency_response(two_oscillators(faster), (4.1, 2.25), 7, formulation="alcorta2019", max_step=0.02)
+    assert places(curve) == pytest.approx([faster * UPPER, LOWER], abs=5e-5)
+    assert len(curve.audit.unsettled) == 2
+    for stretch, place in zip(curve.audit.unsettled, [UPPER, faster * LOWER], strict=True):
+        assert stretch.last < place < stretch.first
 
 
 def test_the_determinant_has_a_minimum_at_every_period_doubling_of_close_points(two):

@@ -261,3 +261,21 @@ def test_what_is_no_period_doubling_is_refused():
     curve = so.frequency_response(system, (2.3, 1.7), 5, max_step=0.02, formulation=so.Alcorta2019("determinant"))
     assert not len(curve.bifurcations)
     assert not curve.warnings
+
+
+@pytest.mark.parametrize("formulation", ["extended", "alcorta2019"])
+def test_units_of_single_degrees_of_freedom_do_not_matter(formulation):
+    """The second mass in thousandths, the DOFs exchanged: the same places, steps and residuals."""
+    k, unit = np.array([[2.0, -1.0], [-1.0, 2.0]]), np.diag([1.0, 1e-3])
+    found = []
+    for dof, change in ((0, np.eye(2)), (1, unit[:, ::-1])):
+        mass, stiffness = (change.T @ matrix @ change for matrix in (np.eye(2), k))
+        stop = [so.ElasticStop(dof, 9.0, 0.0), so.CubicSpring(dof, 0.1)]
+        system = so.System(mass, 0.03 * stiffness, 2.0 * stiffness, stop, [so.HarmonicLoad(dof, 0.5)])
+        found.append(so.frequency_response(system, (5.2, 4.7), 9, formulation=formulation).bifurcations)
+    one, other = found
+    assert [b.kind for b in one] == [b.kind for b in other] == ["PD", "NS"]
+    for a, b in zip(one, other, strict=True):
+        assert a.omega == pytest.approx(b.omega, rel=1e-11)
+        assert a.residual < 1e-6
+        assert b.residual == pytest.approx(a.residual, rel=1e-3, abs=1e-10)

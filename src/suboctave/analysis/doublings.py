@@ -23,6 +23,9 @@ _MISSED = (
 )
 _UNSOLVED = "a multiplier passes -1, but the published system of period doublings did not lead there"
 
+#: what the harmonics left out may make between the places of two formulations, in units of a step
+_ASIDE = 0.1
+
 Pair = tuple[Sample, Sample]
 
 
@@ -53,11 +56,12 @@ class DoublingWatch:
             self._open.append(((a, b), False))
         found = []
         for p, q in self._indicated(a, b):
-            self._open = [(pair, known or _overlap(pair, (p, q))) for pair, known in self._open]
+            low, high = p.point.arclength, q.point.arclength
+            self._open = [(pair, known or _within(pair, low, high)) for pair, known in self._open]
             located = self.locate(self.kind, p, q)
             if located is not None:
                 found.append((located, p, q))
-                self._explained(p, q)
+                self._explained(low + located.fraction * (high - low), _ASIDE * (high - low))
         self._last = a
         return found
 
@@ -94,11 +98,11 @@ class DoublingWatch:
                 return [pair]
         return [(before[0], b)]
 
-    def _explained(self, p: Sample, q: Sample) -> None:
-        for item in self._open:
-            if _overlap(item[0], (p, q)):
-                self._open.remove(item)
-                return
+    def _explained(self, place: float, reach: float) -> None:
+        """A period doubling was found at an arclength: the passage of -1 nearest to it is that."""
+        nearest = min(self._open, key=lambda item: _distance(item[0], place), default=None)
+        if nearest is not None and _distance(nearest[0], place) <= reach:
+            self._open.remove(nearest)
 
 
 def leading(sample: Sample) -> float:
@@ -107,10 +111,15 @@ def leading(sample: Sample) -> float:
     return float(np.sign(mu.real) * abs(mu)) + 1.0
 
 
-def _overlap(one: Pair, other: Pair) -> bool:
-    a, b = (s.point.arclength for s in one)
-    p, q = (s.point.arclength for s in other)
-    return a <= q and p <= b
+def _within(pair: Pair, low: float, high: float) -> bool:
+    """Whether a passage lies between two places."""
+    return low <= pair[0].point.arclength and pair[1].point.arclength <= high
+
+
+def _distance(pair: Pair, place: float) -> float:
+    """How far outside a pair of samples a place lies; 0 inside."""
+    a, b = (s.point.arclength for s in pair)
+    return max(a - place, place - b, 0.0)
 
 
 __all__ = ["DoublingWatch", "leading"]
