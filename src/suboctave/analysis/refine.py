@@ -92,7 +92,7 @@ def solved_bifurcation(
     guess = _guess_from(solution, curve, size)
     state = solution.state
     layer = layer_of(kind, solution, guess)
-    orbit = as_orbit(state, solution.residual, truncation(state), curve)
+    orbit = as_orbit(state, solution.balance_residual, truncation(state), curve)
     return Bifurcation(
         kind.name,
         orbit,

@@ -27,6 +27,7 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.trace import Settings, Trace
 from suboctave.analysis.ways import both_ways
+from suboctave.bifurcation.formulation import Formulation
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
@@ -93,6 +94,7 @@ def find_subharmonics(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
     linear: LinearPart | None = None,
 ) -> list[Branch]:
     """Branches of motions of `subharmonic` load periods in a range of frequencies, each once; empty if none is found.
@@ -114,7 +116,7 @@ def find_subharmonics(
     check_system(system, (first, last))
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
-    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
     low, high = min(first, last), max(first, last)
     curve = make_curve(system, "omega", first, high - low, harmonics, order, linear)
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))

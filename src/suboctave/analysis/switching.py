@@ -24,6 +24,7 @@ from suboctave.analysis.trace import Settings, Trace
 from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation
+from suboctave.bifurcation.formulation import FORMULATIONS, Formulation
 from suboctave.bifurcation.solve import Singular
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
@@ -63,6 +64,7 @@ def switch_branch(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
 ) -> Branch:
     """The branch that leaves another one at a period doubling or a branch point, with stability and bifurcations.
 
@@ -120,6 +122,7 @@ def switch_branch(
         known.newton if newton is None else newton,
         known.stepping if stepping is None else stepping,
         known.stability if stability is None else stability,
+        known.formulation if formulation is None else formulation,
     )
     settings = replace(settings, half=kind == "BP" and side is not None)
     nu = orbit.basis.nu * (2 if kind == "PD" else 1)
@@ -174,6 +177,12 @@ class Inherited:
         """The name of the stability method; one with options of its own has to be given again."""
         known = self.options.get("stability")
         return known if known in METHODS else None
+
+    @property
+    def formulation(self) -> str | None:
+        """The name of the formulation; one with options of its own has to be given again."""
+        known = self.options.get("formulation")
+        return known if known in FORMULATIONS else None
 
 
 def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:

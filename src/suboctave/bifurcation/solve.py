@@ -74,6 +74,11 @@ class Singular:
     residual: float
     iterations: int
 
+    @property
+    def balance_residual(self) -> float:
+        """Residual of the equations of motion alone, in units of the forces that balance."""
+        return min(self.residual, self.state.residual_size() / max(self.state.force_scale(), NOTHING))
+
     @lazy
     def floquet(self) -> FloquetResult:
         """Its multipliers."""
