@@ -7,7 +7,7 @@ import pytest
 
 import suboctave as so
 from suboctave.bifurcation.normal_form_real import doubling_predictor
-from suboctave.timedomain import integrate
+from suboctave.timedomain import integrate, shoot
 
 
 def along(balance, start, first, eps, at, values, omega, name):
@@ -88,6 +88,22 @@ def test_the_doubled_branch_bends_as_foretold(system, omega, share, rel):
         assert doubled_curvature(b, share) == pytest.approx(form["curvature"], rel=rel)
         # it lies where the parent is unstable (d > 0: above) exactly if it is supercritical
         assert (b.criticality == "supercritical") == (form["d"] * form["curvature"] > 0.0)
+
+
+def test_the_doubled_branch_by_shooting():
+    """Motions of two load periods, found without harmonics: their halves differ by 2 eps phi, eps^2 as foretold."""
+    (b,) = so.frequency_response(so.library.reference_oscillator(p=0.55), (2.4, 2.2)).bifurcations["PD"]
+    predictor = doubling_predictor(b.orbit.state(), b.null_vectors, "omega")
+    eps = 0.01 * size_of(b)
+    x, change = predictor.at(eps)
+    frequency = np.arange(1, predictor.basis.harmonics + 1) * 0.5 * b.omega
+    state = [x[0, 0] + x[1::2].sum(), frequency @ x[2::2, 0]]
+    found = shoot(b.orbit.balance.system, state, b.omega + change, periods=2)
+    half = integrate(b.orbit.balance.system, found.state, [0.0, 2.0 * np.pi / found.omega], found.omega)
+    phi = np.array([predictor.first[1::2].sum(), frequency @ predictor.first[2::2, 0]])
+    across = 0.5 * (found.state - np.array([half.x[-1, 0], half.v[-1, 0]]))
+    assert across / eps == pytest.approx(phi, abs=2e-3)
+    assert found.stable
 
 
 @pytest.mark.parametrize("hardening", [0.3, -0.3])

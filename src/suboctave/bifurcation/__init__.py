@@ -3,6 +3,7 @@
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, KINDS, Bifurcation, BifurcationList
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.kinds import ALL_KINDS, BifurcationKind, Sample
+from suboctave.bifurcation.normal_form import NormalForm
 
 __all__ = [
     "ALL_KINDS",
@@ -12,5 +13,6 @@ __all__ = [
     "BifurcationKind",
     "BifurcationList",
     "GrazingContact",
+    "NormalForm",
     "Sample",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import ROUNDING, Terms, unweighted
+from suboctave.bifurcation.normal_form_terms import ROUNDING, Terms, unweighted
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient

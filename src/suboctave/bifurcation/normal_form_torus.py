@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import NormalForm, Terms, unweighted
+from suboctave.bifurcation.normal_form_terms import NormalForm, Terms, unweighted
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.state import BalanceState
