@@ -201,6 +201,18 @@ def test_self_excitation_against_its_closed_form(cubic, damping, quadratic, prod
     assert b.criticality == ("supercritical" if growth < 0.0 else "subcritical")
 
 
+@pytest.mark.parametrize(("omega", "words"), [(3.0, "1:3"), (4.0, "1:4"), (3.02, "1:3")])
+def test_strong_resonances_are_stated(omega, words):
+    """An oscillator of frequency one beside a load of three or four: the normal form has further terms there."""
+    force = "0.1*x'**3 + 0.4*x**2"
+    loads = [so.HarmonicLoad(0, 1e-3)]
+    system = so.System(1.0, "mu", 1.0, [so.Expression(0, force)], loads, parameters={"mu": 0.02})
+    start = so.frequency_response(system, (omega, omega + 0.01)).orbits[0]
+    (b,) = so.continue_branch(start, "mu", (0.02, -0.02)).bifurcations
+    assert f"strong resonance {words}" in b.remark()
+    assert b.criticality == ("supercritical" if omega == 3.02 else None)
+
+
 def test_decay_towards_a_neimark_sacker_point():
     """At the point itself `1 / |A|^2` grows by -2 c3 per time: A from a long integration, by the left eigenvector."""
     curve = so.frequency_response(so.library.nltva(0.11), (1.1, 1.12), 9)

@@ -81,7 +81,7 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
     if kind == "BP":
         return normal_form_branch.labelled(form, found)
     if kind == "NS":
-        form = normal_form_torus.labelled(form, kappa / state.rate)
+        return normal_form_torus.labelled(with_criticality(form), kappa / state.rate)
     return form if kind == "LP" else with_criticality(form)
 
 

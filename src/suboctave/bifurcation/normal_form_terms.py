@@ -79,8 +79,7 @@ def with_criticality(form: NormalForm) -> NormalForm:
         if value is None or error is None:
             continue
         if not abs(value) > error:
-            remark = "; ".join(part for part in (form.remark, words) if part)
-            return replace(form, criticality=None, remark=remark)
+            return replace(form, criticality=None, remark=words)
     return replace(form, criticality=SUPERCRITICAL if form.coefficients["c3"] < 0.0 else SUBCRITICAL)
 
 

@@ -75,5 +75,5 @@ def labelled(form: NormalForm, share: float) -> NormalForm:
         return form
     words = f"kappa lies {distance:.1e} w0 from the strong resonance 1:{q}"
     if distance > _RESONANT:
-        return replace(form, remark=words)
-    return replace(form, remark=words, errors={**form.errors, "c3": float("inf")})
+        return replace(form, remark="; ".join(part for part in (words, form.remark) if part))
+    return replace(form, remark=words, criticality=None)
