@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.bifurcation.normal_form_real import doubling_predictor
+from suboctave.bifurcation.normal_form_terms import with_criticality
+from suboctave.errors import InputError
 from suboctave.timedomain import integrate, shoot
 
 
@@ -248,6 +251,32 @@ def test_generalised_period_doublings_of_the_sharp_law():
         signs.append(b.criticality)
         assert b.normal_form["curvature"] == pytest.approx(doubled_curvature(b, 1e-4), rel=1e-2)
     assert signs == ["supercritical", "subcritical", "supercritical"]
+
+
+@pytest.mark.parametrize(
+    ("c3", "g", "criticality", "words"),
+    [
+        (-1.0, 1.0, "supercritical", ""),
+        (1.0, 1.0, "subcritical", ""),
+        (-0.05, 1.0, None, "zero within its error"),
+        (-1.0, 1e-9, None, "double multiplier"),
+        (np.nan, 1.0, None, "zero within its error"),
+    ],
+)
+def test_a_sign_is_read_where_it_is_certain(c3, g, criticality, words):
+    form = with_criticality(NormalForm("PD", "omega", {"c3": c3, "g": g}, {"c3": 0.1, "g": 1e-6}))
+    assert form.criticality == criticality
+    assert words in form.remark
+
+
+def test_wrong_names_are_refused(duffing):
+    b = duffing.bifurcations[0]
+    with pytest.raises(InputError, match="did you mean 'omega'"):
+        normal_form("LP", b.orbit.state(), b.null_vectors, "omga")
+    with pytest.raises(InputError, match="has no normal form"):
+        normal_form("grazing", b.orbit.state(), b.null_vectors, "omega")
+    with pytest.raises(InputError, match="did you mean 'curvature'"):
+        b.normal_form["curvatur"]
 
 
 def test_no_verdict_behind_a_grazing():

@@ -68,15 +68,16 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
         raise InputError(f"unknown parameter {name!r}{suggest(name, known)}")
     terms = _TERMS[kind]
     found = terms(state, vectors, name, kappa)
-    coarse = _coarser(state, vectors, FORMS[kind], kappa)
-    other = None if coarse is None else terms(*coarse, name, kappa)
-    errors = {}
-    for key, size in found.sizes.items():
-        # harmonics left out matter like 1 / H where a contact is hard: a third of them tells half of what is missing
-        change = 0.0
-        if other is not None:
-            change = 2.0 * abs(found.coefficients[key] - other.coefficients[key] * found.unit / other.unit)
-        errors[key] = max(change, ROUNDING * size)
+    errors = {key: ROUNDING * size for key, size in found.sizes.items()}
+    # harmonics left out matter like 1 / H where a contact is hard; two numbers, as a single change may vanish by chance
+    for high, missing in ((2 * state.basis.harmonics // 3, 2.0), (state.basis.harmonics // 2, 1.0)):
+        coarse = _coarser(state, vectors, FORMS[kind], kappa, high)
+        if coarse is None:
+            continue
+        other = terms(*coarse, name, kappa)
+        for key in errors:
+            change = found.coefficients[key] - other.coefficients[key] * found.unit / other.unit
+            errors[key] = max(errors[key], missing * abs(change))
     form = NormalForm(kind, name, found.coefficients, errors)
     if kind == "BP":
         return normal_form_branch.labelled(form, found)
@@ -86,11 +87,10 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
 
 
 def _coarser(
-    state: BalanceState, vectors: NullVectors, kind: Kind, kappa: float
+    state: BalanceState, vectors: NullVectors, kind: Kind, kappa: float, high: int
 ) -> tuple[BalanceState, NullVectors] | None:
-    """The motion with two thirds of its harmonics, its null vectors turned like those given; None with few of them."""
+    """The motion with `high` of its harmonics, its null vectors turned like those given; None with too few of them."""
     balance, basis = state.balance, state.basis
-    high = 2 * basis.harmonics // 3
     if high < max(1, balance.highest_load * basis.nu):
         return None
     fewer = HarmonicBasis(high, basis.nu)

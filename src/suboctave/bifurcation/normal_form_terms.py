@@ -30,7 +30,8 @@ class NormalForm:
         By name, see `bifurcation.normal_form`. LP: a, b, g, curvature. PD: c3, d, g, curvature. BP: a, b, c, g, and at
         a pitchfork c3, curvature. NS: c3, d (growth), c3_frequency, d_frequency (their imaginary parts), curvature.
     errors
-        Estimated errors of those that decide, by the same names: how they change with two thirds of the harmonics.
+        Estimated errors of those that decide, by the same names: from how they change with two thirds and with half of
+        the harmonics.
     criticality
         "supercritical", "subcritical", or None: at an LP, at a transcritical BP, and where no sign is certain.
     shape
