@@ -22,7 +22,21 @@ from typing import TYPE_CHECKING
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
-    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, verify
+    from suboctave.analysis import (
+        BifurcationDiagram,
+        Branch,
+        Results,
+        Seeds,
+        bifurcation_diagram,
+        continue_branch,
+        find_subharmonics,
+        frequency_response,
+        load,
+        periodic_orbit,
+        stability,
+        switch_branch,
+        verify,
+    )
     from suboctave.bifurcation import Bifurcation
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
@@ -82,10 +96,16 @@ _HOME = {
     "SteppingOptions": "suboctave.continuation",
     "Event": "suboctave.continuation",
     "Bifurcation": "suboctave.bifurcation",
+    "BifurcationDiagram": "suboctave.analysis",
     "Branch": "suboctave.analysis",
+    "bifurcation_diagram": "suboctave.analysis",
+    "find_subharmonics": "suboctave.analysis",
     "frequency_response": "suboctave.analysis",
+    "periodic_orbit": "suboctave.analysis",
+    "Seeds": "suboctave.analysis",
     "continue_branch": "suboctave.analysis",
     "stability": "suboctave.analysis",
+    "switch_branch": "suboctave.analysis",
     "Arbitration": "suboctave.stability",
     "Monodromy": "suboctave.stability",
     "Hill": "suboctave.stability",
@@ -106,6 +126,7 @@ __all__ = [
     "BaseAcceleration",
     "BaseDisplacement",
     "Bifurcation",
+    "BifurcationDiagram",
     "Branch",
     "Callable",
     "Clearance",
@@ -131,19 +152,24 @@ __all__ = [
     "QuadraticDamper",
     "Results",
     "RotatingUnbalance",
+    "Seeds",
     "StaticLoad",
     "SteppingOptions",
     "SuboctaveError",
     "System",
     "TanhFriction",
     "__version__",
+    "bifurcation_diagram",
     "check_derivatives",
     "continue_branch",
+    "find_subharmonics",
     "frequency_response",
     "library",
     "load",
+    "periodic_orbit",
     "plot",
     "stability",
+    "switch_branch",
     "verify",
     "write_report",
 ]

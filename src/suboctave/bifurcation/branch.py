@@ -34,7 +34,8 @@ def locate_branch_point(guess: Guess) -> Singular:
     borders = null_vectors(guess.state(), Kind.INTEGER)
     start = guess.state()
     rows = 1.0 / np.tile(start.balance.scales()[1], start.basis.size)
-    force = max(start.force_scale(), NOTHING)
+    # at rest nothing balances, yet a motion may branch off (parametric excitation)
+    force = max(start.force_scale(), guess.size * guess.omega**2, NOTHING)
     last: list[Bordered] = []
 
     def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
