@@ -109,6 +109,21 @@ def test_the_doubled_branch_by_shooting():
     assert found.stable
 
 
+def test_doubled_branches_leave_on_the_side_foretold():
+    """Beside a stable parent a supercritical branch is stable, a subcritical one is not."""
+    curve = so.frequency_response(so.library.reference_oscillator(p=1.7), (1.45, 1.3))
+    words = []
+    for b in curve.bifurcations["PD"]:
+        branch = so.switch_branch(b)
+        begin = int(np.argmin(np.abs(branch.omega - b.omega)))
+        near = slice(begin + 1, begin + 4) if begin < len(branch) // 2 else slice(begin - 3, begin)
+        side = np.sign(b.normal_form["curvature"])
+        assert np.all(np.sign(branch.omega[near] - b.omega) == side)
+        assert np.all(branch.stable[near] == (b.criticality == "supercritical"))
+        words.append(b.criticality)
+    assert words == ["supercritical", "subcritical"]
+
+
 @pytest.mark.parametrize("hardening", [0.3, -0.3])
 def test_parametric_resonance_against_one_harmonic(hardening):
     """`x = a cos(W t + .)`, W = omega / 2: `(1 - W^2 + 3/4 gamma a^2)^2 + (c W)^2 = (eps / 2)^2`."""
