@@ -355,8 +355,10 @@ class _Reader:
             if said["context"] is not None:
                 context = dict(self.tables["contexts"][said["context"]])
                 context["system"] = self.systems[context["system"]]
-            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **said["fields"])
-            events.append(event.with_normal_form(said["normal_form"]))
+            # older files hold no normal forms: they are computed when asked for
+            fields = {name: value for name, value in said["fields"].items() if name != "criticality"}
+            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            events.append(event.with_normal_form(said["normal_form"]) if "normal_form" in said else event)
         return events
 
 

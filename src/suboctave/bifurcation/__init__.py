@@ -10,6 +10,7 @@ from suboctave.bifurcation.formulation import (
     formulation_of,
 )
 from suboctave.bifurcation.kinds import ALL_KINDS, BifurcationKind, Sample
+from suboctave.bifurcation.normal_form import NormalForm
 
 __all__ = [
     "ALL_KINDS",
@@ -23,6 +24,7 @@ __all__ = [
     "ExtendedSystem",
     "Formulation",
     "GrazingContact",
+    "NormalForm",
     "Sample",
     "formulation_of",
 ]
