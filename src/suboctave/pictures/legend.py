@@ -53,7 +53,7 @@ def _covers(figure: Figure, axes: Axes, legend: Legend) -> bool:
     if box.x0 < frame.x0 - 1 or box.x1 > frame.x1 + 1 + 2 * style.MARKER_SIZE or box.height > 0.7 * frame.height:
         return True  # it would stick out, or leave no room for anything else
     for line in axes.get_lines():
-        x, y = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()])).T
+        x, y = line.get_transform().transform(np.column_stack([line.get_xdata(), line.get_ydata()])).T
         if x.size == 0:
             continue
         # Points every pixel or so along the line: a long piece may cross a box that holds none of its ends.
@@ -73,8 +73,8 @@ def ordered(entries: dict[str, Line2D]) -> dict[str, Line2D]:
     def rank(name: str) -> tuple[int, int]:
         if name in lines:
             return 1, lines.index(name)
-        if name in kinds:
-            return 2, kinds.index(name)
+        if name.split(",")[0] in kinds:
+            return 2, kinds.index(name.split(",")[0])
         return (0, 0) if entries[name].get_marker() == "None" else (3, 0)
 
     return {name: entries[name] for name in sorted(entries, key=rank)}
