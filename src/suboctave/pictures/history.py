@@ -50,8 +50,8 @@ def plot_history(
 ) -> Figure:
     """Draw motions, or the force of an element along them, over one response period.
 
-    Time is counted in load periods from phase zero of the load; circles are the stroboscopic instants, thin lines the
-    gaps of elements that act on the degree of freedom alone.
+    Time is counted in load periods from phase zero of the load; beside motions of longer period shorter ones go on, thin.
+    Circles are the stroboscopic instants, thin grey lines the gaps of elements that act on the degree of freedom alone.
 
     Parameters
     ----------
@@ -78,24 +78,35 @@ def plot_history(
     check_path(path)
     datasets = motion_datasets(motions, points, dof, () if element is None else (element,))
     frames = Frames(datasets, view, overlay=overlay, labels=labels, size=size, cell=_CELL, stacked=True)
+    longest = max(_length(dataset, view) for dataset in datasets)
     for index in lower_first(datasets):
-        _draw(frames, index, datasets[index], view)
+        _draw(frames, index, datasets[index], view, longest)
     if quantity == "displacement":
         draw_gaps(frames, datasets, view, upright=False)
-    frames.frames[0].margins(x=0.02)
+    frames.frames[0].set_xlim(-0.02 * longest, 1.02 * longest)
+    if frequency is None and omega_reference is None and longest > 1.5:
+        from matplotlib.ticker import MaxNLocator
+
+        frames.frames[0].xaxis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 5, 10]))
     return frames.finish(xlabel or _across(view), ylabel or _upwards(datasets[0], view), title, path)
 
 
-def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView) -> None:
+def _length(dataset: xarray.Dataset, view: MotionView) -> float:
+    """The response period on the axis."""
+    return float(dataset["time"].to_numpy()[-1]) * _unit_of_time(dataset, view)
+
+
+def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView, longest: float) -> None:
     axes, look, curve = frames.axes[index], frames.look, frames.looks[index]
-    unit = _unit_of_time(dataset, view)
-    values = _values(dataset, view)
+    values, length = _values(dataset, view), _length(dataset, view)
     line: dict[str, Any] = {"color": curve.colour, "linewidth": look.line * (curve.width if frames.overlay else 1.0)}
-    time = dataset["time"].to_numpy() * unit
+    time = dataset["time"].to_numpy() * _unit_of_time(dataset, view)
     axes.plot(time, values, zorder=3, solid_joinstyle="round", gid="motion", **line)
+    for repeated in range(1, math.ceil(longest / length - 1e-9)):
+        axes.plot(time + repeated * length, values, zorder=2.5, gid="repeated", **{**line, "linewidth": 0.5 * look.line})
     if frames.overlay:
-        frames.add(frames.names[index], line)
-    at = dataset["section_time"].to_numpy() * unit
+        frames.add(frames.names[index], line, last=False)
+    at = dataset["section_time"].to_numpy() * _unit_of_time(dataset, view)
     draw_sections(frames, index, at, np.interp(at, time, values))
 
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 __all__ = [
     "DERIVATIVES",
@@ -48,6 +47,8 @@ _CALLED = ("displacement", "velocity", "acceleration")
 _COLUMNS = 4
 #: inches of width below which captions and labels are cut short
 _NARROW = 1.9
+#: inches of width of a figure above which there is room for the most columns
+_WIDE = 5.0
 
 
 @dataclass(frozen=True)
@@ -129,22 +130,22 @@ def differing(datasets: Sequence[xarray.Dataset]) -> list[list[str]]:
     return [[f"{name} = {known[name]:.4g}" for name in names] for known in values]
 
 
-def captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[tuple[str, str]]:
-    """What is said of each motion: T, 2T, ... with the kind of a bifurcation; frequency and what differs."""
+def captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:
+    """What is said of each motion: T, 2T, ... with the kind of a bifurcation; frequency; what differs."""
     told = []
     for dataset, words in zip(datasets, differing(datasets), strict=True):
         kind = str(dataset.attrs.get("kind", ""))
         period = period_name(period_of(dataset))
         frequency = view.at_frequency(float(dataset.attrs["omega"]))
-        told.append((f"{period}, {kind}" if kind else period, ", ".join([frequency, *words])))
+        told.append([f"{period}, {kind}" if kind else period, frequency, *words])
     return told
 
 
 class Frames:
     """The frames of one figure and what is drawn in which: one for each motion on shared axes, or one for all.
 
-    `axes`, one for each motion; `narrow`, whether there is little room for words; `looks`, the style of each motion; `legend`, entries to which the drawing
-    adds.
+    `axes`, one for each motion; `narrow`, whether there is little room for words; `looks`, the style of each motion; `legend` and
+    `last`, its entries, first those of single motions.
     """
 
     def __init__(
@@ -169,7 +170,7 @@ class Frames:
             raise InputError(f"the motions are of different degrees of freedom ({dofs}): choose one with dof=")
         frames = 1 if overlay else count
         self.overlay = overlay and count > 1
-        columns = 1 if stacked else _columns(frames)
+        columns = 1 if stacked else _columns(frames, size)
         rows = math.ceil(frames / columns)
         inches = _inches(size, columns, rows, cell)
         self.look = style.PRINT if isinstance(size, str) else style.look_of(inches[0] / columns)
@@ -183,13 +184,12 @@ class Frames:
             every[index - columns].tick_params(labelbottom=True)
         self.axes = self.frames * count if overlay else self.frames
         self.narrow = inches[0] / columns < _NARROW
-        told = [(", ", "\n")[self.narrow and not overlay].join(parts) for parts in captions(datasets, view)]
+        told = [("\n" if self.narrow and not overlay else ", ").join(parts) for parts in captions(datasets, view)]
         self.names = told if labels is None else [_plain(label) for label in labels]
         periods = [period_of(dataset) for dataset in datasets]
         # in frames of their own motions of one period need not differ
         self.looks = styles_of_periods(periods, self.names if overlay else [""] * count)
-        self.legend: dict[str, Line2D] = {}
-        #: what ends the legend
+        self.legend: dict[str, dict[str, Any]] = {}
         self.last: dict[str, dict[str, Any]] = {}
         if not self.overlay:
             for index, axes in enumerate(self.frames):
@@ -197,23 +197,23 @@ class Frames:
                 axes.set_title(above, fontsize=self.look.normal, color=style.INK)
         self._edges = (columns, frames)
 
-    def add(self, name: str, drawing: dict[str, Any]) -> None:
-        """An entry of the legend; the first of a name stays."""
-        from matplotlib.lines import Line2D
-
-        self.legend.setdefault(name, Line2D([], [], **drawing))
+    def add(self, name: str, drawing: dict[str, Any], last: bool = True) -> None:
+        """An entry of the legend, motions before what is said of all of them; the first of a name stays."""
+        (self.last if last else self.legend).setdefault(name, drawing)
 
     def finish(self, across: str, upwards: str, title: str | None, path: str | Path | None) -> Figure:
         """Labels, legend, title; saved where a path is given."""
-        for name, drawing in self.last.items():
-            self.add(name, drawing)
+        from matplotlib.lines import Line2D
+
         columns, frames = self._edges
         for index, axes in enumerate(self.frames):
             lowest = index + columns >= frames
             _dress(axes, across if lowest else "", upwards if index % columns == 0 else "", self.look)
         if title:
             self.figure.suptitle(_plain(title), fontsize=self.look.large, color=style.INK)
-        place_legend(self.figure, self.frames, self.legend, self.look)
+        entries = {name: Line2D([], [], **drawing) for name, drawing in {**self.legend, **self.last}.items()}
+        # beside several frames: inside one of them it would seem to be about that one
+        place_legend(self.figure, self.frames if frames == 1 else [], entries, self.look)
         if path is not None:
             save_figure(self.figure, path)
         # Notebooks show an object that has this; without pyplot nothing else would tell them to.
@@ -262,9 +262,10 @@ def check_path(path: str | Path | None) -> None:
         raise InputError(f"cannot tell the form of {Path(path).name!r} from its suffix{suggest(suffix, SUFFIXES)}")
 
 
-def _columns(frames: int) -> int:
+def _columns(frames: int, size: str | tuple[float, float] | None) -> int:
     """As few rows as fit, evenly filled."""
-    return math.ceil(frames / math.ceil(frames / _COLUMNS))
+    most = _COLUMNS if size is None or style.size_in_inches(size)[0] > _WIDE else _COLUMNS - 1
+    return math.ceil(frames / math.ceil(frames / most))
 
 
 def _inches(
@@ -274,10 +275,8 @@ def _inches(
     if size is None:
         return 0.8 + cell[0] * columns, 0.7 + cell[1] * rows
     width, height = style.size_in_inches(size)
-    if isinstance(size, str):
-        if columns == 1 and rows == 1:
-            return width, height
-        return width, 0.55 + rows * min(height, width / columns * cell[1] / cell[0])
+    if isinstance(size, str) and max(columns, rows) > 1:
+        return width, 0.55 + rows * min(height, 0.75 * cell[1], width / columns * cell[1] / cell[0])
     return width, height
 
 

@@ -93,6 +93,6 @@ def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView)
     line = {"color": curve.colour, "linewidth": look.line * (curve.width if frames.overlay else 1.0)}
     axes.plot(x, v, zorder=3, solid_joinstyle="round", gid="motion", **line)
     if frames.overlay:
-        frames.add(frames.names[index], line)
+        frames.add(frames.names[index], line, last=False)
     places = [dataset[f"section_{name}"].to_numpy() * view.factor(d) for d, name in enumerate(("displacement", "velocity"))]
     draw_sections(frames, index, *places)

@@ -92,8 +92,9 @@ def plot_spectrum(
     datasets = motion_datasets(motions, points, dof)
     frames = Frames(datasets, view, overlay=overlay, labels=labels, size=size, cell=_CELL, stacked=True)
     most = highest or max(_ends(dataset) * (1.0 + _BEYOND) for dataset in datasets)
-    for index in lower_first(datasets):
-        _draw(frames, index, datasets[index], view, most)
+    ends = [_draw(frames, index, datasets[index], view, most) for index in lower_first(datasets)]
+    for drawing in filter(None, ends):
+        frames.add("neglected (estimated)", drawing)
     _axis(frames, datasets, view, most)
     upwards = view.name(datasets[0], DERIVATIVES[quantity]).replace("$", r"$|c_k|$ of $", 1)
     return frames.finish(xlabel or _across(view), ylabel or upwards, title, path)
@@ -118,7 +119,10 @@ def _across(view: MotionView) -> str:
     return r"frequency / forcing frequency" if view.omega_reference is None else r"frequency / $\omega_0$"
 
 
-def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView, most: float) -> None:
+def _draw(
+    frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView, most: float
+) -> dict[str, Any] | None:
+    """Draw one motion's components; returns how the end of what was solved for is drawn, if it is."""
     axes, look = frames.axes[index], frames.look
     unit, order, nu = _unit_of_axis(dataset, view), DERIVATIVES[view.quantity], period_of(dataset)
     parts = {}
@@ -128,7 +132,11 @@ def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView,
         parts[name] = at, np.abs(dataset[f"amplitude_of_{name}"].to_numpy()) * rate * view.factor(order)
     largest = parts["component"][1].max()
     shape = _MARKERS[index % len(_MARKERS)] if frames.overlay else _MARKERS[0]
-    size = 0.62 * style.MARKER_SIZE * look.marker
+    # where components stand close their markers must not become one
+    apart = 0.85 * 72.0 * float(frames.figure.get_size_inches()[0]) / (most * max(nu, 1) + 1.0)
+    size = min(0.62 * style.MARKER_SIZE * look.marker, max(0.8 * apart, 1.3))
+    width = min(0.8 * look.line, max(0.3 * apart, 0.2))
+    hollow = frames.overlay and index > 0  # so that one behind it shows
     for name, (at, height) in parts.items():
         shown = (height > _NOTHING * largest) & (at <= most * (1.0 + 1e-9))
         periods = np.array([Fraction(round(m * nu), nu).denominator for m in at])
@@ -141,29 +149,26 @@ def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView,
                 "marker": shape,
                 "markersize": size if solved else 0.8 * size,
                 "markeredgecolor": colour,
-                "markerfacecolor": colour if solved else "#ffffff",
-                "markeredgewidth": look.edge,
+                "markerfacecolor": colour if solved and not hollow else "none" if solved else "#ffffff",
+                "markeredgewidth": min(look.edge, 0.25 * size),
             }
             if solved and not frames.overlay:
-                axes.vlines(at[chosen] * unit, 0.0, height[chosen], color=colour, linewidth=0.8 * look.line, zorder=2)
+                axes.vlines(at[chosen] * unit, 0.0, height[chosen], color=colour, linewidth=width, zorder=2)
             axes.plot(at[chosen] * unit, height[chosen], zorder=3, gid=f"{name} {q}", **drawing)
             if solved:
-                frames.add(r"at $k\,\omega$" if q == 1 else rf"at $k\,\omega/{q}$", {**drawing, "marker": "o"})
+                frames.add(r"at $k\,\omega$" if q == 1 else rf"at $k\,\omega/{q}$", {**drawing, "marker": "o", "markersize": 0.62 * style.MARKER_SIZE * look.marker, "markerfacecolor": colour})
     if frames.overlay:
-        plain = {"linestyle": "none", "marker": shape, "markersize": size, "markerfacecolor": "#ffffff"}
-        frames.add(frames.names[index], {**plain, "markeredgecolor": style.INK, "markeredgewidth": look.edge})
+        inside = "none" if hollow else style.INK
+        plain = {"linestyle": "none", "marker": shape, "markersize": size, "markerfacecolor": inside}
+        edge = {"markeredgecolor": style.INK, "markeredgewidth": look.edge}
+        frames.add(frames.names[index], {**plain, **edge}, last=False)
     end = _ends(dataset) + 0.5 / nu
-    if end < most:
-        dotted = {"color": style.SOFT, "linewidth": 0.9 * look.line, "linestyle": (0, (1.0, 1.5))}
-        axes.axvline(end * unit, zorder=1, gid="truncation", **dotted)
-        hollow = {"linestyle": (0, (1.0, 1.5)), "color": style.SOFT, "linewidth": 0.9 * look.line, "marker": shape}
-        frames.last["neglected (estimated)"] = {
-            **hollow,
-            "markersize": 0.8 * size,
-            "markerfacecolor": "#ffffff",
-            "markeredgecolor": style.INK,
-            "markeredgewidth": look.edge,
-        }
+    if end >= most:
+        return None
+    dotted = {"color": style.SOFT, "linewidth": 0.9 * look.line, "linestyle": (0, (1.0, 1.5))}
+    axes.axvline(end * unit, zorder=1, gid="truncation", **dotted)
+    edge = {"markeredgecolor": style.INK, "markeredgewidth": look.edge}
+    return {**dotted, **edge, "marker": "o", "markersize": 0.5 * style.MARKER_SIZE * look.marker, "markerfacecolor": "w"}
 
 
 def _axis(frames: Frames, datasets: Sequence[xarray.Dataset], view: MotionView, most: float) -> None:
@@ -197,5 +202,5 @@ def _ticks(axes: Axes, nu: int, most: float) -> None:
         axes.xaxis.set_major_formatter(FixedFormatter([str(place) for place in places]))
         return
     axes.xaxis.set_major_locator(MaxNLocator(nbins=12, integer=True))
-    if nu * most <= 130.0:
+    if most <= 130.0:
         axes.xaxis.set_minor_locator(MultipleLocator(1.0))
