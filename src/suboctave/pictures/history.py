@@ -18,7 +18,6 @@ from suboctave.pictures.motions import (
     draw_sections,
     lower_first,
 )
-from suboctave.store.motions import motion_datasets
 
 if TYPE_CHECKING:
     import xarray
@@ -50,7 +49,7 @@ def plot_history(
 ) -> Figure:
     """Draw motions, or the force of an element along them, over one response period.
 
-    Time is counted in load periods from phase zero of the load; beside motions of longer period shorter ones go on, thin.
+    Time is counted in load periods from phase zero of the load; beside a motion of longer period others go on, thin.
     Circles are the stroboscopic instants, thin grey lines the gaps of elements that act on the degree of freedom alone.
 
     Parameters
@@ -73,6 +72,8 @@ def plot_history(
     InputError
         For what cannot be drawn, before anything is.
     """
+    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
+
     view = MotionView(quantity, element, frequency, omega_reference, scale, unit, xlabel, ylabel)
     view.check_quantity([*DERIVATIVES, "force"])
     check_path(path)
@@ -103,7 +104,9 @@ def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView,
     time = dataset["time"].to_numpy() * _unit_of_time(dataset, view)
     axes.plot(time, values, zorder=3, solid_joinstyle="round", gid="motion", **line)
     for repeated in range(1, math.ceil(longest / length - 1e-9)):
-        axes.plot(time + repeated * length, values, zorder=2.5, gid="repeated", **{**line, "linewidth": 0.5 * look.line})
+        axes.plot(
+            time + repeated * length, values, zorder=2.5, gid="repeated", **{**line, "linewidth": 0.5 * look.line}
+        )
     if frames.overlay:
         frames.add(frames.names[index], line, last=False)
     at = dataset["section_time"].to_numpy() * _unit_of_time(dataset, view)

@@ -1,7 +1,7 @@
 """What pictures of single motions have in common: units, frames, captions, colours.
 
-A motion is a dataset (`suboctave.store.motions`), so that a picture is the same from a live orbit, from a branch and from
-a file. Motions stand in frames of their own on shared axes, or all in one.
+A motion is a dataset (`suboctave.store.motions`), so that a picture is the same from a live orbit, from a branch and
+from a file. Motions stand in frames of their own on shared axes, or all in one.
 """
 
 from __future__ import annotations
@@ -49,6 +49,8 @@ _COLUMNS = 4
 _NARROW = 1.9
 #: inches of width of a figure above which there is room for the most columns
 _WIDE = 5.0
+#: inches of one line of a caption
+_LINE = 0.13
 
 
 @dataclass(frozen=True)
@@ -144,8 +146,8 @@ def captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[
 class Frames:
     """The frames of one figure and what is drawn in which: one for each motion on shared axes, or one for all.
 
-    `axes`, one for each motion; `narrow`, whether there is little room for words; `looks`, the style of each motion; `legend` and
-    `last`, its entries, first those of single motions.
+    `axes`, one for each motion; `narrow`, whether there is little room for words; `looks`, the style of each motion;
+    `legend` and `last`, the legend's entries, first those of single motions.
     """
 
     def __init__(
@@ -173,6 +175,10 @@ class Frames:
         columns = 1 if stacked else _columns(frames, size)
         rows = math.ceil(frames / columns)
         inches = _inches(size, columns, rows, cell)
+        self.narrow = inches[0] / columns < _NARROW
+        told = [("\n" if self.narrow and not overlay else ", ").join(parts) for parts in captions(datasets, view)]
+        if isinstance(size, str) and not overlay and rows * columns > 1:  # room for what stands over the frames
+            inches = inches[0], inches[1] + rows * _LINE * (told[0].count("\n") + (labels is not None))
         self.look = style.PRINT if isinstance(size, str) else style.look_of(inches[0] / columns)
         self.figure: Figure = Figure(figsize=inches, layout="constrained", facecolor="white")
         FigureCanvasAgg(self.figure)
@@ -183,8 +189,6 @@ class Frames:
             every[index].remove()
             every[index - columns].tick_params(labelbottom=True)
         self.axes = self.frames * count if overlay else self.frames
-        self.narrow = inches[0] / columns < _NARROW
-        told = [("\n" if self.narrow and not overlay else ", ").join(parts) for parts in captions(datasets, view)]
         self.names = told if labels is None else [_plain(label) for label in labels]
         periods = [period_of(dataset) for dataset in datasets]
         # in frames of their own motions of one period need not differ
@@ -242,7 +246,7 @@ def draw_sections(frames: Frames, index: int, x: np.ndarray, y: np.ndarray) -> N
 
 def draw_gaps(frames: Frames, datasets: Sequence[xarray.Dataset], view: MotionView, upright: bool) -> None:
     """Thin lines at the gaps that the widest of the motions reaches, or nearly so."""
-    drawing = {"color": style.SOFT, "linewidth": 0.6 * frames.look.line}
+    drawing: dict[str, Any] = {"color": style.SOFT, "linewidth": 0.6 * frames.look.line}
     reach = 1.25 * max(float(dataset.attrs["amplitude"]) for dataset in datasets)
     drawn: set[tuple[int, float]] = set()
     for axes, dataset in zip(frames.axes, datasets, strict=True):

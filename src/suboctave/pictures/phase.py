@@ -1,7 +1,6 @@
 """Phase portraits: dx/dt over x along one response period, with the stroboscopic points of the load's period.
 
-A motion of nu load periods has nu of these points, at t = 0, 2 pi / omega, ...; as in Alcorta et al. (Nonlinear Dynamics
-98, 2019), Figs 7 and 8, each period doubling adds loops to the portrait and doubles their number.
+A motion of nu load periods has nu of these points, at t = 0, 2 pi / omega, ...: a period doubling doubles their number.
 """
 
 from __future__ import annotations
@@ -10,13 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from suboctave.pictures import style
 from suboctave.pictures.motions import Frames, MotionView, check_path, draw_gaps, draw_sections, lower_first
-from suboctave.store.motions import motion_datasets
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["plot_phase"]
@@ -43,8 +39,8 @@ def plot_phase(
 ) -> Figure:
     """Draw phase portraits, dx/dt over x along one response period, side by side or in one frame.
 
-    The colour tells the period, T, 2T, ...; circles are the stroboscopic points t = 0, 2 pi / omega, ..., thin lines the
-    gaps of elements that act on the degree of freedom alone.
+    The colour tells the period, T, 2T, ...; circles are the stroboscopic points t = 0, 2 pi / omega, ..., thin lines
+    the gaps of elements that act on the degree of freedom alone.
 
     Parameters
     ----------
@@ -76,6 +72,8 @@ def plot_phase(
     InputError
         For what cannot be drawn, before anything is.
     """
+    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
+
     view = MotionView("displacement", None, frequency, omega_reference, scale, unit, xlabel, ylabel)
     check_path(path)
     datasets = motion_datasets(motions, points, dof)
@@ -90,9 +88,11 @@ def plot_phase(
 def _draw(frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView) -> None:
     axes, look, curve = frames.axes[index], frames.look, frames.looks[index]
     x, v = (dataset[name].to_numpy() * view.factor(d) for d, name in enumerate(("displacement", "velocity")))
-    line = {"color": curve.colour, "linewidth": look.line * (curve.width if frames.overlay else 1.0)}
+    line: dict[str, Any] = {"color": curve.colour, "linewidth": look.line * (curve.width if frames.overlay else 1.0)}
     axes.plot(x, v, zorder=3, solid_joinstyle="round", gid="motion", **line)
     if frames.overlay:
         frames.add(frames.names[index], line, last=False)
-    places = [dataset[f"section_{name}"].to_numpy() * view.factor(d) for d, name in enumerate(("displacement", "velocity"))]
+    places = [
+        dataset[f"section_{name}"].to_numpy() * view.factor(d) for d, name in enumerate(("displacement", "velocity"))
+    ]
     draw_sections(frames, index, *places)

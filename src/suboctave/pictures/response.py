@@ -269,7 +269,9 @@ def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.D
             raise InputError(f"expected a dataset of a curve, got {type(dataset).__name__}; a branch has to_xarray()")
         check_layout(dataset)
         if "point" not in dataset.sizes:
-            raise InputError("this dataset is no curve; one of a motion is drawn by plot_phase, plot_spectrum, plot_history")
+            raise InputError(
+                "this dataset is no curve; one of a motion is drawn by plot_phase, plot_spectrum, plot_history"
+            )
         if dataset.sizes["point"] == 0:
             raise InputError("a curve without points cannot be drawn")
     return group

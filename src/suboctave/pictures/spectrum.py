@@ -19,7 +19,6 @@ from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.motions import DERIVATIVES, Frames, MotionView, check_path, lower_first
 from suboctave.pictures.periods import period_colour, period_of
-from suboctave.store.motions import motion_datasets
 
 if TYPE_CHECKING:
     import xarray
@@ -84,6 +83,8 @@ def plot_spectrum(
     InputError
         For what cannot be drawn, before anything is.
     """
+    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
+
     view = MotionView(quantity, None, frequency, omega_reference, scale, unit, xlabel, ylabel)
     view.check_quantity(list(DERIVATIVES))
     check_path(path)
@@ -92,7 +93,10 @@ def plot_spectrum(
     datasets = motion_datasets(motions, points, dof)
     frames = Frames(datasets, view, overlay=overlay, labels=labels, size=size, cell=_CELL, stacked=True)
     most = highest or max(_ends(dataset) * (1.0 + _BEYOND) for dataset in datasets)
-    ends = [_draw(frames, index, datasets[index], view, most) for index in lower_first(datasets)]
+    nu = max(period_of(dataset) for dataset in datasets)
+    # where components stand close their markers must not become one
+    apart = 0.85 * 72.0 * float(frames.figure.get_size_inches()[0]) / (most * nu + 1.0)
+    ends = [_draw(frames, index, datasets[index], view, most, apart) for index in lower_first(datasets)]
     for drawing in filter(None, ends):
         frames.add("neglected (estimated)", drawing)
     _axis(frames, datasets, view, most)
@@ -120,9 +124,9 @@ def _across(view: MotionView) -> str:
 
 
 def _draw(
-    frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView, most: float
+    frames: Frames, index: int, dataset: xarray.Dataset, view: MotionView, most: float, apart: float
 ) -> dict[str, Any] | None:
-    """Draw one motion's components; returns how the end of what was solved for is drawn, if it is."""
+    """Draw one motion's components, `apart` points from each other; returns how the end of the solved ones is drawn."""
     axes, look = frames.axes[index], frames.look
     unit, order, nu = _unit_of_axis(dataset, view), DERIVATIVES[view.quantity], period_of(dataset)
     parts = {}
@@ -132,8 +136,6 @@ def _draw(
         parts[name] = at, np.abs(dataset[f"amplitude_of_{name}"].to_numpy()) * rate * view.factor(order)
     largest = parts["component"][1].max()
     shape = _MARKERS[index % len(_MARKERS)] if frames.overlay else _MARKERS[0]
-    # where components stand close their markers must not become one
-    apart = 0.85 * 72.0 * float(frames.figure.get_size_inches()[0]) / (most * max(nu, 1) + 1.0)
     size = min(0.62 * style.MARKER_SIZE * look.marker, max(0.8 * apart, 1.3))
     width = min(0.8 * look.line, max(0.3 * apart, 0.2))
     hollow = frames.overlay and index > 0  # so that one behind it shows
@@ -156,7 +158,15 @@ def _draw(
                 axes.vlines(at[chosen] * unit, 0.0, height[chosen], color=colour, linewidth=width, zorder=2)
             axes.plot(at[chosen] * unit, height[chosen], zorder=3, gid=f"{name} {q}", **drawing)
             if solved:
-                frames.add(r"at $k\,\omega$" if q == 1 else rf"at $k\,\omega/{q}$", {**drawing, "marker": "o", "markersize": 0.62 * style.MARKER_SIZE * look.marker, "markerfacecolor": colour})
+                frames.add(
+                    r"at $k\,\omega$" if q == 1 else rf"at $k\,\omega/{q}$",
+                    {
+                        **drawing,
+                        "marker": "o",
+                        "markersize": 0.62 * style.MARKER_SIZE * look.marker,
+                        "markerfacecolor": colour,
+                    },
+                )
     if frames.overlay:
         inside = "none" if hollow else style.INK
         plain = {"linestyle": "none", "marker": shape, "markersize": size, "markerfacecolor": inside}
@@ -165,10 +175,11 @@ def _draw(
     end = _ends(dataset) + 0.5 / nu
     if end >= most:
         return None
-    dotted = {"color": style.SOFT, "linewidth": 0.9 * look.line, "linestyle": (0, (1.0, 1.5))}
+    dotted: dict[str, Any] = {"color": style.SOFT, "linewidth": 0.9 * look.line, "linestyle": (0, (1.0, 1.5))}
     axes.axvline(end * unit, zorder=1, gid="truncation", **dotted)
     edge = {"markeredgecolor": style.INK, "markeredgewidth": look.edge}
-    return {**dotted, **edge, "marker": "o", "markersize": 0.5 * style.MARKER_SIZE * look.marker, "markerfacecolor": "w"}
+    small = 0.5 * style.MARKER_SIZE * look.marker
+    return {**dotted, **edge, "marker": "o", "markersize": small, "markerfacecolor": "#ffffff"}
 
 
 def _axis(frames: Frames, datasets: Sequence[xarray.Dataset], view: MotionView, most: float) -> None:

@@ -3,8 +3,9 @@
 The colours are those of Okabe and Ito (*Color Universal Design*, 2008). Shape carries the kind on its own, so that
 a black-and-white print loses nothing: circles for limit points and triangles for period doublings, as in Alcorta
 et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Markers of
-subcritical bifurcations are hollow. Grazing contacts, which need not change the response, are crosses beneath the others. Several curves in one frame differ in
-colour, in width and in the dashes of their unstable parts, and each one's markers have its colour at the edge.
+subcritical bifurcations are hollow. Grazing contacts, which need not change the response, are crosses beneath the
+others. Several curves in one frame differ in colour, in width and in the dashes of their unstable parts, and each one's
+markers have its colour at the edge.
 
 Widths of "single-column" and "double-column" are 84 mm and 174 mm, which fit the columns of the journals of the field;
 letters are then 7 to 8 points high.

@@ -1,4 +1,4 @@
-"""How one periodic motion of one degree of freedom is laid out as a labelled dataset: what pictures of motions work from.
+"""How one periodic motion of one degree of freedom is laid out as a labelled dataset: what its pictures work from.
 
 Dimensions
 
@@ -89,8 +89,8 @@ def _laid_out(
     elif _is_branch(item):
         if points is None:
             raise InputError(
-                f"a branch has {len(item.orbits)} motions: choose with points=[0, ...], or give branch.orbits[i] or one of "
-                "its bifurcations"
+                f"a branch has {len(item.orbits)} motions: choose with points=[0, ...], or give branch.orbits[i], "
+                "or one of its bifurcations"
             )
         for point in [points] if isinstance(points, int | np.integer) else points:
             if isinstance(point, bool) or not isinstance(point, int | np.integer):
@@ -146,9 +146,10 @@ def motion_dataset(
     count = nu * max(_SMOOTH, _PER_HARMONIC * math.ceil(high / nu))
     tau = 2.0 * math.pi * np.arange(count + 1) / count
     sections = np.arange(nu) * (count // nu)
+    waves, rates = np.exp(1j * np.multiply.outer(tau, np.arange(high + 1))), 1j * multiples * orbit.omega
     series = {
-        name: np.real(np.exp(1j * np.multiply.outer(tau, np.arange(high + 1))) @ (c * (1j * multiples * orbit.omega) ** d))
-        for d, name in enumerate(("displacement", "velocity", "acceleration"))
+        name: np.real(waves @ (c * rates**order))
+        for order, name in enumerate(("displacement", "velocity", "acceleration"))
     }
     time = tau * nu / orbit.omega
     variables: dict[str, Any] = {name: ("sample", values) for name, values in series.items()}
