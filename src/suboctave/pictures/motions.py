@@ -136,7 +136,7 @@ def captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[
     """What is said of each motion: T, 2T, ... with the kind of a bifurcation; frequency; what differs."""
     told = []
     for dataset, words in zip(datasets, differing(datasets), strict=True):
-        kind = str(dataset.attrs.get("kind", ""))
+        kind = _plain(str(dataset.attrs.get("kind", "")))
         period = period_name(period_of(dataset))
         frequency = view.at_frequency(float(dataset.attrs["omega"]))
         told.append([f"{period}, {kind}" if kind else period, frequency, *words])

@@ -25,7 +25,8 @@ __all__ = [
     "tinted",
 ]
 
-_OF_PERIODS = {1: style.INK, 2: "#0072B2", 4: "#E69F00", 3: "#009E73", 8: "#CC79A7", 6: "#56B4E9", 5: "#D55E00"}
+# Okabe and Ito's; those of T, 2T, 3T, 4T and 8T stay apart for every kind of colour blindness
+_OF_PERIODS = {1: style.INK, 2: "#0072B2", 4: "#E69F00", 8: "#56B4E9", 3: "#D55E00", 6: "#009E73", 5: "#CC79A7"}
 #: share of white in the colours of the second and third curve of one period
 _TINTS = (0.0, 0.45, 0.25)
 
@@ -43,7 +44,7 @@ def period_colour(nu: int) -> str:
 def tinted(colour: str, share: float) -> str:
     """The colour with a share of white in it."""
     parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-    return "#" + "".join(f"{round(part + share * (255 - part)):02x}" for part in parts)
+    return colour if not share else "#" + "".join(f"{round(part + share * (255 - part)):02x}" for part in parts)
 
 
 def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[style.CurveStyle]:

@@ -65,7 +65,8 @@ def motion_datasets(
     InputError
         For what is no motion, a branch without `points`, or an index that is out of range.
     """
-    given = list(motions) if isinstance(motions, list | tuple) else [motions]
+    single = _is_branch(motions) or hasattr(motions, "data_vars") or not isinstance(motions, Iterable)
+    given = [motions] if single or isinstance(motions, str) else list(motions)
     branches = [item for item in given if _is_branch(item)]
     if points is not None and not branches:
         raise InputError("points= chooses among the points of a branch, and no branch is given: leave it out")
