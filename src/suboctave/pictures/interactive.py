@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.pictures import style
 from suboctave.pictures.periods import curve_styles, period_of, several_periods
-from suboctave.pictures.strokes import line
+from suboctave.pictures.strokes import line, repeated
 from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
@@ -77,10 +77,11 @@ def _lines(
 ) -> list[dict[str, Any]]:
     whole = line(dataset, horizontal)
     words = _Words(dataset)
+    again = repeated(whole)
     verdicts = [None] if whole.stable is None else [True, False]
     traces = []
     for verdict in verdicts:
-        vertices = _of_verdict(whole.stable, verdict, whole.x.size)
+        vertices = _of_verdict(whole.stable, verdict, whole.x.size, again)
         if not vertices:
             continue
         word = "motions" if verdict is None else "stable" if verdict else "unstable"
@@ -111,12 +112,12 @@ def _lines(
     return traces
 
 
-def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> list[int]:
-    """Vertices of all pieces of one verdict, -1 between two strokes."""
+def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int, again: np.ndarray) -> list[int]:
+    """Vertices of all pieces of one verdict, -1 between two strokes, without those that are there `again`."""
     if stable is None or stable.size == 0:
         return list(range(count)) if not verdict else []
     vertices: list[int] = []
-    for piece in np.flatnonzero(stable == verdict):
+    for piece in np.flatnonzero((stable == verdict) & ~again):
         if not vertices or vertices[-1] != piece:
             vertices += [-1, int(piece)] if vertices else [int(piece)]
         vertices.append(int(piece) + 1)
