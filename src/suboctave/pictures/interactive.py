@@ -127,15 +127,10 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int, aga
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
     words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
-    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
-    senses = [str(sense) for sense in dataset["event_criticality"].to_numpy()]
-    marks = list(zip(kinds, senses, strict=True))
     smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
     traces = []
-    for kind, sense in dict.fromkeys(marks):
-        mark = style.kind_style(kind)
-        chosen = np.flatnonzero([pair == (kind, sense) for pair in marks])
-        named = html.escape(style.in_words(kind, sense))
+    for _, mark, chosen in style.marks(dataset):
+        named = html.escape(mark.name)
         traces.append(
             {
                 "type": "scatter",
@@ -149,7 +144,7 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
                 "marker": {
                     "symbol": _SYMBOLS[mark.marker],
                     "size": 1.5 * mark.size * smaller,
-                    "color": style.filling(kind, sense),
+                    "color": mark.colour,
                     "line": {"color": edge, "width": 1.8},
                 },
             }

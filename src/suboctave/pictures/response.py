@@ -207,21 +207,17 @@ def _draw_events(
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
-    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
-    senses = [str(sense) for sense in dataset["event_criticality"].to_numpy()]
-    marks = list(zip(kinds, senses, strict=True))
     smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
-    for kind, sense in dict.fromkeys(marks):
-        mark = style.kind_style(kind)
+    for kind, mark, which in style.marks(dataset):
         drawing: dict[str, Any] = {
             "linestyle": "none",
             "marker": mark.marker,
             "markersize": mark.size * look.marker * smaller,
-            "markerfacecolor": style.filling(kind, sense),
+            "markerfacecolor": mark.colour,
             "markeredgecolor": edge,
             "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
-        chosen = positions[[pair == (kind, sense) for pair in marks]]
+        chosen = positions[which]
         axes.plot(
             chosen[:, 0],
             chosen[:, 1],
@@ -231,7 +227,7 @@ def _draw_events(
             **drawing,
         )
         plain = {"markeredgecolor": style.INK, "markeredgewidth": look.edge, "markersize": mark.size * look.marker}
-        legend[style.in_words(kind, sense)] = Line2D([], [], **{**drawing, **plain})
+        legend[mark.name] = Line2D([], [], **{**drawing, **plain})
     return legend
 
 
