@@ -92,7 +92,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     state, size = sample.state, b.point.arclength - a.point.arclength
     while curve.adaptive is not None:
         basis = next_harmonics(state, curve.adaptive)
-        if basis.harmonics <= state.basis.harmonics:
+        if basis.count <= state.basis.count:
             break
         x = state.basis.resized(state.x, basis)
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
@@ -121,13 +121,13 @@ def _refined(
     for _ in range(8):
         state = solution.state
         basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
-        if basis.harmonics <= state.basis.harmonics:
+        if basis.count <= state.basis.count:
             # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
             critical = located.kind.critical(solution)
             if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
                 break
             basis = next_harmonics(state, adaptive)
-        if basis.harmonics <= state.basis.harmonics:
+        if basis.count <= state.basis.count:
             break
         x = state.completed.basis.resized(state.completed.x, basis)
         # more harmonics need more samples of a law that tells nothing of itself
