@@ -12,8 +12,10 @@ will do; `choose_harmonics` may give every class an end of its own. What must no
 left out:
 
 - the place at which the motion was born. At a period doubling of its parent the youngest class vanishes, and the
-  equations within it are those of the parent's J_half: cut too short, the whole branch moves. So every class keeps what
-  it is to a thousandth of itself, however small it is, and at least a share of the highest harmonic;
+  equations within it are those of the parent's J_half. The errors of both cancel in part if they end at the same
+  frequency; one class that is shorter moves the birth, and the whole branch with it, by ten times as much as fewer
+  harmonics of all classes do. So nothing is left out while a class is small beside one that it doubles, and later only
+  what a class itself does not miss;
 - symmetries that may break. The even harmonics of a symmetric motion are empty, but J_0 sees the branch point at which
   they appear only if they are among its unknowns. So no class is made of them, and motions of the load's period keep
   all harmonics;
@@ -31,21 +33,22 @@ from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
+from suboctave.lazy import lazy
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
 _MOST_UNKNOWNS = 4000
 #: numbers of harmonics (of omega) that adaptive selection chooses from
 _LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
 #: ratio of neighbouring highest harmonics for sub-harmonic motions, whose steps need not be whole multiples of omega
-_FINER = 1.1
+_FINER = 1.05
 #: what a class of sub-harmonics may lack in units of itself
-_OF_ITSELF = 1e-3
+_OF_ITSELF = 3e-4
+#: size of a class in units of the one that it doubles, below which it is young and all harmonics are kept
+_YOUNG = 0.05
 #: share of the tolerance that a new choice for sub-harmonic motions aims at
 _AIM = 0.6
-#: size of a class, relative to the motion, below which its harmonics tell nothing
-_EMPTY = 1e-8
-#: least end of a class in units of the highest harmonic, of one that is empty
-_SHARE, _EMPTY_SHARE = 1.0 / 3.0, 0.5
+#: least end of a class in units of the highest harmonic
+_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -178,7 +181,7 @@ class _Classes:
         self.beyond = np.array([_beyond(np.where(self.divisor == d, shares, 0.0)) for d in self.divisors])
         lowest = max(options.minimum, state.balance.highest_load)
         most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-        rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(60)})
+        rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
         self.rungs = [r for r in rungs if lowest * nu <= r <= most * nu] or [max(lowest * nu, high)]
         #: where each class ends now: before the first of its harmonics that is missing
         missing = np.arange(len(squares)) > high
@@ -201,8 +204,10 @@ class _Classes:
         lacking = np.array([b[end] for b, end in zip(self.beyond, self.ends, strict=True)])
         if np.linalg.norm(lacking) > tolerance:
             return True
-        cut = np.array(self.ends) < self.basis.harmonics
-        return bool(np.any(cut & (self.whole > _EMPTY) & (lacking > 2.0 * _OF_ITSELF * self.whole)))
+        if self.basis.kept is None:
+            return False
+        cut = np.isin(self.divisors, self.divisor[self.basis.left_out])
+        return self._youngest < _YOUNG or bool(np.any(cut & (lacking > 2.0 * _OF_ITSELF * self.whole)))
 
     def _needed(self, bound: float) -> list[int]:
         """Where each class has to end for less than `bound` to be neglected in all."""
@@ -218,14 +223,21 @@ class _Classes:
             total = np.sqrt(np.sum(self.beyond**2, axis=0))
             high = round(max(double, min(_expected(total, self.basis.harmonics, bound), 1.25 * double)))
         high = self._rung(high)
+        # some way from where they would have to be filled again
+        if self._youngest < 1.5 * _YOUNG:
+            return [high] * len(least)
         found = []
         for end, b, whole in zip(least, self.beyond, self.whole, strict=True):
-            if whole > _EMPTY:
-                end = max(end, int(np.argmax(b <= _OF_ITSELF * whole)), round(_SHARE * high))
-            else:
-                end = round(_EMPTY_SHARE * high)
+            end = max(end, int(np.argmax(b <= _OF_ITSELF * whole)), round(_SHARE * high))
             found.append(min(high, self._rung(end)))
         return found
+
+    @lazy
+    def _youngest(self) -> float:
+        """The least size of a class in units of one whose period it multiplies."""
+        sizes = dict(zip(self.divisors, self.whole, strict=True))
+        pairs = [(d, m) for d in self.divisors for m in self.divisors if m % d == 0 and _is_prime(m // d)]
+        return min((sizes[d] / sizes[m] for d, m in pairs if sizes[m] > 0.0), default=math.inf)
 
     def _rung(self, end: int) -> int:
         return next((r for r in self.rungs if r >= end), self.rungs[-1])
@@ -244,3 +256,7 @@ class _Classes:
 def _beyond(shares: Array) -> Array:
     """What is left of squares beyond every index, as a size."""
     return np.sqrt(np.append(np.cumsum(shares[:0:-1])[::-1], 0.0))
+
+
+def _is_prime(number: int) -> bool:
+    return number > 1 and all(number % k for k in range(2, math.isqrt(number) + 1))
