@@ -143,6 +143,10 @@ class ResponseCurve:
         weights[-1] = 1.0 / self.span
         return weights
 
+    def unit(self, weights: Array) -> float:
+        """Size of a motion that counts as one in `weights`."""
+        return float(self._weight[0] / weights[0])
+
     def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
         """The curve with the number of harmonics (and blind samples) that this point needs."""
         assert isinstance(evaluation, ResponseEvaluation)
