@@ -46,6 +46,9 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         solution = behind_grazing(located.kind, guess) or _with_more_harmonics(located, a, b)
     if solution is None:
         orbit = orbit_of(located.sample)
+        if orbit.basis.kept is not None:
+            state = _filled(located.sample.state, curve)
+            orbit = as_orbit(state, _residual(state), truncation(state), curve)
         beside = grazing_beside(guess)
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
         width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
@@ -194,7 +197,21 @@ def _refined(
             break
         coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
         solution = better
+    if solution.state.basis.kept is not None:
+        state = _filled(solution.state, curve)
+        solution = replace(solution, state=state, residual=max(solution.residual, _residual(state)))
     return solution, coarser
+
+
+def _filled(state: BalanceState, curve: ResponseCurve) -> BalanceState:
+    """A motion in the equations of all harmonics up to its highest: what is quoted leaves none out."""
+    if state.basis.kept is None:
+        return state
+    return curve.with_basis(state.basis.filled).balance.at(state.x, state.omega, state.values)
+
+
+def _residual(state: BalanceState) -> float:
+    return state.residual_size() / max(state.force_scale(), float(np.finfo(float).tiny))
 
 
 def orbit_of(sample: Sample) -> PeriodicOrbit:
