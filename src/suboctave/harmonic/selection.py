@@ -17,8 +17,8 @@ left out:
   harmonics of all classes do. So nothing is left out while a class is small beside one that it doubles, and later only
   what a class itself does not miss;
 - symmetries that may break. The even harmonics of a symmetric motion are empty, but J_0 sees the branch point at which
-  they appear only if they are among its unknowns. So no class is made of them, and motions of the load's period keep
-  all harmonics;
+  they appear only if they are among its unknowns. So an empty class is a young one, the load's included (2T motions of
+  parametric excitation have odd multiples only), and motions of the load's period keep all harmonics;
 - what leaves the branch by a further doubling: J_half always has all frequencies.
 """
 
@@ -234,10 +234,11 @@ class _Classes:
 
     @lazy
     def _youngest(self) -> float:
-        """The least size of a class in units of one whose period it multiplies."""
+        """The least size of a class in units of one whose period it multiplies, or of the load's in units of any."""
         sizes = dict(zip(self.divisors, self.whole, strict=True))
         pairs = [(d, m) for d in self.divisors for m in self.divisors if m % d == 0 and _is_prime(m // d)]
-        return min((sizes[d] / sizes[m] for d, m in pairs if sizes[m] > 0.0), default=math.inf)
+        ages = [sizes[d] / sizes[m] for d, m in pairs if sizes[m] > 0.0]
+        return float(min(ages + [sizes[self.basis.nu] / max(sizes.values())]))
 
     def _rung(self, end: int) -> int:
         return next((r for r in self.rungs if r >= end), self.rungs[-1])
