@@ -114,7 +114,7 @@ def _turned(a: CurvePoint, b: CurvePoint, curve: ResponseCurve) -> bool:
 
 def _odd(u: Array, curve: ResponseCurve, weights: Array) -> Array:
     """The weighted coefficients of odd order."""
-    shaped = (weights * u)[:-1].reshape(curve.balance.basis.size, -1)
+    shaped = curve.balance.spread((weights * u)[:-1])
     return np.concatenate((shaped[1::4].ravel(), shaped[2::4].ravel()))
 
 

@@ -237,7 +237,7 @@ def _motions(
             if not _lasts(curve, solved.u) or any(_same(curve, solved.u, u) for u in met):
                 continue
             met.append(solved.u)
-            x = solved.u[:-1].reshape(curve.balance.basis.size, -1)
+            x = curve.split(solved.u)[0]
             start = PeriodicOrbit(curve.balance, x, float(value), curve.balance.values, 0.0, 0.0, curve.adaptive)
             try:
                 point = start_point(curve, float(value), start, settings.newton)
@@ -252,7 +252,7 @@ def _motions(
 def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array]:
     """Free vibrations at a fraction of omega on top of the linear response."""
     balance = curve.balance
-    basis, nu = balance.basis, balance.basis.nu
+    nu = balance.basis.nu
     base = linear_response(curve, value)
     for k in range(1, nu):
         if gcd(k, nu) > 1:
@@ -260,7 +260,7 @@ def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array
         for shape in _modes(balance)[: seeds.modes]:
             for amplitude in _resonant(curve, value, value * k / nu, shape):
                 for phase in 2.0 * np.pi * k / nu * np.arange(seeds.phases) / seeds.phases:
-                    x = base[:-1].reshape(basis.size, -1).copy()
+                    x = curve.split(base)[0].copy()
                     x[2 * k - 1] += amplitude * np.cos(phase) * shape
                     x[2 * k] += amplitude * np.sin(phase) * shape
                     yield curve.join(x, value)
@@ -301,7 +301,7 @@ def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array
 def _lasts(curve: ResponseCurve, u: Array) -> bool:
     """Whether a motion has the period of its basis: for every prime factor something that a shorter one lacks."""
     basis = curve.balance.basis
-    x = u[:-1].reshape(basis.size, -1) * curve.balance.scales()[0]
+    x = curve.split(u)[0] * curve.balance.scales()[0]
     whole = length(x)
     k = np.arange(1, basis.harmonics + 1)
     for factor in _primes(basis.nu):

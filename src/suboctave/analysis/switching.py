@@ -273,11 +273,12 @@ def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
     x, omega, values = curve.split(u)
     balance = curve.balance.settle(x, omega, values)
     rest, phi = balance.at(x, omega, values), direction[:-1]
-    slope = rest.force_jacobian @ phi
+    change = balance.spread(phi)
+    slope = rest.force_jacobian @ change.ravel()
     linear = length(rest.linear_jacobian @ phi) + length(slope)
-    unit = curve.size(curve.join(phi.reshape(x.shape), 0.0))
+    unit = curve.size(curve.join(change, 0.0))
     for size in np.geomspace(1e-12, 1e12, 145):
-        bent = balance.at(x + size * phi.reshape(x.shape), omega, values).force - rest.force
+        bent = balance.at(x + size * change, omega, values).force - rest.force
         if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > _NOTICED * linear:
             break
     curve.reference = 100.0 * float(size) * unit
