@@ -68,17 +68,17 @@ class _Patient(CPUDispatcher):
                 return compiled(self)(*args)
             spent = 0.0
         if self._due(spent) or sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE:
-            start = time.perf_counter()
+            start = time.thread_time()
             self.compile(tuple(self.typeof_pyval(a) for a in args))
-            _ledger.budget -= time.perf_counter() - start
+            _ledger.budget -= time.thread_time() - start
             return compiled(self)(*args)
         before, _ledger.nested = _ledger.nested, 0.0
-        start = time.perf_counter()
+        start = time.thread_time()
         try:
             with np.errstate(all="ignore"):
                 return self.py_func(*args)
         finally:
-            took = time.perf_counter() - start
+            took = time.thread_time() - start
             self._spent = spent + took - _ledger.nested
             _ledger.nested = before + took
 
