@@ -15,12 +15,14 @@ one the last bit may still change, for rounded laws and several degrees of freed
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
+from numba import config, njit
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -32,6 +34,10 @@ PATIENCE, LESS, QUICK = 1.0, 0.03, 0.02
 BUDGET = 4.0
 #: entries of a kernel's arguments beyond which it is compiled at once: a single call could take long
 LARGE = 40000
+
+#: LLVM's level of optimisation and whether it makes vectors of loops: with `fastmath`, and without
+_THOROUGH = (config.OPT, config.LOOP_VECTORIZE)
+_SWIFT = (type(config.OPT)(min(int(config.OPT), 1)), 0)
 
 
 class _Ledger:
@@ -54,7 +60,32 @@ def computation_begins() -> None:
     _ledger.runs += 1
 
 
-class _Patient(CPUDispatcher):
+class _Kernel(CPUDispatcher):
+    """A kernel that is compiled with no more effort than its kind repays.
+
+    Loops are put into vector registers in kernels with `fastmath` only: elsewhere Numba could hardly do so, and half of
+    LLVM's time would go into trying. What a kernel calls has been optimised already.
+    """
+
+    def compile(self, sig: Any) -> Any:
+        if self.overloads.get(tuple(sig)) is not None:
+            return super().compile(sig)
+        with global_compiler_lock:
+            before = config.OPT, config.LOOP_VECTORIZE
+            collecting = gc.isenabled()
+            fast = bool(self.targetoptions.get("fastmath"))
+            config.OPT, config.LOOP_VECTORIZE = _THOROUGH if fast else _SWIFT
+            # Numba makes millions of small objects, and looking through them takes a tenth of the time
+            gc.disable()
+            try:
+                return super().compile(sig)
+            finally:
+                config.OPT, config.LOOP_VECTORIZE = before
+                if collecting:
+                    gc.enable()
+
+
+class _Patient(_Kernel):
     """A kernel that has not been compiled yet."""
 
     patience = PATIENCE
@@ -92,7 +123,7 @@ class _Patient(CPUDispatcher):
 def compiled(kernel: _Function) -> _Function:
     """The same kernel, compiled (or loaded) at its next call if it is not yet."""
     if isinstance(kernel, _Patient):
-        kernel.__class__ = CPUDispatcher
+        kernel.__class__ = _Kernel
     return kernel
 
 
@@ -104,9 +135,12 @@ def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) ->
 
     def decorate(function: _Function) -> _Function:
         result = njit(cache=True, **options)(function)
-        if isinstance(result, CPUDispatcher) and not (at_once or options.get("fastmath")):
-            result.__class__ = _Patient
-            result.patience = patience
+        if isinstance(result, CPUDispatcher):
+            if at_once or options.get("fastmath"):
+                result.__class__ = _Kernel
+            else:
+                result.__class__ = _Patient
+                result.patience = patience
         return result
 
     return decorate

@@ -46,7 +46,7 @@ def norm(a):
     return size
 
 
-@kernel(fastmath=FAST)
+@kernel(inline="always", fastmath=FAST)
 def series(state, matrix, damping, left, right, local, span, moving, graded, enough, terms, room):
     """Sum the series of one step into `state` (2 n, cols); returns how many terms it took.
 
@@ -59,7 +59,7 @@ def series(state, matrix, damping, left, right, local, span, moving, graded, eno
     groups, n = left.shape
     size = 2 * n
     cols = state.shape[1]
-    small = 0
+    small = used = 0
     for i in range(size):
         for j in range(cols):
             terms[PAST, i, j] = state[i, j]
@@ -121,14 +121,15 @@ def series(state, matrix, damping, left, right, local, span, moving, graded, eno
                 state[n + i, j] += terms[o + 1, n + i, j]
                 most = max(most, abs(state[n + i, j]))
                 last = max(last, abs(terms[o + 1, n + i, j]))
+        used = order
         if order + 1 >= ORDER:
             small = small + 1 if last <= enough * most else 0
             if small == 2:
-                return order
-    return TERMS - 2
+                break
+    return used
 
 
-@kernel(fastmath=FAST)
+@kernel(inline="always", fastmath=FAST)
 def evaluate(terms, used, row, x, out):
     """The series of a row of `terms` at x into out (cols,)."""
     for j in range(out.shape[0]):

@@ -143,7 +143,7 @@ def add(out, powers, j, value):
         out[i] += powers[i, j] * value
 
 
-@kernel(fastmath=FAST)
+@kernel(at_once=True)
 def march(
     stretch, scale, damping, left, right, base, kick, nodes, poly, matrices, steps, moving, forced,
     total, alone, rows, terms, plain,
