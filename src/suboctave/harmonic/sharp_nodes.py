@@ -246,7 +246,8 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
     capacity = ORDERS * (8 + 3 * intervals + math.ceil(2.0 * math.pi / panel))
     out_r, out_i, w = np.empty(capacity), np.empty(capacity), np.empty(capacity)
     offset = np.empty(ORDERS)
-    count = 0
+    # not a literal, for which `_fill` would be compiled twice
+    count = np.int64(0)
     for k in range(intervals):
         # the way from a singularity to the middle before the next, forwards or backwards in time
         centre, distance, length, sign = 0.0, 1.0, 2.0 * math.pi, 1.0
