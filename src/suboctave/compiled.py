@@ -100,8 +100,8 @@ def compile_at_once() -> None:
 class _Kernel(CPUDispatcher):
     """A kernel that is compiled with no more effort than its kind repays.
 
-    Loops are put into vector registers in kernels with `fastmath` only: elsewhere Numba could hardly do so, and half of
-    LLVM's time would go into trying. What a kernel calls has been optimised already.
+    Loops are put into vector registers in kernels with `fastmath` only: elsewhere that gains nothing measurable, and
+    half of LLVM's time would go into it. What a kernel calls has been optimised already.
     """
 
     def compile(self, sig: Any) -> Any:
