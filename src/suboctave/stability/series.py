@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from suboctave.compiled import kernel
 from suboctave.stability.nodes import ORDER
 
