@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
-    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, verify
+    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, track, verify
     from suboctave.bifurcation import Bifurcation
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
@@ -90,6 +90,7 @@ _HOME = {
     "Monodromy": "suboctave.stability",
     "Hill": "suboctave.stability",
     "KoopmanHill": "suboctave.stability",
+    "track": "suboctave.analysis",
     "verify": "suboctave.analysis",
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
@@ -144,6 +145,7 @@ __all__ = [
     "load",
     "plot",
     "stability",
+    "track",
     "verify",
     "write_report",
 ]

@@ -2,6 +2,8 @@
 
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.results import Results, Table, load
+from suboctave.analysis.track import track
+from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
@@ -10,10 +12,12 @@ __all__ = [
     "BranchPoint",
     "Results",
     "Table",
+    "TrackedBranch",
     "Verification",
     "continue_branch",
     "frequency_response",
     "load",
     "stability",
+    "track",
     "verify",
 ]
