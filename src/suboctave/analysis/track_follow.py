@@ -32,7 +32,7 @@ from suboctave.analysis.tracked_events import (
 from suboctave.bifurcation.augmented import BranchPointUnfolded, GrazingContactEquations, SingularOperator
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.tracked import TrackedEvent
-from suboctave.continuation import CurvePoint, March
+from suboctave.continuation import CurvePoint, March, kernels
 from suboctave.continuation.march import between, make_point
 from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
@@ -138,7 +138,7 @@ class _Tracker:
             if stop is not None:
                 return stop
             landed = self._leaves(a, new)
-            b = new if landed is None else landed
+            b = self._smooth(a, new if landed is None else landed)
             for found in events_between(a, b, self.tests, self.settings.newton, self.trace.warnings):
                 self.trace.events.append(self._event(found))
             self._add(b)
@@ -154,6 +154,20 @@ class _Tracker:
             low, high = self.box.second
             report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
         return None
+
+    def _smooth(self, a: TrackedSample, b: TrackedSample) -> TrackedSample:
+        """The second of two neighbours with the direction in which the curve comes to it.
+
+        On the end of a range a coefficient may have a corner (a gap that is just closed): derivatives there may be those
+        of the far side.
+        """
+        point = b.point
+        if kernels.cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(
+            2.5 * self.settings.stepping.angle
+        ):
+            return b
+        chord = point.weights * (point.u - b.curve.transfer(a.point.u, a.curve))
+        return TrackedSample(replace(point, tangent=kernels.normalised(chord, point.weights)))
 
     def _add(self, sample: TrackedSample) -> None:
         point = sample.point

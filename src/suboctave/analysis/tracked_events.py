@@ -53,6 +53,10 @@ class TrackedSample:
         assert isinstance(equations, SingularEquations)
         return equations
 
+    def curve_tangent(self, curve: TrackedCurve) -> np.ndarray:
+        """The tangent in the discretisation of another point's curve."""
+        return curve.transfer(self.point.tangent, self.curve)
+
     @property
     def kappa(self) -> float:
         """Frequency of the critical perturbation at an NS, else 0."""
