@@ -22,6 +22,7 @@ from suboctave.analysis.tracked_events import (
     CurveTest,
     DoubleMultiplier,
     Found,
+    GeneralisedDoubling,
     TrackedSample,
     events_between,
     nearest_point,
@@ -37,12 +38,15 @@ from suboctave.continuation.march import between, make_point
 from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
 
-#: share of the motion that is not sub-harmonic any more
-_SUBHARMONIC = 1e-3
+#: sub-harmonic share of the motion from which on the end of the curve is looked for, and which is none any more
+_FAINT, _NOTHING_LEFT = 1e-2, 1e-5
+#: way along the parent's curve, in scaled arclength, within which that end lies
+_BESIDE = 0.05
 #: kappa in units of the base frequency, from 0 or 1/2, at which an NS curve has reached its end
 _RESONANT = 2e-3
 #: unfolding, in units of the forces that balance, above which there is no branch point
@@ -122,7 +126,7 @@ class _Tracker:
         if b.orientation != a.orientation and b.arclength - a.arclength > _JUMP:
             return False
         nu = b.curve.balance.basis.nu
-        if nu > 1 and _subharmonic_share(b) > _SUBHARMONIC:
+        if nu > 1 and _subharmonic_share(b) > _NOTHING_LEFT:
             before, behind = (_subharmonic_parts(p, nu) for p in (replace(a, u=_in_basis(a, b), curve=b.curve), b))
             return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, behind, strict=True))
         return True
@@ -173,7 +177,12 @@ class _Tracker:
         point = sample.point
         self.trace.points.append(
             TrackedPoint(
-                _orbit(sample), point.arclength, point.iterations, self.settings.stability, _extra(sample.evaluation)
+                _orbit(sample),
+                point.arclength,
+                point.iterations,
+                self.settings.stability,
+                _extra(sample.evaluation),
+                sample.coefficient,
             )
         )
 
@@ -234,12 +243,41 @@ class _Tracker:
             share = b.kappa / b.state.rate
             if not _RESONANT < share < 0.5 - _RESONANT:
                 return self._resonant_end(a, double=share > 0.25)
-        if b.curve.balance.basis.nu > 1 and _subharmonic_share(b.point) <= _SUBHARMONIC:
-            return (
-                f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: the curve ends on the "
-                "period doublings of the parent motion"
-            )
+        if b.curve.balance.basis.nu > 1:
+            share = _subharmonic_share(b.point)
+            if share <= _FAINT:
+                found = self._parent_end(a)
+                if found is not None:
+                    self.trace.events.append(replace(self._event(found), arclength=a.point.arclength))
+                    where = found.sample.curve.where(found.sample.point.u)
+                    return f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
+            if share <= _NOTHING_LEFT:
+                return (
+                    f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are "
+                    "period doublings of the parent motion, which solve the same equations"
+                )
         return None
+
+    def _parent_end(self, a: TrackedSample) -> Found | None:
+        """The GPD beside a faint LP of doubled motions, located on the PD curve of the parent; None if there is none."""
+        curve = a.curve
+        basis = curve.balance.basis
+        if curve.augmentation.name != "LP" or basis.nu % 2:
+            return None
+        parent = HarmonicBasis(max(1, basis.harmonics // 2), basis.nu // 2)
+        x = np.zeros((parent.size, curve.balance.size))
+        x[0], x[1::2], x[2::2] = a.state.x[0], a.state.x[3::4][: parent.harmonics], a.state.x[4::4][: parent.harmonics]
+        try:
+            balance = curve.balance.with_basis(parent).settle(x, a.state.omega, a.state.values)
+            state = balance.at(x, a.state.omega, a.state.values)
+            doubling = SingularOperator(Kind.HALF, null_vectors(state, Kind.HALF))
+            curve = replace(curve, balance=balance, augmentation=doubling, cache={})
+            u = curve.join(x, np.zeros(0), a.point.u[-2:])
+            start = nearest_point(curve, u, curve.weights(u, curve.size(u)), self.settings.newton)
+            found = zero_along(start, GeneralisedDoubling(), self.settings.newton, _BESIDE)
+        except ConvergenceError:
+            return None
+        return Found(GeneralisedDoubling(), found)
 
     def _resonant_end(self, a: TrackedSample, double: bool) -> str:
         """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""

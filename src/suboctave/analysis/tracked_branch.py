@@ -24,8 +24,8 @@ from suboctave.stability import FloquetResult, StabilityMethod
 class TrackedPoint:
     """One point of a tracked curve: orbit, position in scaled arclength, Newton iterations, and the extra unknown.
 
-    `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0. The multipliers are computed when
-    asked for.
+    `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0; `coefficient` the one that decides the
+    normal form of an LP (a) or a PD (c3), else nan. The multipliers are computed when asked for.
     """
 
     orbit: PeriodicOrbit
@@ -33,6 +33,7 @@ class TrackedPoint:
     iterations: int
     method: StabilityMethod
     extra: float = 0.0
+    coefficient: float = float("nan")
 
     @lazy
     def floquet(self) -> FloquetResult:
@@ -75,6 +76,15 @@ class TrackedBranch(Branch):
     def kappa(self) -> Array:
         """Frequency of the critical perturbation along an NS curve, rad per unit time; else zeros; shape (len,)."""
         return np.array([p.extra if self.kind == "NS" else 0.0 for p in self._tracked])
+
+    @cached_property
+    def coefficient(self) -> Array:
+        """The coefficient that decides the normal form, a of LP, c3 of PD (`bifurcation.normal_form`), else nan.
+
+        c3 is negative where the doublings are supercritical and changes sign at a GPD; a does so at a cusp. Shape
+        (len,).
+        """
+        return np.array([p.coefficient for p in self._tracked])
 
     @property
     def _tracked(self) -> tuple[TrackedPoint, ...]:

@@ -6,6 +6,7 @@ Functions of the curve's points that change sign:
     CP                psi . R''[phi, phi] on LP curves; both components of the tangent vanish with it
     R1, R2            psi . (dJ_kappa/dkappa) phi on LP, PD curves: the multiplier is double
     R3, R4            kappa - w0/3, kappa - w0/4 on NS curves
+    GPD               the cubic coefficient c3 on PD curves: super- turns into subcritical
     LPPD              det J_half on LP curves, det J_0 on PD curves: the other multiplier is critical too
 
 At a cusp the curve turns in both parameters, which makes no extremum of either: there the tangent's components divided
@@ -22,6 +23,7 @@ import numpy as np
 from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation.augmented import SingularEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.bifurcation.normal_form_real import Expansion
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
@@ -29,6 +31,7 @@ from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.third import Multilinear
 from suboctave.lazy import lazy
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
@@ -85,13 +88,33 @@ class TrackedSample:
         return 0.0 if abs(value) <= _NOTHING * size else value
 
     @lazy
-    def other(self) -> float:
-        """Sign of det J_half of an LP, of det J_0 of a PD."""
-        return Factor.of(self._other_operator).sign
+    def cubic(self) -> float:
+        """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
+        equations, state = self.equations, self.state
+        b, by_x = equations.bordered, equations.gradient[0].real
+        by_motion = -by_x.reshape(state.x.shape)
+        own = Expansion(state, Kind.HALF, b.right, b.left, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
+        return own.cubic(self._other_factor.solve(-0.5 * own.squared()))[0]
+
+    @lazy
+    def coefficient(self) -> float:
+        """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
+        augmentation = self.curve.augmentation
+        kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
+        if kind is Kind.FREE:
+            return float("nan")
+        turn = -1.0 if self.twist > 0.0 else 1.0
+        return turn * (0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
 
     @property
-    def _other_operator(self) -> np.ndarray:
-        return self.state.half_jacobian if self.equations.of.kind is Kind.INTEGER else self.state.jacobian
+    def other(self) -> float:
+        """Sign of det J_half of an LP, of det J_0 of a PD."""
+        return self._other_factor.sign
+
+    @lazy
+    def _other_factor(self) -> Factor:
+        limit = self.equations.of.kind is Kind.INTEGER
+        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
 
 
 class CurveTest(ABC):
@@ -131,6 +154,18 @@ class Cusp(CurveTest):
     def value(self, sample: TrackedSample) -> float:
         """See `CurveTest.value`."""
         return sample.bend
+
+
+@dataclass(frozen=True)
+class GeneralisedDoubling(CurveTest):
+    """The motions that branch off change sides; a curve of their limit points begins."""
+
+    kind = "GPD"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        # at a fold-flip c3 passes through infinity, and det J_0 through zero
+        return sample.cubic * sample.other
 
 
 @dataclass(frozen=True)
@@ -188,7 +223,7 @@ def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
         return turns
     own: dict[Kind, tuple[CurveTest, ...]] = {
         Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), FoldFlip()),
-        Kind.HALF: (DoubleMultiplier("R2"), FoldFlip()),
+        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier("R2"), FoldFlip()),
         Kind.FREE: (Resonance(3), Resonance(4)),
     }
     return turns + own[augmentation.kind]
