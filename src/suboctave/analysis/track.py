@@ -15,7 +15,7 @@ from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.track_follow import Box, TrackedTrace, follow_tracked
 from suboctave.analysis.tracked_branch import TrackedBranch, tracked_branch
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import null_row
+from suboctave.analysis.tracked_sample import null_row
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.augmented import (
     Augmentation,
@@ -97,8 +97,8 @@ def track(
 
     Notes
     -----
-    Minimally augmented systems (`bifurcation.augmented`) and pseudo-arclength. A branch point can be followed only where
-    a symmetry forces it; the curve ends where that is broken.
+    Minimally augmented systems (`bifurcation.augmented`) and pseudo-arclength. A branch point can be followed only
+    where a symmetry forces it; the curve ends where that is broken.
     """
     names, ranges = _free(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit

@@ -122,9 +122,7 @@ def tracked_branch(
 ) -> TrackedBranch:
     """A tracked curve of what following it gave."""
     items: list[Bifurcation] = list(events)
-    return TrackedBranch(
-        kind, names, system, names[1], points, items, [], closed, ended, observe, options, warnings
-    )
+    return TrackedBranch(kind, names, system, names[1], points, items, [], closed, ended, observe, options, warnings)
 
 
 __all__ = ["TrackedBranch", "TrackedPoint", "tracked_branch"]

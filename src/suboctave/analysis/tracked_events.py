@@ -18,103 +18,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-import numpy as np
-
-from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
-from suboctave.bifurcation.augmented import SingularEquations, SingularOperator
+from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_sample import TrackedSample
+from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
-from suboctave.bifurcation.normal_form_real import Expansion
+from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.events import locate_zero
-from suboctave.continuation.linear import Factor, length
-from suboctave.continuation.march import CurvePoint, make_point
-from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.newton import NewtonOptions
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.state import BalanceState
-from suboctave.harmonic.third import Multilinear
-from suboctave.lazy import lazy
-
-#: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
-_NOTHING = 1e-9
-
-
-class TrackedSample:
-    """A point of a tracked curve with what the tests ask of it."""
-
-    def __init__(self, point: CurvePoint) -> None:
-        assert isinstance(point.curve, TrackedCurve)
-        assert isinstance(point.evaluation, TrackedEvaluation)
-        self.point = point
-        self.curve = point.curve
-        self.evaluation = point.evaluation
-        self.state: BalanceState = point.evaluation.state
-
-    @property
-    def equations(self) -> SingularEquations:
-        """The scalar equations, where they are those of a singular operator."""
-        equations = self.evaluation.equations
-        assert isinstance(equations, SingularEquations)
-        return equations
-
-    def curve_tangent(self, curve: TrackedCurve) -> np.ndarray:
-        """The tangent in the discretisation of another point's curve."""
-        return curve.transfer(self.point.tangent, self.curve)
-
-    @property
-    def kappa(self) -> float:
-        """Frequency of the critical perturbation at an NS, else 0."""
-        equations = self.evaluation.equations
-        return equations.kappa if isinstance(equations, SingularEquations) else 0.0
-
-    @property
-    def vectors(self) -> NullVectors | None:
-        """Null vectors of the singular operator, None where there is none."""
-        found = getattr(self.evaluation.equations, "bordered", None)
-        return None if found is None else found.vectors
-
-    @lazy
-    def bend(self) -> float:
-        """psi . R''[phi, phi] of an LP."""
-        equations = self.equations
-        return float((equations.gradient[0] @ equations.bordered.right).real)
-
-    @lazy
-    def twist(self) -> float:
-        """psi . (dJ_kappa/dkappa) phi of an LP or PD; 0 where it is rounding."""
-        equations = self.equations
-        b = equations.bordered
-        size = length(b.left / b.scale) * length(b.right / b.scale) * self.state.omega
-        value = float(equations.gradient[2].imag)
-        return 0.0 if abs(value) <= _NOTHING * size else value
-
-    @lazy
-    def cubic(self) -> float:
-        """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
-        equations, state = self.equations, self.state
-        b, by_x = equations.bordered, equations.gradient[0].real
-        by_motion = -by_x.reshape(state.x.shape)
-        own = Expansion(state, Kind.HALF, b.right, b.left, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
-        return own.cubic(self._other_factor.solve(-0.5 * own.squared()))[0]
-
-    @lazy
-    def coefficient(self) -> float:
-        """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
-        augmentation = self.curve.augmentation
-        kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
-        if kind is Kind.FREE:
-            return float("nan")
-        turn = -1.0 if self.twist > 0.0 else 1.0
-        return turn * (0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
-
-    @property
-    def other(self) -> float:
-        """Sign of det J_half of an LP, of det J_0 of a PD."""
-        return self._other_factor.sign
-
-    @lazy
-    def _other_factor(self) -> Factor:
-        limit = self.equations.of.kind is Kind.INTEGER
-        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
+from suboctave.stability import StabilityMethod
 
 
 class CurveTest(ABC):
@@ -270,69 +183,24 @@ def _extreme(test: CurveTest, a: TrackedSample) -> str:
     return "maximum" if a.point.tangent[a.curve.index(test.name)] > 0.0 else "minimum"
 
 
-def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:
-    """The first of two neighbours solved again in the discretisation of the second, where that differs."""
-    curve, point = b.curve, a.point
-    if a.curve.balance is curve.balance:
-        return a
-    weights = b.point.weights
-    along = curve.transfer(point.tangent, a.curve)
-    row = weights * along / length(weights * along)
-    solved = correct(curve, curve.transfer(point.u, a.curve), row, weights, newton)
-    return TrackedSample(make_point(solved, curve, along, point.arclength))
+def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEvent:
+    """An event as users get it; `observe`: the DOF whose amplitude is reported."""
+    sample = found.sample
+    curve, orbit = sample.curve, sample.orbit
+    return TrackedEvent(
+        found.test.kind,
+        orbit,
+        method.along(sample.state),
+        orbit.residual,
+        orbit.amplitude(observe),
+        getattr(found.test, "name", curve.names[1]),
+        sample.vectors,
+        sample.kappa,
+        arclength=sample.point.arclength,
+        curve=curve.augmentation.name,
+        names=curve.names,
+        extreme=found.extreme,
+    )
 
 
-def nearest_point(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method does not converge.
-    """
-    row = null_row(curve, u, weights)
-    return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
-
-
-def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Unit vector that the scaled Jacobian at u maps to zero: the curve's direction there."""
-    jacobian = curve.evaluate(u).jacobian / weights
-    q = np.linalg.qr(jacobian.T, mode="complete")[0]
-    result: np.ndarray = q[:, -1]
-    return result
-
-
-def zero_along(
-    start: CurvePoint, test: CurveTest, newton: NewtonOptions, reach: float, iterations: int = 12
-) -> TrackedSample:
-    """The zero of a test along a curve near one of its points, by secants in arclength.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is none within `reach`.
-    """
-    curve, weights = start.curve, start.weights
-    row = weights * start.tangent
-    row = row / length(row)
-
-    def at(s: float) -> TrackedSample:
-        solved = correct(curve, start.u + s * row / weights, row, weights, newton)
-        return TrackedSample(make_point(solved, curve, start.tangent, s))
-
-    s, old = 0.02 * reach, 0.0
-    value_old = test.value(at(0.0))
-    for _ in range(iterations):
-        sample = at(s)
-        value = test.value(sample)
-        if value == 0.0 or abs(s - old) < 1e-11:
-            return sample
-        if value == value_old:
-            break
-        s, old, value_old = s - value * (s - old) / (value - value_old), s, value
-        if abs(s) > reach:
-            break
-    raise ConvergenceError(f"no {test.kind} found beside {start.curve.where(start.u)}")
-
-
-__all__ = ["CurveTest", "Found", "TrackedSample", "events_between", "same_discretisation", "tests_of", "zero_along"]
+__all__ = ["CurveTest", "Found", "as_event", "events_between", "tests_of"]

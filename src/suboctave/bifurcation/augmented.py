@@ -1,4 +1,4 @@
-"""What singles a bifurcation out among periodic motions: scalar equations beside R = 0, with one unknown fewer than two.
+"""What singles a bifurcation out among periodic motions: scalar equations beside R = 0.
 
     LP, PD      g = 0                        unknowns (X, two parameters)
     NS          Re g = Im g = 0              (X, kappa, two parameters)

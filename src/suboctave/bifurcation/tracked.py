@@ -1,4 +1,4 @@
-"""A located point on a curve of bifurcations in two parameters: an extremum of either, or a point of codimension two."""
+"""A located point on a curve of bifurcations in two parameters: an extremum, or a point of codimension two."""
 
 from __future__ import annotations
 
