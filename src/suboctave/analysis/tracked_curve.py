@@ -6,6 +6,7 @@ free parameters, "omega" and a named one, or two named ones. The engine's free p
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,10 +19,13 @@ from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics
+from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, next_harmonics
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, floquet_multipliers
 
+#: distance of the critical multiplier from the unit circle up to which harmonics suffice
+_CRITICAL = 1e-3
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -33,6 +37,25 @@ class TrackedEvaluation:
         self.state = state
         self.extra = extra
         self.equations: Equations = curve.augmentation.at(state, extra, curve.names)
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Multipliers of the motion, by the monodromy matrix."""
+        return floquet_multipliers(self.state)
+
+    @property
+    def critical(self) -> complex | None:
+        """The multiplier that lies on the unit circle at a solution, None if none need."""
+        kind = self.curve.augmentation.name
+        if kind == "NS":
+            return cmath.exp(2j * cmath.pi * float(self.extra[0]) / self.state.rate)
+        return {"LP": 1.0 + 0.0j, "BP": 1.0 + 0.0j, "PD": -1.0 + 0.0j}.get(kind)
+
+    @property
+    def doubt(self) -> float:
+        """Distance of the critical multiplier from where it should be: what the harmonics left out make of it."""
+        critical = self.critical
+        return 0.0 if critical is None else float(np.abs(self.floquet.multipliers - critical).min())
 
     @lazy
     def residual(self) -> Array:
@@ -151,13 +174,21 @@ class TrackedCurve:
         augmentation = evaluation.equations.renewed()
         balance = self.balance
         if self.adaptive is not None:
-            balance = self._in_basis(choose_harmonics(state, self.adaptive, self.tolerance))
+            balance = self._in_basis(self._basis(evaluation, self.adaptive))
         x = state.x if balance is self.balance else self.balance.basis.resized(state.x, balance.basis)
         balance = balance.settle(x, state.omega, state.values)
         self.cache[balance.basis] = balance
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
         return replace(self, balance=balance, augmentation=augmentation, force=max(state.force_scale(), self.floor))
+
+    def _basis(self, evaluation: TrackedEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
+        """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""
+        state, present = evaluation.state, self.balance.basis
+        basis = choose_harmonics(state, adaptive, self.tolerance)
+        if basis.harmonics > present.harmonics or evaluation.doubt <= 0.1 * _CRITICAL:
+            return basis
+        return next_harmonics(state, adaptive) if evaluation.doubt > _CRITICAL else present
 
     def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         if basis == self.balance.basis:
