@@ -25,6 +25,7 @@ from suboctave.model import (
 )
 
 OMEGA, KAPPA, STEP = 1.7, 0.37, 1e-6
+INPUTS = {"x": 0, "y": (0, 1)}
 NAMES = ("zeta", "alpha", "Kc", "j", "p", "k")
 
 
@@ -47,7 +48,7 @@ def own_nodes():
     ]
 
 
-@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes"])
+@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes", "rough"])
 def elements(request, damper):
     cubic = CubicSpring(0, "alpha")
     return {
@@ -55,6 +56,11 @@ def elements(request, damper):
         "regularised": [cubic, *contacts(30.0)],
         # in one direction with the cubic spring, and in one of its own
         "own nodes": own_nodes(),
+        # powers of a half and a corner at one place, the latter moving in time
+        "rough": [
+            cubic,
+            Expression(0, "Kc*max(x - j, 0)**1.5*(1 + zeta*x') + p*abs(x - j)*(1 + y)*(1 + 0.3*cos(omega*t))", INPUTS),
+        ],
         "damper": [cubic, damper(0, ["zeta*k", "j**2"]), damper((0, 1), ["alpha", "zeta+Kc*j"])],
     }[request.param]
 
@@ -149,13 +155,13 @@ def test_second_derivative(case, first, second):
 def test_third_derivative(case):
     a, b, c = case.vector(), case.vector(), case.vector()
     exact = third_derivative(case.state, a, b, c)
-    # differences of higher order: R'' is steep beside a corner
     assert_close_fourth(exact, lambda h: second_derivative(case.at(h, c), Direction(a), Direction(b)))
     swapped = third_derivative(case.state, c, b, a)
     assert np.abs(swapped - exact).max() <= 1e-10 * np.abs(exact).max()
 
 
-def assert_close_fourth(exact, function, step=1e-4):
+def assert_close_fourth(exact, function, step=1e-5):
+    """By differences of fourth order: second derivatives are steep beside a crossing that is nearly tangent."""
     rough = (8.0 * (function(step) - function(-step)) - (function(2 * step) - function(-2 * step))) / (12.0 * step)
     assert np.abs(rough - exact).max() <= 1e-6 * np.abs(exact).max()
 
@@ -177,13 +183,13 @@ def test_derivatives_along_waves_are_those_of_a_longer_basis(case):
     whole = np.concatenate(([0], np.arange(3, doubled.size, 4), np.arange(4, doubled.size, 4)))
     found = basis.resized(second.reshape(-1, 2), doubled)
     size = np.abs(expected).max()
-    np.testing.assert_allclose(found[whole], expected[whole], rtol=0, atol=1e-9 * size)
-    assert np.abs(np.delete(expected, whole, axis=0)).max() <= 1e-9 * size
+    np.testing.assert_allclose(found[whole], expected[whole], rtol=0, atol=1e-6 * size)
+    assert np.abs(np.delete(expected, whole, axis=0)).max() <= 1e-6 * size
     third = forms.third(a, b, b, Frequencies.of(case.state, Kind.HALF)).vector(Kind.HALF).reshape(-1, 2)
     expected = third_derivative(state, longer[0], longer[1], longer[1]).reshape(-1, 2)
     size = np.abs(expected).max()
-    np.testing.assert_allclose(third[::2], expected[1::4], rtol=0, atol=1e-9 * size)
-    np.testing.assert_allclose(third[1::2], expected[2::4], rtol=0, atol=1e-9 * size)
+    np.testing.assert_allclose(third[::2], expected[1::4], rtol=0, atol=1e-6 * size)
+    np.testing.assert_allclose(third[1::2], expected[2::4], rtol=0, atol=1e-6 * size)
 
 
 def test_derivatives_along_waves_of_any_shift(case):

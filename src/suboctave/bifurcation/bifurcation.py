@@ -121,7 +121,7 @@ class Bifurcation:
 
     @property
     def criticality(self) -> str | None:
-        """ "supercritical" or "subcritical"; None for limit points, transcritical points, and where it is not certain."""
+        """Whether it is "supercritical" or "subcritical"; None at limit points and where that is not certain."""
         return None if self.normal_form is None else self.normal_form.criticality
 
     def with_normal_form(self, form: NormalForm | None) -> Bifurcation:

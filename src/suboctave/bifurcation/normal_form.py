@@ -83,10 +83,13 @@ class NormalForm:
 
 @dataclass(frozen=True)
 class Terms:
-    """What a kind computes at one motion: coefficients, and the sizes of the sums that those which decide are made of."""
+    """Coefficients at one motion, the sizes of the sums that those which decide are made of, and the unit that the
+    length of psi gives them.
+    """
 
     coefficients: dict[str, float]
     sizes: dict[str, float]
+    unit: float
 
 
 def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str, kappa: float = 0.0) -> NormalForm:
@@ -120,9 +123,10 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
     other = None if coarse is None else terms(*coarse, name, kappa)
     errors = {}
     for key, size in found.sizes.items():
-        value = found.coefficients[key]
         # harmonics left out matter like 1 / H where a contact is hard: a third of them tells half of what is missing
-        change = 0.0 if other is None else 2.0 * abs(value - other.coefficients.get(key, np.nan))
+        change = 0.0
+        if other is not None:
+            change = 2.0 * abs(found.coefficients[key] - other.coefficients[key] * found.unit / other.unit)
         errors[key] = max(change, ROUNDING * size)
     form = NormalForm(kind, name, found.coefficients, errors)
     if kind == "BP":
@@ -135,8 +139,8 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
 def with_criticality(form: NormalForm) -> NormalForm:
     """The same with the sign of c3 read, where it is certain."""
     for key, words in (
-        ("g", "the critical multiplier is (nearly) a double one: without damping there is no super- or subcritical"),
-        ("c3", "the cubic coefficient is zero within its error: neither super- nor subcritical"),
+        ("g", "a double multiplier: neither super- nor subcritical"),
+        ("c3", "cubic coefficient zero within its error"),
     ):
         value, error = form.coefficients.get(key), form.errors.get(key)
         if value is None or error is None:

@@ -5,8 +5,8 @@ branches solve
 
     c s^2 + 2 b s r + a r^2 = 0,    a = psi.R''[v, v], b = psi.R''[v, phi], c = psi.R''[phi, phi].
 
-`c = 0` is a pitchfork: the other branch leaves along phi, as `p = p_0 + curvature eps^2`, `curvature = -c3 / b`, with c3
-as at a period doubling. A symmetry of the system is the reason as a rule.
+`c = 0` is a pitchfork: the other branch leaves along phi, as `p = p_0 + curvature eps^2`, `curvature = -c3 / b`, with
+c3 as at a period doubling. A symmetry of the system is the reason as a rule.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     c = float(own.psi @ squared)
     c3, cubic_size = own.cubic(solve(-0.5 * squared))
     coefficients = {"a": a, "b": b, "c": c, "g": own.g, "c3": c3, "curvature": -c3 / b if b else float("nan")}
-    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": _quadratic_size(own)})
+    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": _quadratic_size(own)}, own.g_size)
 
 
 def labelled(form: NormalForm, found: Terms) -> NormalForm:

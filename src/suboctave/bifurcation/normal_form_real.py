@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import Terms, unweighted
+from suboctave.bifurcation.normal_form import ROUNDING, Terms, unweighted
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient
@@ -20,8 +20,8 @@ from suboctave.harmonic.waves import Frequencies, Waves
 class Expansion:
     """Null vectors of an operator at a motion in the coefficients' own units, psi turned so that g > 0.
 
-    `by_parameter` is `psi.J_p phi`, `by_motion` the gradient of `psi.J phi` by the motion, (2 H + 1, size); `g_size` the
-    sum of the moduli that g is made of.
+    `by_parameter` is `psi.J_p phi`, `by_motion` the gradient of `psi.J phi` by the motion, (2 H + 1, size); `g_size`
+    the sum of the moduli that g is made of.
     """
 
     state: BalanceState
@@ -40,7 +40,9 @@ class Expansion:
         phi, psi = unweighted(state, vectors.right), unweighted(state, vectors.left)
         slope = bilinear_gradient(state, kind, psi, phi, (name,))
         g, size = float((1j * slope.kappa).real), growth_size(state, kind, psi, phi)
-        turn = -1.0 if g < 0.0 else 1.0
+        # without damping g is rounding, and the parameter tells the sense
+        certain = abs(g) > ROUNDING * size
+        turn = -1.0 if (g if certain else slope.rates[name].real) < 0.0 else 1.0
         by_parameter = turn * slope.rates[name].real
         return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, Multilinear(state))
 
@@ -66,14 +68,15 @@ def limit_point(state: BalanceState, vectors: NullVectors, name: str, kappa: flo
     """a, b, g and the curvature: along the branch `p = p_0 + curvature eps^2`."""
     own = Expansion.of(state, Kind.INTEGER, vectors, name)
     a, b = 0.5 * float(own.psi @ own.squared()), float(own.psi @ state.residual_by(name))
-    return Terms({"a": a, "b": b, "g": own.g, "curvature": _ratio(-a, b)}, {"a": abs(a), "b": abs(b)})
+    return Terms({"a": a, "b": b, "g": own.g, "curvature": _ratio(-a, b)}, {"a": abs(a), "b": abs(b)}, own.g_size)
 
 
 def period_doubling(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
     """c3, d, g and the curvature."""
     own = Expansion.of(state, Kind.HALF, vectors, name)
     c3, d, size, _ = doubled(own, name)
-    return Terms({"c3": c3, "d": d, "g": own.g, "curvature": _ratio(-c3, d)}, {"c3": size, "g": own.g_size})
+    coefficients = {"c3": c3, "d": d, "g": own.g, "curvature": _ratio(-c3, d)}
+    return Terms(coefficients, {"c3": size, "g": own.g_size}, own.g_size)
 
 
 def doubled(own: Expansion, name: str) -> tuple[float, float, float, Array]:

@@ -11,8 +11,8 @@ and what remains at kappa is, with `i g = i psi^H dJ_kappa/dkappa phi`,
     g),    d = psi^H (J_p phi + R''[phi, X_p]) / (i g).
 
 The real part of c3 is the first Lyapunov coefficient: negative, a stable torus surrounds the motions that have lost
-stability (supercritical), with `|A|^2 = -Re d delta / Re c3`. Near `kappa = w0 / 3` and `w0 / 4` resonant terms of second
-and third order join; at those ratios the form says nothing.
+stability (supercritical), with `|A|^2 = -Re d delta / Re c3`. Near `kappa = w0 / 3` and `w0 / 4` resonant terms of
+second and third order join; at those ratios the form says nothing.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def torus(state: BalanceState, vectors: NullVectors, name: str, kappa: float) ->
         "d_frequency": d.imag,
         "curvature": -c3.real / d.real if d.real else float("nan"),
     }
-    return Terms(coefficients, {"c3": float(np.abs(parts).sum() / abs(g))})
+    return Terms(coefficients, {"c3": float(np.abs(parts).sum() / abs(g))}, 1.0)
 
 
 def labelled(form: NormalForm, share: float) -> NormalForm:

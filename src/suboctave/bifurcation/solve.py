@@ -26,7 +26,7 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 _TOLERANCE = 1e-10
 _STEP = 1e-9
 #: size of motion and forces at rest: products of it with others neither overflow nor vanish
-_NOTHING = 1e-100
+NOTHING = 1e-100
 #: step below which the matrix is not computed anew
 _SHORT = 1e-4
 #: step, in units of the motion and of the parameter's range, that leads to no bifurcation of this neighbourhood
@@ -145,7 +145,7 @@ def newton(
         if not all(e.size > 0.0 for e in equations):
             raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
-        force = max(state.force_scale(), _NOTHING)
+        force = max(state.force_scale(), NOTHING)
         error = float(np.linalg.norm(residual * rows)) / force
         error = max([error] + [abs(e.value) / e.size for e in equations])
         if not np.isfinite(error):
@@ -202,7 +202,7 @@ def _linearised(
     """
     n, q = len(rows), len(spans)
     matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
-    scale_x = max(motion_size(state), _NOTHING) / weight
+    scale_x = max(motion_size(state), NOTHING) / weight
     scale_rows = rows / force
     matrix[:n, :n] = state.jacobian * scale_rows[:, None] * scale_x
     matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span

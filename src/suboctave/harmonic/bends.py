@@ -106,7 +106,7 @@ def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, movin
             weights[0, 0, 0] += nodes.weights * uuu
             if not moving or rest[0] is None:
                 continue
-            uuv, uvv, vvv = (nodes.weights * part for part in rest)
+            uuv, uvv, vvv = (nodes.weights * np.asarray(part) for part in rest)
             for place in ((0, 0, 1), (0, 1, 0), (1, 0, 0)):
                 weights[place] += uuv
             for place in ((0, 1, 1), (1, 0, 1), (1, 1, 0)):

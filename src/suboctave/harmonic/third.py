@@ -21,9 +21,9 @@ from suboctave.harmonic.waves import Frequencies, Waves
 
 def third_derivative(state: BalanceState, a: Array, b: Array, c: Array) -> Array:
     """R'''[a, b, c] along changes of the coefficients, (2 H + 1, size) each; shape (dimension,)."""
-    waves = (Waves.of(state, Kind.INTEGER, one) for one in (a, b, c))
-    result: Array = Multilinear(state).third(*waves, Frequencies.of(state, Kind.INTEGER)).vector(Kind.INTEGER)
-    return result
+    first, second, third = (Waves.of(state, Kind.INTEGER, one) for one in (a, b, c))
+    at = Frequencies.of(state, Kind.INTEGER)
+    return Multilinear(state).third(first, second, third, at).vector(Kind.INTEGER)
 
 
 class Multilinear:
@@ -70,7 +70,7 @@ class Multilinear:
         return Waves(self._response(total, out), out)
 
     def _values(self, bend: Bends, a: Waves, zr: Array, zi: Array) -> ComplexArray:
-        """Change of q along a perturbation at instants, without the factor exp(i f_0 tau) of its lowest wave; (Q, N)."""
+        """Change of q along a perturbation at instants, (Q, N), without the factor of its lowest wave."""
         rows = (a.amplitudes @ bend.ins.T).T
         if bend.moving:
             rows = np.concatenate((rows, 1j * self.state.rate * a.at.values * rows))

@@ -35,7 +35,7 @@ class Frequencies:
     @cached_property
     def values(self) -> Array:
         """All of them, shape (count,)."""
-        return self.lowest + np.arange(self.count)
+        return np.asarray(self.lowest + np.arange(self.count), dtype=float)
 
 
 @dataclass(frozen=True)
