@@ -13,7 +13,7 @@ from suboctave.analysis.checks import check_bounds, check_parameter, check_range
 from suboctave.analysis.follow import Settings
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.track_follow import Box, TrackedTrace, follow_tracked
-from suboctave.analysis.tracked_branch import TrackedBranch, tracked_branch
+from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import null_row
 from suboctave.bifurcation import Bifurcation
@@ -120,7 +120,6 @@ def track(
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     options = {
         "bounds": {name: r for name, r in zip(names, ranges, strict=True) if r is not None},
-        "tracked": [bifurcation.kind, *names],
         "harmonics": asdict(wanted) if isinstance(wanted, AdaptiveHarmonics) else wanted,
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
@@ -128,12 +127,14 @@ def track(
         "observe": settings.observe,
     }
     context = {"system": system, "parameter": names[1], **options}
-    return tracked_branch(
+    return TrackedBranch(
         bifurcation.kind,
         names,
         system,
+        names[1],
         trace.points,
         [replace(event, context=context) for event in trace.events],
+        [],
         trace.closed,
         trace.ended,
         settings.observe,

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from suboctave.analysis.branch import Branch
+from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.problem import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
-from suboctave.model.system import System
 from suboctave.stability import FloquetResult, StabilityMethod
 
 
@@ -31,13 +29,17 @@ class TrackedPoint:
     orbit: PeriodicOrbit
     arclength: float
     iterations: int
-    method: StabilityMethod
+    method: StabilityMethod | None
     extra: float = 0.0
     coefficient: float = float("nan")
+    known: FloquetResult | None = None
 
     @lazy
     def floquet(self) -> FloquetResult:
         """Multipliers and their errors."""
+        if self.known is not None or self.method is None:
+            assert self.known is not None
+            return self.known
         return self.method.along(self.orbit.state())
 
 
@@ -75,7 +77,7 @@ class TrackedBranch(Branch):
     @cached_property
     def kappa(self) -> Array:
         """Frequency of the critical perturbation along an NS curve, rad per unit time; else zeros; shape (len,)."""
-        return np.array([p.extra if self.kind == "NS" else 0.0 for p in self._tracked])
+        return np.array([p.extra if self.kind == "NS" else 0.0 for p in self.tracked])
 
     @cached_property
     def coefficient(self) -> Array:
@@ -84,10 +86,11 @@ class TrackedBranch(Branch):
         c3 is negative where the doublings are supercritical and changes sign at a GPD; a does so at a cusp. Shape
         (len,).
         """
-        return np.array([p.coefficient for p in self._tracked])
+        return np.array([p.coefficient for p in self.tracked])
 
     @property
-    def _tracked(self) -> tuple[TrackedPoint, ...]:
+    def tracked(self) -> tuple[TrackedPoint, ...]:
+        """The points, with what only tracked curves have."""
         return self.points  # type: ignore[return-value]
 
     def _others_inside(self, point: Any) -> bool:
@@ -108,21 +111,22 @@ class TrackedBranch(Branch):
         return text + "\n" + repr(self.bifurcations)
 
 
-def tracked_branch(
-    kind: str,
-    names: tuple[str, str],
-    system: System,
-    points: list[TrackedPoint],
-    events: list[TrackedEvent],
-    closed: bool,
-    ended: str,
-    observe: int,
-    options: Mapping[str, Any],
-    warnings: tuple[str, ...],
-) -> TrackedBranch:
-    """A tracked curve of what following it gave."""
-    items: list[Bifurcation] = list(events)
-    return TrackedBranch(kind, names, system, names[1], points, items, [], closed, ended, observe, options, warnings)
+def tracked_record(branch: TrackedBranch) -> dict[str, Any]:
+    """What a file holds of a tracked curve besides what it holds of any branch."""
+    return {
+        "kind": branch.kind,
+        "names": branch.names,
+        "extra": [p.extra for p in branch.tracked],
+        "coefficient": [p.coefficient for p in branch.tracked],
+    }
 
 
-__all__ = ["TrackedBranch", "TrackedPoint", "tracked_branch"]
+def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> list[Any]:
+    """Points that were read, as those of a tracked curve."""
+    return [
+        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet)
+        for p, extra, coefficient in zip(points, record["extra"], record["coefficient"], strict=True)
+    ]
+
+
+__all__ = ["TrackedBranch", "TrackedPoint", "tracked_points", "tracked_record"]
