@@ -24,7 +24,7 @@ from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered
 from suboctave.bifurcation.gaps import level_rate, levels
 from suboctave.bifurcation.grazing import basis_rows, read_direction
 from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
+from suboctave.harmonic.perturbation import Kind, bilinear_gradient, form_rates, parameter_gradient
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
@@ -51,6 +51,16 @@ class Equations(ABC):
     @abstractmethod
     def renewed(self) -> Augmentation:
         """The augmentation with bordering vectors of this motion."""
+
+
+def gradient_of(b: Bordered, names: tuple[str, str]) -> tuple[np.ndarray, dict[str, complex], complex]:
+    """The gradient of g, the parameters' part apart: most of it is the same whatever the parameters are."""
+    named = tuple(name for name in names if name != "omega")
+    rates = form_rates(b.state, b.kind, b.left, b.right, named, b.kappa)
+    if rates is None:
+        return b.gradient(names)
+    by_x, plain, by_kappa = b.gradient(("omega",))
+    return by_x, plain | {name: -rate for name, rate in rates.items()}, by_kappa
 
 
 class Augmentation(ABC):
@@ -131,7 +141,7 @@ class SingularEquations(Equations):
     @lazy
     def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
-        return self.bordered.gradient(tuple(dict.fromkeys(self.names)))
+        return gradient_of(self.bordered, self.names)
 
     @property
     def rows(self) -> Array:
@@ -206,7 +216,7 @@ class BranchPointEquations(Equations):
     @lazy
     def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
-        return self.bordered.gradient(self.names)
+        return gradient_of(self.bordered, self.names)
 
     @property
     def rows(self) -> Array:
