@@ -256,7 +256,8 @@ def _start(
         spans,
         orbit.omega,
         adaptive,
-        0.0 if adaptive is None else adaptive.event_tolerance,
+        # between what a response curve needs and what a located event does
+        0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
         max(force, floor),
         floor,
         {balance.basis: balance},

@@ -11,7 +11,7 @@ from suboctave.analysis.follow import Settings
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, tests_of
+from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
@@ -115,7 +115,8 @@ class _Tracker:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
         for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
-            self.trace.events.append(as_event(found, settings.stability, settings.observe))
+            item = refined(found, settings.newton, self.trace.warnings)
+            self.trace.events.append(as_event(item, settings.stability, settings.observe))
         self._add(new)
         self.previous = new
         if settings.report is not None:
@@ -139,7 +140,8 @@ class _Tracker:
     def _take_end(self, a: TrackedSample, end: End) -> None:
         settings, arclength = self.settings, a.point.arclength + end.way(a)
         if end.event is not None:
-            item = as_event(end.event, settings.stability, settings.observe)
+            found = refined(end.event, settings.newton, self.trace.warnings)
+            item = as_event(found, settings.stability, settings.observe)
             self.trace.events.append(replace(item, arclength=arclength))
         if end.last is not None:
             self.trace.points.append(TrackedPoint(end.last, arclength, 0, settings.stability))

@@ -26,6 +26,8 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 
 #: distance of the critical multiplier from the unit circle up to which harmonics suffice
 _CRITICAL = 1e-3
+#: steps after which that is looked at again
+_LOOKED_AT = 5
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -110,6 +112,8 @@ class TrackedCurve:
         Rule for the number of harmonics (None to keep it) and the neglected share of the motion that is tolerated.
     force, floor
         Size of the forces at the last point; size below which residuals are not judged (a motion at rest).
+    steps
+        How many steps lie behind.
     """
 
     balance: HarmonicBalance
@@ -122,6 +126,7 @@ class TrackedCurve:
     force: float
     floor: float
     cache: dict[HarmonicBasis, HarmonicBalance]
+    steps: int = 0
 
     @property
     def parameter(self) -> int:
@@ -180,15 +185,19 @@ class TrackedCurve:
         self.cache[balance.basis] = balance
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
-        return replace(self, balance=balance, augmentation=augmentation, force=max(state.force_scale(), self.floor))
+        force = max(state.force_scale(), self.floor)
+        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
 
     def _basis(self, evaluation: TrackedEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
         """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""
         state, present = evaluation.state, self.balance.basis
         basis = choose_harmonics(state, adaptive, self.tolerance)
-        if basis.harmonics > present.harmonics or evaluation.doubt <= 0.1 * _CRITICAL:
+        lower = basis.harmonics < present.harmonics
+        if basis.harmonics > present.harmonics or not (lower or self.steps % _LOOKED_AT == 0):
             return basis
-        return next_harmonics(state, adaptive) if evaluation.doubt > _CRITICAL else present
+        if evaluation.doubt > _CRITICAL:
+            return next_harmonics(state, adaptive)
+        return present if lower and evaluation.doubt > 0.1 * _CRITICAL else basis
 
     def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         if basis == self.balance.basis:

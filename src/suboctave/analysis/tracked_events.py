@@ -16,10 +16,10 @@ by the cusp's function keep their signs. (Kuznetsov, Elements of Applied Bifurca
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_sample import TrackedSample
+from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
 from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
 from suboctave.bifurcation.tracked import TrackedEvent
@@ -27,7 +27,11 @@ from suboctave.continuation.events import locate_zero
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.selection import choose_harmonics
 from suboctave.stability import StabilityMethod
+
+#: way along a curve, in scaled arclength, that more harmonics may move an event
+_BESIDE = 0.05
 
 
 class CurveTest(ABC):
@@ -183,6 +187,37 @@ def _extreme(test: CurveTest, a: TrackedSample) -> str:
     return "maximum" if a.point.tangent[a.curve.index(test.name)] > 0.0 else "minimum"
 
 
+def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
+    """An event located again with the harmonics that events ask for."""
+    sample = found.sample
+    arclength = sample.point.arclength
+    for _ in range(6):
+        curve = sample.curve
+        if curve.adaptive is None:
+            break
+        basis = choose_harmonics(sample.state, curve.adaptive, curve.adaptive.event_tolerance)
+        if basis.harmonics <= curve.balance.basis.harmonics:
+            break
+        finer = curve.with_basis(basis)
+        u = finer.transfer(sample.point.u, curve)
+        try:
+            x, _, omega, values = finer.split(u)
+            finer = replace(finer, balance=finer.balance.settle(x, omega, values))
+            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton)
+            near = TrackedSample(start)
+            test = found.test.within(near, near)
+            sample = zero_along(start, test.value, newton, _BESIDE)
+        except ConvergenceError as failure:
+            warnings.append(
+                f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
+                f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
+            )
+            break
+    if sample is found.sample:
+        return found
+    return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
+
+
 def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEvent:
     """An event as users get it; `observe`: the DOF whose amplitude is reported."""
     sample = found.sample
@@ -203,4 +238,4 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
     )
 
 
-__all__ = ["CurveTest", "Found", "as_event", "events_between", "tests_of"]
+__all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]

@@ -14,7 +14,7 @@ import numpy as np
 from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form_real import Expansion
+from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -23,7 +23,6 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
 from suboctave.harmonic.state import BalanceState
-from suboctave.harmonic.third import Multilinear
 from suboctave.lazy import lazy
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
@@ -97,11 +96,9 @@ class TrackedSample:
     @lazy
     def cubic(self) -> float:
         """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
-        equations, state = self.equations, self.state
-        b, by_x = equations.bordered, equations.gradient[0].real
-        by_motion = -by_x.reshape(state.x.shape)
-        own = Expansion(state, Kind.HALF, b.right, b.left, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
-        return own.cubic(self._other_factor.solve(-0.5 * own.squared()))[0]
+        b, by_x = self.equations.bordered, self.equations.gradient[0].real
+        by_motion = -by_x.reshape(self.state.x.shape)
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._other_factor)
 
     @lazy
     def coefficient(self) -> float:
