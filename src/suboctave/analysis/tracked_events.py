@@ -18,12 +18,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
+from scipy.optimize import brentq
+
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
 from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
 from suboctave.bifurcation.tracked import TrackedEvent
-from suboctave.continuation.events import locate_zero
+from suboctave.continuation.march import point_between
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
@@ -32,6 +34,8 @@ from suboctave.stability import StabilityMethod
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
+#: share of a step to which an event is located
+_RESOLVED = 1e-11
 
 
 class CurveTest(ABC):
@@ -166,19 +170,24 @@ def events_between(
             continue
         smooth = test.within(a, b)
         try:
-            point = locate_zero(
-                a.point,
-                b.point,
-                smooth.value(a),
-                smooth.value(b),
-                lambda p, smooth=smooth: smooth.value(TrackedSample(p)),  # type: ignore[misc]
-                newton,
-            )
+            sample = _zero_between(a, b, smooth, newton)
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
             continue
-        found.append(Found(test, TrackedSample(point), _extreme(test, a)))
+        found.append(Found(test, sample, _extreme(test, a)))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def _zero_between(a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> TrackedSample:
+    """Where a test vanishes between two neighbours, by Brent's method on the way along the chord."""
+    known = {0.0: a, 1.0: b}
+
+    def value(share: float) -> float:
+        if share not in known:
+            known[share] = TrackedSample(point_between(a.point, b.point, share, newton))
+        return test.value(known[share])
+
+    return known[float(brentq(value, 0.0, 1.0, xtol=_RESOLVED, rtol=8.9e-16))]
 
 
 def _extreme(test: CurveTest, a: TrackedSample) -> str:

@@ -193,17 +193,18 @@ def form_rates(
     None where that takes more than the elements' coefficients and the linear part: elements with nodes of their own, a
     condensed model.
     """
-    linear = state.linear
+    linear, elements = state.linear, state.balance.elements
     if state.nodal or state.compliance is not None:
         return None
-    size = state.balance.size
-    u, f = _as_waves(left, kind, size, left=True)
-    v, _ = _as_waves(right, kind, size, left=False)
-    frequency = f * state.rate + (kappa if kind is Kind.FREE else 0.0)
-    rates = dict.fromkeys(names, 0j)
+    size, rates = state.balance.size, dict.fromkeys(names, 0j)
     for name in names:
-        for element, local in zip(state.balance.elements, state.local_motions, strict=True):
-            change = coefficient_rates(element, state.values, {name: 1.0})
+        changes = [coefficient_rates(element, state.values, {name: 1.0}) for element in elements]
+        if not (name in linear_names(state) or any(change.any() for change in changes)):
+            continue
+        u, f = _as_waves(left, kind, size, left=True)
+        v, _ = _as_waves(right, kind, size, left=False)
+        frequency = f * state.rate + (kappa if kind is Kind.FREE else 0.0)
+        for element, local, change in zip(elements, state.local_motions, changes, strict=True):
             if change.any():
                 d = linear.retain(element.direction(state.balance.system.n))
                 rates[name] += _change_of_form(local, change, u @ d, v @ d, frequency)
@@ -211,6 +212,12 @@ def form_rates(
         if block is not None:
             rates[name] += _form(u, block, v)
     return rates if kind is Kind.FREE else {name: complex(rate.real) for name, rate in rates.items()}
+
+
+def linear_names(state: BalanceState) -> frozenset[str]:
+    """Parameters that the linear part depends on."""
+    system = state.balance.system
+    return frozenset(system.mass.names | system.damping.names | system.stiffness.names)
 
 
 def _change_of_form(
