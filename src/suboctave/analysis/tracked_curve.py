@@ -93,7 +93,7 @@ class TrackedEvaluation:
             shaped = (state.residual + addition).reshape(state.x.shape)
             size = length(shaped * state.balance.scales()[1])
         balanced = size / max(state.force_scale(), self.curve.floor, _TINY)
-        return max(balanced, float(np.abs(self.equations.values).max()))
+        return max(balanced, *map(abs, self.equations.values.tolist()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -132,7 +132,7 @@ class SingularEquations(Equations):
         """g with its null vectors."""
         return bordered(self.state, self.of.kind, self.of.borders, self.kappa)
 
-    @property
+    @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
         g = self.bordered.g / self.state.omega**2
@@ -207,7 +207,7 @@ class BranchPointEquations(Equations):
         value = self.state.omega if p == "omega" else abs(self.state.values[p])
         return self.of.force / (value or 1.0)
 
-    @property
+    @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
         b = self.bordered
@@ -285,7 +285,7 @@ class GrazingEquations(Equations):
     def _size(self) -> float:
         return motion_size(self.state) / float(np.max(self.state.balance.scales()[0])) or 1.0
 
-    @property
+    @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
         gap = levels(self.state.local(self.of.element))[self.of.index]

@@ -52,11 +52,12 @@ def cubic_coefficient(state: BalanceState, phi: Array, psi: Array, by_motion: Ar
             if not len(part.zr):
                 continue
             p, q = _values(along, part.zr, part.zi)
-            total = float((part.weights[0, 0, 0] * p**3) @ q)
+            square = p * p
+            total = float((part.weights[0, 0, 0] * square) @ (p * q))
             if part.slopes is not None:
                 k = 1j * (np.arange(along.shape[1]) + 0.5)
                 dp, dq = _values(np.ascontiguousarray(k * along), part.zr, part.zi)
-                total += float((part.slopes[0, 0, 0] * p**2) @ (3.0 * dp * q + p * dq))
+                total += float((part.slopes[0, 0, 0] * square) @ (3.0 * dp * q + p * dq))
             third += total / (2.0 * np.pi)
     bent = factor.solve(-0.5 * second.ravel())
     return float(by_motion.ravel() @ bent) + third / 6.0
@@ -70,6 +71,9 @@ def _waves(vector: Array) -> ComplexArray:
 
 def _values(waves: ComplexArray, zr: Array, zi: Array) -> Array:
     """These functions at instants, up to a sign that all of them share."""
-    half = np.sqrt(zr + 1j * zi)
-    result: Array = (kernels.polynomial(waves, zr, zi) * half).real
+    cosine = np.sqrt(0.5 * (1.0 + zr))
+    # beside tau = pi, where the cosine of the half angle vanishes, its sine does not
+    sine = np.copysign(np.sqrt(0.5 * (1.0 - zr)), zi)
+    values = kernels.polynomial(waves, zr, zi)
+    result: Array = values.real * cosine - values.imag * sine
     return result
