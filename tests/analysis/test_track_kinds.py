@@ -161,6 +161,15 @@ def test_branch_points_where_a_symmetry_forces_them(pitchfork):
     assert curve.omega[-1] == pytest.approx(witness.omega, abs=1e-6)
 
 
+def test_extrema_that_a_long_step_holds_two_of(pitchfork):
+    expected = so.track(pitchfork, "F", (1.0, 15.0), max_step=0.03).extrema
+    assert len(expected) == 4
+    found = so.track(pitchfork, "F", (1.0, 15.0), max_step=0.5).extrema
+    assert [e.remark() for e in found] == [e.remark() for e in expected]
+    for a, b in zip(found, expected, strict=True):
+        assert (a.omega, a.parameter("F")) == pytest.approx((b.omega, b.parameter("F")), abs=1e-5)
+
+
 def test_branch_points_end_where_the_symmetry_does(pitchfork):
     curve = so.track(pitchfork, "q", (-0.1, 0.1))
     assert len(curve) == 1
@@ -202,17 +211,18 @@ def test_tori_by_shooting(absorber):
 
 
 @pytest.mark.parametrize(
-    ("harmonics", "tolerance"), [(31, 0.05), pytest.param("adaptive", 1e-3, marks=pytest.mark.slow)]
+    ("harmonics", "tolerance"), [(15, None), pytest.param("adaptive", 1e-3, marks=pytest.mark.slow)]
 )
 def test_fold_flips_from_both_curves_through_them(harmonics, tolerance):
     curve = so.frequency_response(so.library.two_mass_unilateral(), (0.6, 0.8), harmonics).bifurcations
-    folds = so.track(curve["LP"][0], "F", (0.09, 0.12))
-    flips = so.track(curve["PD"][1], "F", (0.09, 0.12))
+    folds = so.track(curve["LP"][0], "F", (0.07, 0.12))
+    flips = so.track(curve["PD"][1], "F", (0.06, 0.12), max_step=0.2)
     (a,), (b,) = folds.bifurcations["LPPD"], flips.bifurcations["LPPD"]
     assert (a.omega, a.parameter("F")) == pytest.approx((b.omega, b.parameter("F")), abs=1e-8)
-    assert a.critical_multiplier().real == pytest.approx(1.0, abs=tolerance)
-    assert b.critical_multiplier().real == pytest.approx(-1.0, abs=tolerance)
-    assert np.abs(a.multipliers - b.critical_multiplier()).min() < 1e-6
+    assert a.orbit.coefficients[:5] == pytest.approx(b.orbit.coefficients[:5], abs=1e-7)
+    if tolerance is not None:
+        assert a.critical_multiplier().real == pytest.approx(1.0, abs=tolerance)
+        assert b.critical_multiplier().real == pytest.approx(-1.0, abs=tolerance)
 
 
 def test_strong_resonances_of_two_masses():

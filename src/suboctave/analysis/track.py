@@ -23,7 +23,6 @@ from suboctave.bifurcation.augmented import (
     GrazingContactEquations,
     SingularOperator,
 )
-from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TRACKED_KINDS
 from suboctave.compiled import computation_begins
@@ -214,15 +213,15 @@ def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, str]
         places = np.array(levels(state.local(item.contact.element)))
         index = int(np.argmin(np.abs(places - item.contact.gap)))
         tau = item.contact.time * state.rate
-        return GrazingContactEquations(item.contact.element, index), np.array([tau])
+        return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
     if item.kind == "BP":
-        return BranchPointUnfolded(null_vectors(state, Kind.INTEGER), names[0], state.force_scale()), np.zeros(1)
+        return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
     kind = _OPERATORS[item.kind]
     extra = np.zeros(0)
     if kind is Kind.FREE:
         kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
         extra = np.array([kappa])
-    return SingularOperator(kind, null_vectors(state, kind, float(extra.sum()))), extra
+    return SingularOperator.of(state, kind, float(extra.sum())), extra
 
 
 def _start(

@@ -18,7 +18,6 @@ from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import CurveTest, DoubleMultiplier, Found, GeneralisedDoubling
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
 from suboctave.bifurcation.augmented import BranchPointUnfolded, SingularOperator
-from suboctave.bifurcation.bordered import null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
@@ -120,7 +119,7 @@ def _zero_beside(
 ) -> Found:
     """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
     state = curve.balance.at(x, a.state.omega, a.state.values)
-    curve = replace(curve, augmentation=SingularOperator(operator, null_vectors(state, operator)))
+    curve = replace(curve, augmentation=SingularOperator.of(state, operator))
     u = curve.join(x, np.zeros(0), a.point.u[-2:])
     start = nearest_point(curve, u, curve.weights(u, curve.size(u)), newton)
     return Found(test, zero_along(start, test.value, newton, reach))

@@ -15,6 +15,7 @@ by the cusp's function keep their signs. (Kuznetsov, Elements of Applied Bifurca
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
@@ -165,17 +166,46 @@ def events_between(
     """Every event between two neighbours in the same discretisation, in the order met."""
     found = []
     for test in tests:
-        first, last = test.value(a), test.value(b)
-        if not (first * last < 0.0 or (last == 0.0 and first != 0.0)):
-            continue
-        smooth = test.within(a, b)
         try:
-            sample = _zero_between(a, b, smooth, newton)
+            for low, high in _brackets(test, a, b, newton):
+                sample = _zero_between(low, high, test.within(low, high), newton)
+                found.append(Found(test, sample, _extreme(test, low)))
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
-            continue
-        found.append(Found(test, sample, _extreme(test, a)))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def _brackets(
+    test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
+) -> list[tuple[TrackedSample, TrackedSample]]:
+    """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    first, last = test.value(a), test.value(b)
+    if first * last < 0.0 or (last == 0.0 and first != 0.0):
+        return [(a, b)]
+    share = _turn_inside(test.name, a, b) if isinstance(test, Extremum) else None
+    if share is None:
+        return []
+    middle = TrackedSample(point_between(a.point, b.point, share, newton))
+    return [(a, middle), (middle, b)] if test.value(middle) * first < 0.0 else []
+
+
+def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
+    """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
+    i, way = a.curve.index(name), b.point.arclength - a.point.arclength
+    if not way > 0.0:
+        return None
+    chord = float(b.point.u[b.curve.index(name)] - a.point.u[i]) / way
+    start, stop = float(a.point.tangent[i]), float(b.point.tangent[b.curve.index(name)])
+    # the slope start (1 - s) (1 - 3 s) + stop s (3 s - 2) + 6 chord s (1 - s) has its vertex at s
+    curve = 3.0 * start + 3.0 * stop - 6.0 * chord
+    if curve == 0.0:
+        return None
+    s = (2.0 * start + stop - 3.0 * chord) / curve
+    if not 0.0 < s < 1.0:
+        return None
+    slope = start * (1.0 - s) * (1.0 - 3.0 * s) + stop * s * (3.0 * s - 2.0) + 6.0 * chord * s * (1.0 - s)
+    # where it nearly vanishes the interpolation cannot tell
+    return s if slope * math.copysign(1.0, start) < 0.05 * abs(start) else None
 
 
 def _zero_between(a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> TrackedSample:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered
+from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.bifurcation.gaps import level_rate, levels
 from suboctave.bifurcation.grazing import basis_rows, read_direction
 from suboctave.harmonic.basis import Array, HarmonicBasis
@@ -90,10 +90,19 @@ class Augmentation(ABC):
 
 @dataclass(frozen=True)
 class SingularOperator(Augmentation):
-    """J_kappa is singular: LP (Kind.INTEGER), PD (Kind.HALF), NS (Kind.FREE, with kappa unknown)."""
+    """J_kappa is singular: LP (Kind.INTEGER), PD (Kind.HALF), NS (Kind.FREE, with kappa unknown).
+
+    `unit` is what g is measured in, omega^2.
+    """
 
     kind: Kind
     borders: NullVectors
+    unit: float
+
+    @classmethod
+    def of(cls, state: BalanceState, kind: Kind, kappa: float = 0.0) -> SingularOperator:
+        """With the null vectors at a motion."""
+        return cls(kind, null_vectors(state, kind, kappa), state.omega**2)
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -135,7 +144,7 @@ class SingularEquations(Equations):
     @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
-        g = self.bordered.g / self.state.omega**2
+        g = self.bordered.g / self.of.unit
         return np.array([g.real, g.imag] if self.of.extras else [g.real])
 
     @lazy
@@ -148,24 +157,41 @@ class SingularEquations(Equations):
         """See `Equations.rows`."""
         by_x, rates, by_kappa = self.gradient
         extra = [by_kappa] if self.of.extras else []
-        whole = np.concatenate((by_x, extra, [rates[name] for name in self.names])) / self.state.omega**2
+        whole = np.concatenate((by_x, extra, [rates[name] for name in self.names])) / self.of.unit
         return np.array([whole.real, whole.imag] if self.of.extras else [whole.real])
 
     def renewed(self) -> SingularOperator:
         """See `Equations.renewed`."""
-        return replace(self.of, borders=self.bordered.vectors)
+        return replace(self.of, borders=self.bordered.vectors, unit=self.state.omega**2)
 
 
 @dataclass(frozen=True)
 class BranchPointUnfolded(Augmentation):
-    """J_0 is singular and R_p lies in its range, with the unfolding beta in units of the forces that balance.
+    """J_0 is singular and R_p lies in its range, with the unfolding beta in units of the forces that balance, `force`.
 
-    `parameter` is p, one of the two free ones.
+    `parameter` is p, one of the two free ones; `units` are those of g, omega^2, and of psi . R_p, force over the
+    parameter's own size.
     """
 
     borders: NullVectors
     parameter: str
     force: float
+    units: tuple[float, float]
+
+    @classmethod
+    def of(cls, state: BalanceState, parameter: str) -> BranchPointUnfolded:
+        """With the null vectors at a motion."""
+        return cls(null_vectors(state, Kind.INTEGER), parameter, state.force_scale(), cls._units(state, parameter))
+
+    @staticmethod
+    def _units(state: BalanceState, parameter: str) -> tuple[float, float]:
+        value = state.omega if parameter == "omega" else abs(state.values[parameter])
+        return state.omega**2, state.force_scale() / (value or 1.0)
+
+    def renewed(self, state: BalanceState, borders: NullVectors) -> BranchPointUnfolded:
+        """The same at another motion, with its null vectors."""
+        units = self._units(state, self.parameter)
+        return replace(self, borders=borders, force=state.force_scale(), units=units)
 
     name = "BP"
     extras = 1
@@ -200,18 +226,11 @@ class BranchPointEquations(Equations):
     def _slope(self) -> Array:
         return self.state.residual_by(self.of.parameter)
 
-    @property
-    def _size(self) -> float:
-        """Unit of psi . R_p: its change is compared with that of the forces over the parameter's own size."""
-        p = self.of.parameter
-        value = self.state.omega if p == "omega" else abs(self.state.values[p])
-        return self.of.force / (value or 1.0)
-
     @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
         b = self.bordered
-        return np.array([b.g.real / self.state.omega**2, float(b.left @ self._slope) / self._size])
+        return np.array([b.g.real, float(b.left @ self._slope)]) / self.of.units
 
     @lazy
     def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
@@ -226,22 +245,31 @@ class BranchPointEquations(Equations):
         w = b.factor.solve(np.append(self._slope * b.scale, 0.0))[:-1] * b.scale
         first = parameter_gradient(state, b.left, self.of.parameter, self.names)
         second = bilinear_gradient(state, Kind.INTEGER, b.left, w, self.names)
-        top = np.concatenate((by_x.real, [0.0], [rates[name].real for name in self.names])) / state.omega**2
+        top = np.concatenate((by_x.real, [0.0], [rates[name].real for name in self.names]))
         along = [(first.rates[name] - second.rates[name]).real for name in self.names]
-        below = np.concatenate(((first.x - second.x).real.ravel(), [0.0], along)) / self._size
-        return np.array([top, below])
+        below = np.concatenate(((first.x - second.x).real.ravel(), [0.0], along))
+        return np.array([top / self.of.units[0], below / self.of.units[1]])
 
     def renewed(self) -> BranchPointUnfolded:
         """See `Equations.renewed`."""
-        return replace(self.of, borders=self.bordered.vectors, force=self.state.force_scale())
+        return self.of.renewed(self.state, self.bordered.vectors)
 
 
 @dataclass(frozen=True)
 class GrazingContactEquations(Augmentation):
-    """An extremum of an element's relative displacement reaches one of its gaps, at an instant tau of the period."""
+    """An extremum of an element's relative displacement reaches one of its gaps, at an instant tau of the period.
+
+    `unit` is a displacement, the size of the motion.
+    """
 
     element: int
     index: int
+    unit: float
+
+    @classmethod
+    def of(cls, state: BalanceState, element: int, index: int) -> GrazingContactEquations:
+        """With the unit of a motion."""
+        return cls(element, index, motion_size(state) / float(np.max(state.balance.scales()[0])) or 1.0)
 
     name = "grazing"
     extras = 1
@@ -282,15 +310,11 @@ class GrazingEquations(Equations):
         return value, slope, curve
 
     @lazy
-    def _size(self) -> float:
-        return motion_size(self.state) / float(np.max(self.state.balance.scales()[0])) or 1.0
-
-    @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
         gap = levels(self.state.local(self.of.element))[self.of.index]
         value, slope, _ = self.derivatives
-        return np.array([value - gap, slope]) / self._size
+        return np.array([value - gap, slope]) / self.of.unit
 
     @property
     def rows(self) -> Array:
@@ -300,11 +324,11 @@ class GrazingEquations(Equations):
         gap = [-level_rate(self.state, self.of.element, self.of.index, name) for name in self.names]
         above = np.concatenate((np.multiply.outer(first, direction).ravel(), [slope], gap))
         level = np.concatenate((np.multiply.outer(second, direction).ravel(), [curve], [0.0, 0.0]))
-        return np.array([above, level]) / self._size
+        return np.array([above, level]) / self.of.unit
 
     def renewed(self) -> GrazingContactEquations:
         """See `Equations.renewed`."""
-        return self.of
+        return GrazingContactEquations.of(self.state, self.of.element, self.of.index)
 
 
 __all__ = ["Augmentation", "BranchPointUnfolded", "Equations", "GrazingContactEquations", "SingularOperator"]
