@@ -22,8 +22,23 @@ from typing import TYPE_CHECKING
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
-    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, track, verify
-    from suboctave.bifurcation import Bifurcation
+    from suboctave.analysis import (
+        BifurcationDiagram,
+        Branch,
+        Results,
+        Seeds,
+        bifurcation_diagram,
+        continue_branch,
+        find_subharmonics,
+        frequency_response,
+        load,
+        periodic_orbit,
+        stability,
+        switch_branch,
+        track,
+        verify,
+    )
+    from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
     from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
@@ -49,7 +64,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
-    from suboctave.pictures import plot, write_report
+    from suboctave.pictures import plot, plot_history, plot_phase, plot_spectrum, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -82,10 +97,19 @@ _HOME = {
     "SteppingOptions": "suboctave.continuation",
     "Event": "suboctave.continuation",
     "Bifurcation": "suboctave.bifurcation",
+    "BifurcationDiagram": "suboctave.analysis",
+    "BorderedSystem": "suboctave.bifurcation",
+    "ExtendedSystem": "suboctave.bifurcation",
+    "Alcorta2019": "suboctave.bifurcation",
     "Branch": "suboctave.analysis",
+    "bifurcation_diagram": "suboctave.analysis",
+    "find_subharmonics": "suboctave.analysis",
     "frequency_response": "suboctave.analysis",
+    "periodic_orbit": "suboctave.analysis",
+    "Seeds": "suboctave.analysis",
     "continue_branch": "suboctave.analysis",
     "stability": "suboctave.analysis",
+    "switch_branch": "suboctave.analysis",
     "Arbitration": "suboctave.stability",
     "Monodromy": "suboctave.stability",
     "Hill": "suboctave.stability",
@@ -95,6 +119,9 @@ _HOME = {
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
     "plot": "suboctave.pictures",
+    "plot_history": "suboctave.pictures",
+    "plot_phase": "suboctave.pictures",
+    "plot_spectrum": "suboctave.pictures",
     "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
@@ -103,10 +130,13 @@ _HOME = {
 
 __all__ = [
     "AdaptiveHarmonics",
+    "Alcorta2019",
     "Arbitration",
     "BaseAcceleration",
     "BaseDisplacement",
     "Bifurcation",
+    "BifurcationDiagram",
+    "BorderedSystem",
     "Branch",
     "Callable",
     "Clearance",
@@ -117,6 +147,7 @@ __all__ = [
     "Element",
     "Event",
     "Expression",
+    "ExtendedSystem",
     "Freeplay",
     "Gravity",
     "HarmonicBalance",
@@ -132,19 +163,27 @@ __all__ = [
     "QuadraticDamper",
     "Results",
     "RotatingUnbalance",
+    "Seeds",
     "StaticLoad",
     "SteppingOptions",
     "SuboctaveError",
     "System",
     "TanhFriction",
     "__version__",
+    "bifurcation_diagram",
     "check_derivatives",
     "continue_branch",
+    "find_subharmonics",
     "frequency_response",
     "library",
     "load",
+    "periodic_orbit",
     "plot",
+    "plot_history",
+    "plot_phase",
+    "plot_spectrum",
     "stability",
+    "switch_branch",
     "track",
     "verify",
     "write_report",

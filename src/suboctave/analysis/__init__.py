@@ -1,23 +1,32 @@
 """What a user calls: response curves, curves along any parameter, stability and verification of single motions."""
 
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.results import Results, Table, load
+from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
+from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
 __all__ = [
+    "BifurcationDiagram",
     "Branch",
     "BranchPoint",
     "Results",
+    "Seeds",
     "Table",
     "TrackedBranch",
     "Verification",
+    "bifurcation_diagram",
     "continue_branch",
+    "find_subharmonics",
     "frequency_response",
     "load",
+    "periodic_orbit",
     "stability",
+    "switch_branch",
     "track",
     "verify",
 ]

@@ -17,6 +17,7 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.junction import Junction
 from suboctave.analysis.tracked_branch import TrackedBranch, tracked_points, tracked_record
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import NullVectors
@@ -40,7 +41,9 @@ if TYPE_CHECKING:
 
 __all__ = ["branch_from_dataset", "branch_to_dataset"]
 
-_CLASSES = {c.__name__: c for c in (Audit, Unsettled, GrazingContact, AdaptiveHarmonics, FloquetResult, NormalForm)}
+_CLASSES = {
+    c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
+}
 _MEANINGS = {
     "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
     "event_coefficients": "the same of the motions at events",
@@ -83,6 +86,8 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "audit": branch.audit,
         "closed": bool(branch.closed),
         "ended": branch.ended,
+        "departs": branch.departs,
+        "arrives": branch.arrives,
         "observe": int(branch.observe),
         "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
@@ -173,6 +178,7 @@ class _Discretisation:
     samples: tuple[int | None, ...]
     values: tuple[float, ...]
     linear: str
+    kept: tuple[int, ...] | None = None
 
 
 class _Writer:
@@ -214,6 +220,7 @@ class _Writer:
                 tuple(None if s is None else int(s) for s in balance.samples),
                 tuple(float(balance.values[name]) for name in balance.system.parameters),
                 "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
+                balance.basis.kept,
             )
             self._balances[id(balance)] = (balance, self._shared.setdefault(shared, len(self._shared)))
         return self._balances[id(balance)][1]
@@ -292,7 +299,7 @@ class _Reader:
             )
         values = dict(zip(system.parameters, d.values, strict=True))
         given = linear if d.linear else None
-        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu), values, given, d.samples)
+        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu, d.kept), values, given, d.samples)
 
     def array(self, name: str) -> np.ndarray:
         if name in self.dataset:
@@ -321,6 +328,8 @@ class _Reader:
             record["options"],
             record["warnings"],
             record["audit"],
+            record.get("departs"),
+            record.get("arrives"),
         )
         branch.seconds = record["seconds"]
         return branch
@@ -356,9 +365,11 @@ class _Reader:
             if said["context"] is not None:
                 context = dict(self.tables["contexts"][said["context"]])
                 context["system"] = self.systems[context["system"]]
-            made = TrackedEvent if "curve" in said["fields"] else Bifurcation
-            event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **said["fields"])
-            events.append(event.with_normal_form(said["normal_form"]))
+            # older files hold no normal forms: they are computed when asked for
+            fields = {name: value for name, value in said["fields"].items() if name != "criticality"}
+            made = TrackedEvent if "curve" in fields else Bifurcation
+            event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            events.append(event.with_normal_form(said["normal_form"]) if "normal_form" in said else event)
         return events
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
-from suboctave.analysis.follow import Settings
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_follow import Box, TrackedTrace, follow_tracked
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
@@ -192,7 +192,7 @@ def _discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonic
     if isinstance(wanted, str) and wanted == "adaptive":
         wanted = AdaptiveHarmonics()
     if isinstance(wanted, AdaptiveHarmonics):
-        return wanted, basis
+        return wanted, basis.filled
     if isinstance(wanted, (int, np.integer)) and not isinstance(wanted, bool) and wanted >= 1:
         return None, HarmonicBasis(int(wanted) * basis.nu, basis.nu)
     raise InputError(

@@ -39,11 +39,11 @@ _UNFOLDING = 1e-8
 
 @dataclass(frozen=True)
 class End:
-    """Why a curve ends, the event there where it was located, and its last motion where that is one of the curve's."""
+    """Why a curve ends, the event there where it was located, and whether the motion there is the curve's last."""
 
     reason: str
     event: Found | None = None
-    last: PeriodicOrbit | None = None
+    last: bool = False
 
     def way(self, a: TrackedSample) -> float:
         """Distance in the plane of the parameters from a point to the event, in scaled arclength."""
@@ -73,7 +73,7 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
     if parent is not None:
         where = parent.sample.curve.where(parent.sample.point.u)
         reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
-        return End(reason, parent, _rebased(parent.sample.orbit, a))
+        return End(reason, parent, last=True)
     if share <= _NOTHING_LEFT:
         return End(
             f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are period "
@@ -125,7 +125,7 @@ def _zero_beside(
     return Found(test, zero_along(start, test.value, newton, reach))
 
 
-def _rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
+def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
     """A motion of the parent in the basis of a curve of doubled motions."""
     balance = a.curve.balance
     return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
@@ -160,4 +160,4 @@ def _parts(point: CurvePoint) -> list[Array]:
     return [x[1:][k % prime != 0].ravel() for prime in primes]
 
 
-__all__ = ["End", "end_between", "keeps_subharmonics", "subharmonic_share"]
+__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]

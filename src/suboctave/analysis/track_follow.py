@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from suboctave.analysis.follow import Settings
-from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics
+from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
@@ -143,8 +143,8 @@ class _Tracker:
             found = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(found, settings.stability, settings.observe)
             self.trace.events.append(replace(item, arclength=arclength))
-        if end.last is not None:
-            self.trace.points.append(TrackedPoint(end.last, arclength, 0, settings.stability))
+            if end.last:
+                self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability))
 
     def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
         """The first point again, with the bordering vectors of the last."""

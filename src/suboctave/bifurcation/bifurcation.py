@@ -67,6 +67,8 @@ class Bifurcation:
     contact
         The contact that grazes: at a grazing its own; at another bifurcation the one whose beginning or end brings it
         about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.
+    tangent
+        At a branch point: the direction (dX, d parameter) of the branch that it was found on; else None.
     arclength
         Position on the branch in scaled arclength; `context` is what the point was found with.
     """
@@ -82,6 +84,7 @@ class Bifurcation:
     uncertainty: float = 0.0
     arclength: float = 0.0
     contact: GrazingContact | None = None
+    tangent: tuple[float, ...] | None = field(default=None, repr=False)
     context: Any = field(default=None, repr=False)
 
     @property
