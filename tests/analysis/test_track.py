@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from functools import cache
 from pathlib import Path
 
@@ -11,8 +10,6 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.harmonic.basis import spectrum_to_real
-from suboctave.timedomain import integrate
 
 NUMBERS = json.loads((Path(__file__).parents[1] / "data" / "tracked.json").read_text())
 
@@ -21,20 +18,13 @@ NUMBERS = json.loads((Path(__file__).parents[1] / "data" / "tracked.json").read_
 def doublings(p: float, sharpness: float | None = 3000.0):
     """The two period doublings of the motion of one load period: upper, lower."""
     system = so.library.reference_oscillator(p=p, regularization=sharpness)
-    return [so.frequency_response(system, omega).bifurcations["PD"][0] for omega in ((4.05, 3.9), (2.2, 2.45))]
+    return so.frequency_response(system, (4.1, 2.2)).bifurcations["PD"]
 
 
 @cache
-def doubled_branch(p: float, omega: float, state: tuple[float, float], bounds: tuple[float, float]):
-    """The branch of motions of two load periods through one that begins near a state."""
-    system = so.library.reference_oscillator(p=p, regularization=3000.0)
-    basis = so.HarmonicBasis(62, 2)
-    period, samples = 4.0 * math.pi / omega, 8 * basis.harmonics
-    times = np.arange(samples + 1) * period / samples
-    motion = integrate(system, np.array(state), times, omega, system.parameters, rtol=1e-8).x[:-1]
-    x = spectrum_to_real(np.fft.rfft(motion, axis=0) / samples, basis.harmonics)
-    orbit = so.PeriodicOrbit(so.HarmonicBalance(system, basis), x, omega, system.parameters, 0.0, 0.0)
-    return so.continue_branch(orbit, "omega", bounds, harmonics="adaptive")
+def doubled_branch(p: float):
+    """The motions of two load periods between the two."""
+    return so.switch_branch(doublings(p)[0])
 
 
 def extreme(curve, name):
@@ -100,7 +90,7 @@ def test_exact_law(harmonics):
 
 
 def second_doubling():
-    return doubled_branch(1.7, 3.02, (0.207438, 0.106428), (3.0, 3.05)).bifurcations["PD"][0]
+    return doubled_branch(1.7).bifurcations["PD"][0]
 
 
 @pytest.mark.parametrize("max_step", [0.03, None, 0.1])
@@ -123,7 +113,7 @@ def test_second_stage_over_the_stiffness_of_the_stops():
 def test_doubled_limit_points_end_on_the_period_doublings():
     """The isola's birth and merger, the cusp, and both ends: the same GPDs as on the curve of period doublings."""
     numbers = NUMBERS["s3000_Kc4.7_p0.55_doubled_limit_points_over_j"]
-    limits = doubled_branch(0.55, 3.0, (-0.195114, 0.297843), (2.8, 3.3)).bifurcations["LP"]
+    limits = doubled_branch(0.55).bifurcations["LP"]
     upper, lower = (so.track(b, "j", (0.0, 1.0)) for b in sorted(limits[:2], key=lambda b: b.omega))
     born, merges = extreme(lower, "j")
     assert born == pytest.approx(numbers["born"], abs=1e-6)
