@@ -1,4 +1,4 @@
-"""`track`: a bifurcation followed in two parameters."""
+"""`track`: a bifurcation followed in two parameters, an extremum along a curve of them in a third."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from suboctave.bifurcation.augmented import (
     GrazingContactEquations,
     SingularOperator,
 )
+from suboctave.bifurcation.extremum import extremal_of
 from suboctave.bifurcation.gaps import levels
-from suboctave.bifurcation.tracked import TRACKED_KINDS
+from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
@@ -63,14 +64,18 @@ def track(
 ) -> TrackedBranch:
     """The curve of a bifurcation in two parameters, in both directions, from end to end or closed.
 
+    Of an extremum along such a curve (one of its `extrema`): the curve of these extrema in a third parameter.
+
     Parameters
     ----------
     bifurcation
-        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods).
+        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); or one of the
+        `extrema` of a tracked curve.
     parameter
-        The second parameter, omega being the first; or two names, with omega kept.
+        The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
-        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside.
+        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside. The parameter that is extreme
+        is not bounded.
     omega
         Range of omega, rad per unit time; default: not bounded.
     harmonics
@@ -99,7 +104,8 @@ def track(
     Minimally augmented systems (`bifurcation.augmented`) and pseudo-arclength. A branch point can be followed only
     where a symmetry forces it; the curve ends where that is broken.
     """
-    names, ranges = _free(bifurcation, parameter, bounds, omega)
+    turning = bifurcation.parameter_name if _is_extremum(bifurcation) else ""
+    names, ranges = (_third if turning else _free)(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit
     system = orbit.system
     settings = make_settings(system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability)
@@ -112,25 +118,25 @@ def track(
     first = None if ranges[0] is None else (min(ranges[0]), max(ranges[0]))
     box = Box(first, ends)
     computation_begins()
-    with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[1]}") as report:
+    with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[-1]}") as report:
         settings = replace(settings, report=report)
         balance = HarmonicBalance(system, basis, linear=_linear_part(bifurcation))
         start = _start(bifurcation, balance, adaptive, names, box, settings)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     options = {
-        "bounds": {name: r for name, r in zip(names, ranges, strict=True) if r is not None},
+        "bounds": {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None},
         "harmonics": asdict(wanted) if isinstance(wanted, AdaptiveHarmonics) else wanted,
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
         "stability": settings.stability.name,
         "observe": settings.observe,
     }
-    context = {"system": system, "parameter": names[1], **options}
+    context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
-        bifurcation.kind,
+        _kind(bifurcation),
         names,
         system,
-        names[1],
+        names[-1],
         trace.points,
         [replace(event, context=context) for event in trace.events],
         [],
@@ -139,19 +145,52 @@ def track(
         settings.observe,
         options,
         tuple(trace.warnings),
+        turning=turning,
     )
+
+
+def _is_extremum(item: Any) -> bool:
+    return isinstance(item, TrackedEvent) and item.kind == "extremum"
+
+
+def _kind(item: Bifurcation) -> str:
+    """Kind of the bifurcations that are followed."""
+    return item.curve if isinstance(item, TrackedEvent) else item.kind
+
+
+def _third(
+    item: TrackedEvent, parameter: Any, bounds: Any, omega: Any
+) -> tuple[tuple[str, ...], tuple[Range | None, Range | None]]:
+    """The three parameters in which an extremum is followed, and the ranges of the first and the last, checked."""
+    system = item.orbit.system
+    if len(item.names) != 2:
+        raise InputError(
+            f"this extremum lies on a curve in {', '.join(item.names)}: only those along curves in two parameters can "
+            "be followed in another one"
+        )
+    if not isinstance(parameter, str):
+        raise InputError(f"an extremum is followed in one more parameter: give its name, not {parameter!r}")
+    check_parameter(system, parameter)
+    if parameter in item.names:
+        raise InputError(f"{parameter} is free on the curve of this extremum already: name a third parameter")
+    if omega is not None and item.names[0] != "omega":
+        raise InputError("omega= bounds omega where it is free, which it is not on the curve of this extremum")
+    first = None if omega is None else check_range("omega", omega, positive=True)
+    ranges = (first, check_bounds(system, parameter, bounds))
+    _check_inside(item, (item.names[0], parameter), ranges)
+    return (*item.names, parameter), ranges
 
 
 def _free(
     item: Bifurcation, parameter: Any, bounds: Any, omega: Any
-) -> tuple[tuple[str, str], tuple[Range | None, Range | None]]:
+) -> tuple[tuple[str, ...], tuple[Range | None, Range | None]]:
     """The two free parameters and their ranges, checked."""
     if not isinstance(item, Bifurcation):
         raise InputError(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
         )
     if item.kind not in TRACKED_KINDS:
-        raise InputError(f"track follows {', '.join(TRACKED_KINDS)}; this is a {item.kind}")
+        raise InputError(f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves; this is a {item.kind}")
     system = item.orbit.system
     if isinstance(parameter, str):
         names: tuple[str, str] = ("omega", parameter)
@@ -174,14 +213,19 @@ def _free(
         if not isinstance(bounds, Sequence) or len(bounds) != 2 or any(is_number(b) for b in bounds):
             raise InputError(f"bounds of two parameters are two ranges, ((from, to), (from, to)), not {bounds!r}")
         first, second = (check_bounds(system, name, r) for name, r in zip(names, bounds, strict=True))
-    for name, ends in zip(names, (first, second), strict=True):
+    _check_inside(item, names, (first, second))
+    return names, (first, second)
+
+
+def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range | None, Range | None]) -> None:
+    """Refuse a bifurcation outside the ranges."""
+    for name, ends in zip(names, ranges, strict=True):
         if ends is None:
             continue
         value, (low, high) = item.parameter(name), sorted(ends)
         slack = 1e-9 * (high - low)
         if not low - slack <= value <= high + slack:
             raise InputError(f"the bifurcation has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
-    return names, (first, second)
 
 
 def _observed(item: Bifurcation, observe: int | None) -> int | None:
@@ -206,17 +250,17 @@ def _linear_part(item: Bifurcation) -> LinearPart | None:
     return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
 
 
-def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, str]) -> tuple[Augmentation, np.ndarray]:
+def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[Augmentation, np.ndarray]:
     """What singles the bifurcation out, and the start of its extra unknowns."""
-    if item.kind == "grazing":
+    if _kind(item) == "grazing":
         assert item.contact is not None
         places = np.array(levels(state.local(item.contact.element)))
         index = int(np.argmin(np.abs(places - item.contact.gap)))
         tau = item.contact.time * state.rate
         return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
-    if item.kind == "BP":
+    if _kind(item) == "BP":
         return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
-    kind = _OPERATORS[item.kind]
+    kind = _OPERATORS[_kind(item)]
     extra = np.zeros(0)
     if kind is Kind.FREE:
         kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
@@ -228,7 +272,7 @@ def _start(
     item: Bifurcation,
     balance: HarmonicBalance,
     adaptive: AdaptiveHarmonics | None,
-    names: tuple[str, str],
+    names: tuple[str, ...],
     box: Box,
     settings: Settings,
 ) -> CurvePoint:
@@ -239,13 +283,18 @@ def _start(
     state = balance.at(x, orbit.omega)
     augmentation, extra = _augmentation(item, state, names)
     values = np.array([item.parameter(name) for name in names])
-    for i, ends in enumerate((box.first, box.second)):
+    for i, ends in ((0, box.first), (-1, box.second)):
         if ends is not None:
             values[i] = min(ends[1], max(ends[0], values[i]))
-    first = abs(values[0]) or 1.0
+    spans = tuple(_span(item, name, value) for name, value in zip(names[:-1], values, strict=False))
     if box.first is not None:
-        first = box.first[1] - box.first[0]
-    spans = (first, box.second[1] - box.second[0])
+        spans = (box.first[1] - box.first[0], *spans[1:])
+    spans = (*spans, box.second[1] - box.second[0])
+    if _is_extremum(item):
+        turning = item.parameter_name
+        (beside,) = set(names[:2]) - {turning}
+        sizes = dict(zip(names, spans, strict=True))
+        augmentation = extremal_of(augmentation, state, extra, beside, turning, sizes)
     force = state.force_scale()
     floor = 0.0 if force > 0.0 else 1e-8 * orbit.omega**2
     curve = TrackedCurve(
@@ -284,6 +333,15 @@ def _start(
         raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
 
 
+def _span(item: Bifurcation, name: str, value: float) -> float:
+    """Width of the range of a parameter on the curve that an extremum lies on; its value where that has none."""
+    ends = (item.context or {}).get("bounds", {}) if _is_extremum(item) else {}
+    if name in ends:
+        first, last = ends[name]
+        return abs(float(last) - float(first))
+    return abs(float(value)) or 1.0
+
+
 def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> TrackedTrace:
     """Follow a curve from a start to both sides; from a bound inwards only."""
     if start.tangent[-1] * ahead < 0.0:
@@ -303,9 +361,12 @@ def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) ->
 
 def _leads_inside(point: CurvePoint, box: Box) -> bool:
     """Whether a curve that begins at a point stays within its ranges there."""
-    for index, ends in ((-2, box.first), (-1, box.second)):
+    assert isinstance(point.curve, TrackedCurve)
+    names = point.curve.names
+    for name, ends in ((names[0], box.first), (names[-1], box.second)):
         if ends is None:
             continue
+        index = point.curve.index(name)
         low, high = ends
         value, slope = point.u[index], point.tangent[index]
         slack = 1e-9 * (high - low)

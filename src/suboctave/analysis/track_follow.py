@@ -48,7 +48,7 @@ class TrackedTrace:
 
 @dataclass(frozen=True)
 class Box:
-    """Ranges of the two free parameters, None where one is not bounded: the curve ends where it leaves them."""
+    """Ranges of the first and the last free parameter, None where one is not bounded: the curve ends on them."""
 
     first: tuple[float, float] | None
     second: tuple[float, float]
@@ -173,12 +173,12 @@ class _Tracker:
         if self.box.first is None:
             return True
         low, high = self.box.first
-        return low <= float(sample.point.u[-2]) <= high
+        return low <= float(sample.point.u[sample.curve.index(sample.curve.names[0])]) <= high
 
     def _landed(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
         """The point at which the curve leaves the range of its first parameter between two neighbours."""
         assert self.box.first is not None
-        index = b.curve.parameter - 1
+        index = b.curve.index(b.curve.names[0])
         low, high = self.box.first
         bound = low if b.point.u[index] < low else high
         left, right = 0.0, 1.0

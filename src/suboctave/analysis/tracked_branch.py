@@ -51,15 +51,18 @@ class TrackedBranch(Branch):
     kind
         "LP", "BP", "PD", "NS" or "grazing".
     names
-        The two free parameters; `name` is the second.
+        The two free parameters; `name` is the second. Three of a curve of extrema; `name` is the third.
+    turning
+        The one of them that is extreme all along a curve of extrema; else empty.
     bifurcations
         Extrema of either parameter and points of codimension two, in the order met; `extrema` the former.
     """
 
-    def __init__(self, kind: str, names: tuple[str, str], *args: Any, **named: Any) -> None:
+    def __init__(self, kind: str, names: tuple[str, ...], *args: Any, turning: str = "", **named: Any) -> None:
         super().__init__(*args, **named)
         self.kind = kind
         self.names = names
+        self.turning = turning
 
     @property
     def extrema(self) -> list[Bifurcation]:
@@ -105,7 +108,8 @@ class TrackedBranch(Branch):
 
     def __repr__(self) -> str:
         ends = [", ".join(f"{n}={self.parameter(n)[i]:.6g}" for n in self.names) for i in (0, -1)]
-        text = f"{self.kind} curve: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."
+        what = f"{self.kind} curve, extrema of {self.turning}" if self.turning else f"{self.kind} curve"
+        text = f"{what}: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."
         for warning in self.warnings:
             text += f"\n  note: {warning}"
         return text + "\n" + repr(self.bifurcations)
@@ -116,6 +120,7 @@ def tracked_record(branch: TrackedBranch) -> dict[str, Any]:
     return {
         "kind": branch.kind,
         "names": branch.names,
+        "turning": branch.turning,
         "extra": [p.extra for p in branch.tracked],
         "coefficient": [p.coefficient for p in branch.tracked],
     }

@@ -64,7 +64,8 @@ class Extremum(CurveTest):
         """See `CurveTest.value`."""
         slope = float(sample.point.tangent[sample.curve.index(self.name)])
         # at a cusp both change sign
-        return slope / sample.bend if sample.curve.augmentation.name == "LP" and sample.bend != 0.0 else slope
+        plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
+        return slope / sample.bend if plane and sample.bend != 0.0 else slope
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ class FoldFlip(CurveTest):
 def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns = tuple(Extremum(name) for name in curve.names)
-    augmentation = curve.augmentation
+    augmentation = curve.augmentation.own
     if not isinstance(augmentation, SingularOperator):
         return turns
     own: dict[Kind, tuple[CurveTest, ...]] = {

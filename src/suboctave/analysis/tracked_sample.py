@@ -43,7 +43,7 @@ class TrackedSample:
     @property
     def equations(self) -> SingularEquations:
         """The scalar equations, where they are those of a singular operator."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         assert isinstance(equations, SingularEquations)
         return equations
 
@@ -61,13 +61,13 @@ class TrackedSample:
     @property
     def kappa(self) -> float:
         """Frequency of the critical perturbation at an NS, else 0."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         return equations.kappa if isinstance(equations, SingularEquations) else 0.0
 
     @property
     def instant_or_frequency(self) -> float:
         """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, else 0."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         if isinstance(equations, GrazingEquations):
             return equations.tau % (2.0 * math.pi)
         return self.kappa
@@ -75,7 +75,7 @@ class TrackedSample:
     @property
     def vectors(self) -> NullVectors | None:
         """Null vectors of the singular operator, None where there is none."""
-        found = getattr(self.evaluation.equations, "bordered", None)
+        found = getattr(self.evaluation.equations.own, "bordered", None)
         return None if found is None else found.vectors
 
     @lazy
@@ -103,7 +103,7 @@ class TrackedSample:
     @lazy
     def coefficient(self) -> float:
         """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
-        augmentation = self.curve.augmentation
+        augmentation = self.curve.augmentation.own
         kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
         if kind is Kind.FREE:
             return float("nan")
