@@ -21,11 +21,11 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.group_force import Group, GroupLaw
+from suboctave.harmonic.group_force import Group, GroupLaw, PackedLaws
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.nodal import own_elements
-from suboctave.harmonic.quadrature import samples_for
+from suboctave.harmonic.quadrature import on_circle, samples_for, search_count
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 from suboctave.model.element import Element
@@ -92,7 +92,10 @@ class HarmonicBalance:
         self._load_cache: tuple[tuple, Array] | None = None
         self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
         self._load_order = sorted(self.load_names)
+        #: whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X
+        self.steady = not (self.moving.any() or self.own or "omega" in self.load_names)
         self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
+        self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -184,6 +187,19 @@ class HarmonicBalance:
         numbers = [e.coefficient_values(values) for e in self.system.elements]
         kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
+
+    def packed(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
+        """The groups' laws at parameter values, as arrays, and points on the circle for their polynomials, (2, N)."""
+        laws = self.coefficients(values)[2]
+        if self._packed is None or self._packed[0] is not laws:
+            found = PackedLaws.of(laws)
+            self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
+        return self._packed[1]
+
+    @lazy
+    def grid(self) -> Array:
+        """Points on the circle for searches along a motion: cosines and sines, (2, N)."""
+        return on_circle(search_count(self.basis.harmonics))
 
     @lazy
     def _own_coefficients(self) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:

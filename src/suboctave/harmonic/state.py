@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import group_kernels, kernels
+from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
-from suboctave.harmonic.group_force import Group, add_spectra, curvature_of
-from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.group_force import Group, add_sampled_spectra, curvature_of
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from suboctave.harmonic.balance import HarmonicBalance
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
+_NO_MATRICES = np.zeros((0, 1, 1))
 
 
 class BalanceState:
@@ -61,9 +62,11 @@ class BalanceState:
         return self.linear.compliance(self.frequencies)
 
     @lazy
-    def motions(self) -> list[ComplexArray]:
-        """Complex coefficients (H + 1,) of the displacement along each group's direction."""
-        return [group_kernels.local_amplitudes(self.x, g.dofs, g.values) for g in self.balance.groups]
+    def motions(self) -> ComplexArray:
+        """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
+        found = np.empty((len(self.balance.groups), self.basis.harmonics + 1), dtype=complex)
+        evaluation.along_directions(self.x, *self.balance.directions, found)
+        return found
 
     @lazy
     def local_motions(self) -> list[LocalMotion]:
@@ -109,17 +112,52 @@ class BalanceState:
     @lazy
     def spectra_table(self) -> ComplexArray:
         """Fourier coefficients 0 .. top of force, stiffness, damping along each group's direction, (3, G, top + 1)."""
-        balance = self.balance
-        table = np.zeros((3, len(balance.groups), balance.top + 1), dtype=complex)
-        laws = balance.coefficients(self.values)[2]
-        for g, (law, motion) in enumerate(zip(laws, self.motions, strict=True)):
-            add_spectra(
-                law, balance.elements, balance.samples, motion, self.rate, (table[0, g], table[1, g], table[2, g])
-            )
-        # a number that is not finite at any instant is in all coefficients
-        if not group_kernels.finite(table):
+        return self._evaluated[0]
+
+    @lazy
+    def _evaluated(self) -> tuple[ComplexArray, Array, Array]:
+        """`spectra_table` and both of `_parts` without elements that have nodes of their own."""
+        balance, basis, linear = self.balance, self.basis, self.linear
+        count, size = len(balance.groups), balance.size
+        packed, nodes = balance.packed(self.values)
+        table = np.zeros((3, count, balance.top + 1), dtype=complex)
+        if packed.sampled:
+            laws = balance.coefficients(self.values)[2]
+            for g, (law, motion) in enumerate(zip(laws, self.motions, strict=True)):
+                add_sampled_spectra(
+                    law, balance.elements, balance.samples, motion, self.rate, (table[0, g], table[1, g], table[2, g])
+                )
+        if isinstance(linear, StructuralMatrices):
+            matrices = linear.matrices
+            blocks = np.empty((basis.harmonics + 1, size, size), dtype=complex)
+        else:
+            matrices, blocks = _NO_MATRICES, np.ascontiguousarray(self.blocks, dtype=complex)
+        motions = np.empty((count, basis.harmonics + 1), dtype=complex)
+        parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
+        finite = evaluation.evaluate(
+            self.x,
+            self.omega,
+            basis.multiples,
+            matrices,
+            blocks,
+            *balance.directions,
+            packed.pieces,
+            packed.first,
+            packed.polynomial,
+            balance.grid,
+            nodes,
+            balance.load(self.values, self.omega),
+            balance.scales()[1],
+            table,
+            motions,
+            parts,
+            sizes,
+        )
+        known = self.__dict__
+        known["motions"], known["blocks"] = motions, blocks
+        if not finite:
             self._refuse()
-        return table
+        return table, parts, sizes
 
     def _refuse(self) -> None:
         for local in self.local_motions:
@@ -145,16 +183,8 @@ class BalanceState:
     @lazy
     def _parts(self) -> tuple[Array, Array]:
         """A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P with residual weights."""
-        balance = self.balance
-        parts: tuple[Array, Array] = group_kernels.balance_residual(
-            self.x,
-            self.blocks,
-            self.spectra_table[0],
-            balance.load(self.values, self.omega),
-            *balance.directions,
-            balance.scales()[1],
-        )
-        return self._with_nodal(*parts) if self.nodal else parts
+        _, parts, sizes = self._evaluated
+        return self._with_nodal(parts, sizes) if self.nodal else (parts, sizes)
 
     def _with_nodal(self, parts: Array, sizes: Array) -> tuple[Array, Array]:
         """The same with the elements that have nodes of their own."""
@@ -187,37 +217,59 @@ class BalanceState:
         """dF/dX, shape (dimension, dimension)."""
         return self._tangent_matrix(mean=True)
 
-    def _tangent_matrix(self, mean: bool, columns: int = 0) -> Array:
-        """Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis, and further columns of
-        zeros.
-        """
+    def _tangent_matrix(self, mean: bool) -> Array:
+        """Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis."""
         balance, table = self.balance, self.spectra_table
         rows = balance.size * (2 * self.basis.harmonics + (1 if mean else 2))
-        out = np.zeros((rows, rows + columns))
+        out = np.zeros((rows, rows))
         group_kernels.tangent_matrix(
             out, table[1], table[2], balance.moving, self.rate, mean, *balance.directions, balance.size
         )
         add_tangent(self.nodal, out, mean, balance.size)
         return out
 
+    def _structural_jacobian(self, matrices: Array, mean: bool, columns: int = 0) -> Array:
+        """R_X in the integer (mean=True) or the half-odd basis, with the linear part of R_omega if a column is added
+        for it; matrices: M, C, K.
+        """
+        balance, basis, table = self.balance, self.basis, self.spectra_table
+        rows = balance.size * (2 * basis.harmonics + (1 if mean else 2))
+        out = np.zeros((rows, rows + columns))
+        multiples = basis.multiples if mean else basis.half_multiples
+        evaluation.jacobian(
+            out, table, balance.moving, self.rate, mean, *balance.directions, matrices, multiples, self.omega, self.x
+        )
+        if self.nodal:
+            add_tangent(self.nodal, out, mean, balance.size)
+        return out
+
     @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
+        if isinstance(self.linear, StructuralMatrices):
+            return self._structural_jacobian(self.linear.matrices, mean=True)
         return self._with_linear(self._tangent_matrix(mean=True), self.blocks, self.compliance, mean=True)
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
-        if self.compliance is None:
-            out = self._tangent_matrix(mean=True, columns=1)
-            kernels.add_linear(out, self.blocks, True)
-        else:
+        if not isinstance(self.linear, StructuralMatrices):
             out = np.column_stack((self.jacobian, np.zeros(self.balance.dimension)))
-        out[:, -1] = self.residual_by(name)
+            out[:, -1] = self.residual_by(name)
+            return out
+        out = self._structural_jacobian(self.linear.matrices, mean=True, columns=1)
+        if name != "omega":
+            out[:, -1] = self.residual_by(name)
+        elif not self.balance.steady:
+            change = self.unbalanced_by(name)
+            if change is not None:
+                out[:, -1] += change.ravel()
         return out
 
     @lazy
     def half_jacobian(self) -> Array:
         """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
+        if isinstance(self.linear, StructuralMatrices):
+            return self._structural_jacobian(self.linear.matrices, mean=False)
         frequencies = self.basis.half_multiples * self.omega
         return self._with_linear(
             self._tangent_matrix(mean=False),
