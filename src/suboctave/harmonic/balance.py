@@ -87,13 +87,14 @@ class HarmonicBalance:
         self.moving = np.array(
             [any(system.elements[i].depends_on_velocity for i in g.members) for g in self.groups], dtype=bool
         )
+        self.any_moving = bool(self.moving.any())
         shapes = [self.linear.retain(c.direction) for c in system.load_components()]
         self.loads = LoadSpectrum(system, basis, shapes)
         self._load_cache: tuple[tuple, Array] | None = None
         self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
         self._load_order = sorted(self.load_names)
         #: whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X
-        self.steady = not (self.moving.any() or self.own or "omega" in self.load_names)
+        self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
         self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
         self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need

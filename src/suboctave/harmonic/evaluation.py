@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-
 from suboctave.compiled import kernel
 from suboctave.harmonic.group_kernels import add_pieces, add_polynomial, balance_residual, tangent_matrix
 

@@ -71,6 +71,8 @@ class StructuralMatrices:
         #: M, C, K, shape (3, n, n)
         self.matrices = np.array(system.matrices(self.values), dtype=float)
         self._mass, self._damping, self._stiffness = self.matrices
+        #: the same of one DOF
+        self.scalars = tuple(float(matrix[0, 0]) for matrix in self.matrices)
 
     def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
         """The same structure at other parameter values."""
