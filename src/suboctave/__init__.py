@@ -22,7 +22,18 @@ from typing import TYPE_CHECKING
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
-    from suboctave.analysis import Branch, Results, continue_branch, frequency_response, load, stability, verify
+    from suboctave.analysis import (
+        BifurcationDiagram,
+        Branch,
+        Results,
+        bifurcation_diagram,
+        continue_branch,
+        frequency_response,
+        load,
+        stability,
+        switch_branch,
+        verify,
+    )
     from suboctave.bifurcation import Bifurcation
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
@@ -82,10 +93,13 @@ _HOME = {
     "SteppingOptions": "suboctave.continuation",
     "Event": "suboctave.continuation",
     "Bifurcation": "suboctave.bifurcation",
+    "BifurcationDiagram": "suboctave.analysis",
     "Branch": "suboctave.analysis",
+    "bifurcation_diagram": "suboctave.analysis",
     "frequency_response": "suboctave.analysis",
     "continue_branch": "suboctave.analysis",
     "stability": "suboctave.analysis",
+    "switch_branch": "suboctave.analysis",
     "Arbitration": "suboctave.stability",
     "Monodromy": "suboctave.stability",
     "Hill": "suboctave.stability",
@@ -106,6 +120,7 @@ __all__ = [
     "BaseAcceleration",
     "BaseDisplacement",
     "Bifurcation",
+    "BifurcationDiagram",
     "Branch",
     "Callable",
     "Clearance",
@@ -137,6 +152,7 @@ __all__ = [
     "System",
     "TanhFriction",
     "__version__",
+    "bifurcation_diagram",
     "check_derivatives",
     "continue_branch",
     "frequency_response",
@@ -144,6 +160,7 @@ __all__ = [
     "load",
     "plot",
     "stability",
+    "switch_branch",
     "verify",
     "write_report",
 ]

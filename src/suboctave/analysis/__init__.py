@@ -1,19 +1,24 @@
 """What a user calls: response curves, curves along any parameter, stability and verification of single motions."""
 
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.results import Results, Table, load
+from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
 __all__ = [
+    "BifurcationDiagram",
     "Branch",
     "BranchPoint",
     "Results",
     "Table",
     "Verification",
+    "bifurcation_diagram",
     "continue_branch",
     "frequency_response",
     "load",
     "stability",
+    "switch_branch",
     "verify",
 ]

@@ -63,13 +63,14 @@ class Audit:
         """True if nothing is in doubt."""
         return not self.unsettled
 
-    def reversed_before(self, other: Audit, whole: float) -> Audit:
-        """This audit's stretch, of length `whole`, walked backwards, and then that of `other`."""
+    def reversed_before(self, other: Audit, whole: float, gap: float = 0.0) -> Audit:
+        """This audit's stretch, of length `whole`, walked backwards, and then, beyond a gap, that of `other`."""
+        start = whole + gap
         back = [
             replace(u, first=u.last, last=u.first, arclength=(whole - u.arclength[1], whole - u.arclength[0]))
             for u in reversed(self.unsettled)
         ]
-        on = [replace(u, arclength=(whole + u.arclength[0], whole + u.arclength[1])) for u in other.unsettled]
+        on = [replace(u, arclength=(start + u.arclength[0], start + u.arclength[1])) for u in other.unsettled]
         return Audit(
             min(self.finest, other.finest),
             max(self.longest, other.longest),

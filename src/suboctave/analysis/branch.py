@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.analysis.audit import Audit
+from suboctave.analysis.junction import Junction, period_name
 from suboctave.analysis.readings import BranchReadings, columns, with_readings
 from suboctave.bifurcation import Bifurcation, BifurcationList
 from suboctave.continuation.problem import Array
@@ -51,6 +52,9 @@ class Branch(BranchReadings):
         events, in the order met.
     closed, ended
         Whether the curve closed on itself, and a sentence saying why it ended.
+    departs, arrives
+        Where it leaves the branch that it bifurcates from, and where it meets it again at its end (`Junction`); None
+        where it does not.
     options
         Everything it was computed with.
     seconds
@@ -70,6 +74,8 @@ class Branch(BranchReadings):
         options: Mapping[str, Any],
         warnings: tuple[str, ...] = (),
         audit: Audit | None = None,
+        departs: Junction | None = None,
+        arrives: Junction | None = None,
     ) -> None:
         self.system = system
         self.name = name
@@ -82,10 +88,17 @@ class Branch(BranchReadings):
         self.options = dict(options)
         self.warnings = warnings
         self.audit = audit or Audit()
+        self.departs = departs
+        self.arrives = arrives
         self.seconds = float("nan")
 
     def __len__(self) -> int:
         return len(self.points)
+
+    @property
+    def nu(self) -> int:
+        """Period of its motions in periods of the load: 1 for T, 2 for 2T, ..."""
+        return self.points[0].orbit.basis.nu if self.points else 1
 
     @property
     def grazings(self) -> list[Bifurcation]:
@@ -264,7 +277,9 @@ class Branch(BranchReadings):
         values = self.parameter(self.name)
         span = f"{self.name} from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
         unstable = int(np.count_nonzero(~self.stable)) if len(self) else 0
-        text = f"Branch: {len(self)} points ({unstable} unstable), {span}; {self.ended}."
+        kind = "Branch" if self.nu == 1 else f"Branch of {period_name(self.nu)} motions"
+        leaves = "" if self.departs is None else f"leaves {self.departs}; "
+        text = f"{kind}: {len(self)} points ({unstable} unstable), {span}; {leaves}{self.ended}."
         for warning in self.warnings:
             text += f"\n  note: {warning}"
         return text + "\n" + repr(self.bifurcations)

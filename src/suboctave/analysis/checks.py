@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.analysis.follow import Settings
+from suboctave.analysis.trace import Settings
 from suboctave.bifurcation import KINDS
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import InputError, suggest

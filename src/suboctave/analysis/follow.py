@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
 
 import numpy as np
 
-from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.count import CountCheck
 from suboctave.analysis.guard import Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
-from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of
+from suboctave.analysis.junction import Meeting, meeting
+from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
+from suboctave.analysis.trace import Settings, Trace
 from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings, touches
-from suboctave.bifurcation.kinds import BRANCH_POINT, changes
+from suboctave.bifurcation.kinds import BRANCH_POINT, PERIOD_DOUBLING, changes
 from suboctave.bifurcation.layer import behind_their_grazings
-from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
+from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import make_point, point_between
+from suboctave.continuation.march import Arrival, make_point, point_between
 from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.stability import StabilityMethod
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point
 _APART = 1e-5
@@ -35,56 +34,6 @@ _NOT_FOUND = {
     "LP": "the branch turns back, but its limit point could not be located",
     "PD": "a multiplier passes -1, but no period doubling could be located",
 }
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a curve is followed and what is reported."""
-
-    newton: NewtonOptions
-    stepping: SteppingOptions
-    stability: StabilityMethod
-    events: Sequence[Event] = ()
-    observe: int = 0
-    report: Callable[[float, str], None] | None = None
-
-
-@dataclass
-class Trace:
-    """What following a curve in one direction gave; `open`: motions between its points whose verdict is open."""
-
-    points: list[BranchPoint] = field(default_factory=list)
-    open: list[BranchPoint] = field(default_factory=list)
-    bifurcations: list[Bifurcation] = field(default_factory=list)
-    events: list[Bifurcation] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    audit: Audit = field(default_factory=Audit)
-    closed: bool = False
-    ended: str = ""
-    interrupted: bool = False
-
-    def reversed_before(self, other: Trace) -> Trace:
-        """This trace walked backwards, then `other`, which started from the same point."""
-        whole = self.points[-1].arclength
-
-        def walked(first: list[BranchPoint], second: list[BranchPoint]) -> list[BranchPoint]:
-            back = [replace(p, arclength=whole - p.arclength) for p in reversed(first)]
-            return back + [replace(p, arclength=whole + p.arclength) for p in second]
-
-        def joined(first: list[Bifurcation], second: list[Bifurcation]) -> list[Bifurcation]:
-            flipped = [b.seen_backwards(whole - b.arclength) for b in reversed(first)]
-            return flipped + [replace(b, arclength=whole + b.arclength) for b in second]
-
-        return Trace(
-            walked(self.points, other.points[1:]),
-            walked(self.open, other.open),
-            joined(self.bifurcations, other.bifurcations),
-            joined(self.events, other.events),
-            self.warnings + other.warnings,
-            self.audit.reversed_before(other.audit, whole),
-            other.closed,
-            other.ended if self.ended == other.ended else f"{self.ended} in one direction, {other.ended} in the other",
-        )
 
 
 def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> Trace:
@@ -97,7 +46,7 @@ class _Follower:
         self.settings = settings
         self.bounds = bounds
         self.direction = direction
-        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear)
+        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear, self._arrived)
         self.trace = Trace()
         self.previous: Sample | None = None
         self._candidate: Sample | None = None
@@ -106,6 +55,8 @@ class _Follower:
         self._count = CountCheck()
         self._hidden = HiddenDoublings()
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
+        self._turned: Bifurcation | None = None
+        self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
         self._done = 0.0
         #: somebody who keeps what has been found (`progress.reporting`)
         self._found: Callable[[Trace], None] | None = getattr(settings.report, "found", None)
@@ -115,12 +66,17 @@ class _Follower:
         try:
             for point in self.march:
                 self._accept(point)
+                if self._turned is not None and self.settings.half:
+                    break
             trace.closed, trace.ended = self.march.closed, self.march.ended
+            trace.arrives = self._arrival()
         except KeyboardInterrupt:
             where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
             trace.ended = f"interrupted at {where}; what was computed is kept"
         trace.audit = self._guard.audit
+        if self._turned is not None and self.settings.half:
+            trace.end_at(self._turned)
         trace.warnings += [
             f"{stretch}; a smaller max_step or more harmonics may settle it" for stretch in trace.audit.unsettled
         ]
@@ -137,11 +93,31 @@ class _Follower:
         return Sample(point, point.evaluation.state, self.settings.stability)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
-        """True if a step stays on its curve and its interior could be looked at."""
+        """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
+        met = meeting(a, b, self.settings.newton)
+        self._meeting = None if met is None else (a, b, met)
+        if met is not None:
+            return True
         self._candidate = new = self._sample(b)
         if self.previous is None or _at_rest(self.previous) or _at_rest(new):
             return True
         return not self._guard.refuses(self._solved_again(self.previous, new), new)
+
+    def _arrived(self, a: CurvePoint, b: CurvePoint) -> Arrival | None:
+        """How the curve ends between two neighbours, if it meets another one there."""
+        known = self._meeting
+        return known[2].arrival if known is not None and known[0] is a and known[1] is b else None
+
+    def _arrival(self) -> Bifurcation | None:
+        """The bifurcation of another curve that this one ends at."""
+        if self._meeting is None or not self.trace.points:
+            return None
+        met, arclength = self._meeting[2], self.trace.points[-1].arclength
+        if self.march.ended != met.arrival.reason:
+            return None
+        return solved_bifurcation(
+            PERIOD_DOUBLING, met.solution, met.parent, self.settings.observe, self.trace.warnings, arclength
+        )
 
     def _solved_again(self, sample: Sample, next_one: Sample) -> Sample:
         """A sample in the discretisation of the step that leaves it: where harmonics change, the motion moves a little
@@ -209,7 +185,7 @@ class _Follower:
             found = pair_in(stretch, self.settings.newton, self._sample)
             for located, a, b in found:
                 item = self._bifurcation(located, a, b)
-                if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
+                if not any(same_event(item, known) for known in self.trace.bifurcations[-4:]):
                     insort(self.trace.bifurcations, item, key=lambda known: known.arclength)
                     self._count.noted(item)
             if len(found) < 2:
@@ -231,7 +207,7 @@ class _Follower:
             located = locate_near(kind, again, reach, guess_at)
             if located is not None:
                 item = self._bifurcation(located, again, again)
-                if not any(_same_event(item, known) for known in self.trace.bifurcations[-4:]):
+                if not any(same_event(item, known) for known in self.trace.bifurcations[-4:]):
                     self.trace.bifurcations.append(item)
                     self._count.noted(item)
                     continue
@@ -249,7 +225,9 @@ class _Follower:
             if kind.name == "LP" and branch_point is not None:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
                 size = b.point.arclength - a.point.arclength
-                if located is None or size * abs(located.fraction - branch_point.fraction) < _APART:
+                near = located is None or size * abs(located.fraction - branch_point.fraction) < _APART
+                if near or turns_at(branch_point, a, b):
+                    self._turned = found[0][1]
                     continue
             if located is None:
                 if kind.name != "NS":  # several real multipliers may pass for a pair: the count tells
@@ -328,7 +306,8 @@ def _at_rest(sample: Sample) -> bool:
     return evaluation.at_rest
 
 
-def _same_event(a: Bifurcation, b: Bifurcation) -> bool:
+def same_event(a: Bifurcation, b: Bifurcation) -> bool:
+    """Whether two located bifurcations are one, met twice."""
     name = a.parameter_name
     if a.kind != b.kind or (a.kind == "grazing" and _element(a) != _element(b)):
         return False
@@ -343,8 +322,8 @@ def _element(item: Bifurcation) -> int | None:
 def _drop_seam(items: list[Bifurcation]) -> None:
     """What lies on the seam of a closed curve is met at both ends: keep the first."""
     # several contacts may graze at once
-    while len(items) > 1 and any(_same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
+    while len(items) > 1 and any(same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
         items.pop()
 
 
-__all__ = ["Settings", "Trace", "follow"]
+__all__ = ["follow", "same_event"]

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.bifurcation import Bifurcation, Sample
+from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
+from suboctave.bifurcation.branching import branching_equation
 from suboctave.bifurcation.finder import Located
 from suboctave.bifurcation.layer import (
     behind_grazing,
@@ -27,6 +28,8 @@ from suboctave.harmonic.state import BalanceState
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
+#: slope of a branch in its parameter at a branch point, both scaled, below which it turns back there
+_STILL = 1e-5
 
 
 def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> Bifurcation:
@@ -62,13 +65,34 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
             arclength=arclength,
             contact=beside,
         )
-    solution, coarser = _refined(located, solution, curve, warnings)
+    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength)
+    return replace(found, tangent=_tangent(a, b, located.fraction, found)) if found.kind == "BP" else found
+
+
+def _tangent(a: Sample, b: Sample, share: float, found: Bifurcation) -> tuple[float, ...]:
+    """The direction of the branch at a bifurcation between two samples, in the harmonics of its motion."""
+    curve = b.point.curve
+    assert isinstance(curve, ResponseCurve)
+    t = (1.0 - share) * curve.transfer(a.point.tangent, a.point.curve) + share * b.point.tangent
+    return tuple(curve.with_balance(found.orbit.balance).transfer(t, curve).tolist())
+
+
+def solved_bifurcation(
+    kind: BifurcationKind,
+    solution: Singular,
+    curve: ResponseCurve,
+    observe: int,
+    warnings: list[str],
+    arclength: float = 0.0,
+) -> Bifurcation:
+    """A solved bifurcation with the harmonics that events ask for, labelled."""
+    solution, coarser = _refined(kind, solution, curve, warnings)
     guess = _guess_from(solution, curve)
     state = solution.state
-    layer = layer_of(located.kind, solution, guess)
+    layer = layer_of(kind, solution, guess)
     orbit = as_orbit(state, solution.residual, truncation(state), curve)
     return Bifurcation(
-        located.kind.name,
+        kind.name,
         orbit,
         solution.floquet,
         solution.residual,
@@ -76,10 +100,28 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         curve.name,
         solution.vectors,
         solution.kappa,
-        0.0 if layer is None else unresolved(located.kind, guess, layer, coarser),
+        0.0 if layer is None else unresolved(kind, guess, layer, coarser),
         arclength=arclength,
-        contact=layer or located.kind.contact(solution, curve.name),
+        contact=layer or kind.contact(solution, curve.name),
     )
+
+
+def turns_at(located: Located, a: Sample, b: Sample) -> bool:
+    """Whether the curve stands still in its parameter at a branch point between two samples, as the bifurcating branch
+    of a pitchfork does.
+    """
+    curve, solution = b.point.curve, located.solution
+    assert isinstance(curve, ResponseCurve)
+    if solution is None:
+        return False
+    try:
+        equation = branching_equation(solution.state, curve.name, curve.span, solution.vectors)
+    except ConvergenceError:
+        return False
+    here = curve.with_balance(solution.state.balance)
+    chord = equation.weights * here.transfer(b.point.u - curve.transfer(a.point.u, a.point.curve), curve)
+    along = max((equation.weights * d for d in equation.directions), key=lambda d: abs(float(d @ chord)))
+    return abs(float(along[-1])) < _STILL
 
 
 def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | None:
@@ -111,7 +153,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
 
 
 def _refined(
-    located: Located, solution: Singular, curve: ResponseCurve, warnings: list[str]
+    kind: BifurcationKind, solution: Singular, curve: ResponseCurve, warnings: list[str]
 ) -> tuple[Singular, tuple[int, float] | None]:
     """Solved again with the harmonics that events ask for; with how many it was found before that, and where."""
     adaptive = curve.adaptive
@@ -123,7 +165,7 @@ def _refined(
         basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
         if basis.harmonics <= state.basis.harmonics:
             # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
-            critical = located.kind.critical(solution)
+            critical = kind.critical(solution)
             if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
                 break
             basis = next_harmonics(state, adaptive)
@@ -134,17 +176,17 @@ def _refined(
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
         guess = replace(_guess_from(solution, curve), balance=balance, x=x)
         try:
-            better = solve_or_behind(located.kind, guess)
+            better = solve_or_behind(kind, guess)
         except ConvergenceError as failure:
             warnings.append(
-                f"{located.kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
+                f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
                 f"harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
             break
         moved = abs(better.state.omega - state.omega) / state.omega
         if moved > 0.05:
             warnings.append(
-                f"{located.kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
+                f"{kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
                 f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
             )
             break

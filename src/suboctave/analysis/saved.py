@@ -16,6 +16,7 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.junction import Junction
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.contact import GrazingContact
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = ["branch_from_dataset", "branch_to_dataset"]
 
-_CLASSES = {c.__name__: c for c in (Audit, Unsettled, GrazingContact, AdaptiveHarmonics, FloquetResult)}
+_CLASSES = {c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult)}
 _MEANINGS = {
     "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
     "event_coefficients": "the same of the motions at events",
@@ -79,6 +80,8 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "audit": branch.audit,
         "closed": bool(branch.closed),
         "ended": branch.ended,
+        "departs": branch.departs,
+        "arrives": branch.arrives,
         "observe": int(branch.observe),
         "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
@@ -313,6 +316,8 @@ class _Reader:
             record["options"],
             record["warnings"],
             record["audit"],
+            record.get("departs"),
+            record.get("arrives"),
         )
         branch.seconds = record["seconds"]
         return branch

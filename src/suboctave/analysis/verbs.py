@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, check_system, is_number, make_settings
-from suboctave.analysis.follow import Settings, Trace, follow
+from suboctave.analysis.follow import follow
+from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
-from suboctave.analysis.verdicts import with_verdicts
+from suboctave.analysis.switching import leave_along, own_linear_part
+from suboctave.analysis.trace import Settings, Trace
 from suboctave.bifurcation import Bifurcation
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
-from suboctave.harmonic.balance import HarmonicBalance
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
-from suboctave.stability.arbitration import METHODS
-
-#: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
-_DENSE_UNKNOWNS = 8000
-
-Harmonics = int | str | AdaptiveHarmonics
 
 
 @timed
@@ -95,7 +88,7 @@ def frequency_response(
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
-    curve = _curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
+    curve = make_curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
     computation_begins()
     with one_thread(), reporting(progress, "frequency response") as report:
         settings = replace(settings, report=report)
@@ -106,8 +99,8 @@ def frequency_response(
             f"the branch folds back and leaves the range where it began, at omega = {first:.6g}: other motions there "
             "may lead through the range. Begin at the other end, or choose one with start="
         )
-    options = _options(settings, harmonics, {"omega": (first, last)})
-    return _branch(system, "omega", trace, settings, options)
+    options = options_of(settings, harmonics, {"omega": (first, last)})
+    return make_branch(system, "omega", trace, settings, options)
 
 
 @timed
@@ -143,6 +136,7 @@ def continue_branch(
 
     Other parameters, and errors, as `frequency_response`.
     """
+    crossing = start if isinstance(start, Bifurcation) and start.parameter_name == parameter else None
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     if isinstance(start, System):
@@ -168,20 +162,18 @@ def continue_branch(
     settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
-    curve = _curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, _own_linear_part(orbit))
+    curve = make_curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, own_linear_part(orbit))
     computation_begins()
     with one_thread(), reporting(progress, f"along {parameter}") as report:
         settings = replace(settings, report=report)
-        point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
         ahead = float(np.sign(last - first))
-        trace = _both_ways(point, ahead, (low, high), settings)
-    return _branch(system, parameter, trace, settings, _options(settings, wanted, {parameter: (first, last)}))
-
-
-def _own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
-    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
-    linear = orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
+        if crossing is not None and crossing.tangent is not None:
+            # two branches cross: go on along that on which the point was found
+            trace = leave_along(crossing, curve, np.array(crossing.tangent), ahead, (low, high), settings)
+        else:
+            point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
+            trace = _both_ways(point, ahead, (low, high), settings)
+    return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
 
 
 def _both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:
@@ -242,7 +234,7 @@ def _from_system(
     if omega is None or not (is_number(omega) and omega > 0.0):
         raise InputError(f"continue_branch from a system along {parameter!r} needs a positive omega=, got {omega!r}")
     settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
-    curve = _curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
+    curve = make_curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
     # a size of the motion to scale with, should the branch begin at rest
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
     computation_begins()
@@ -250,73 +242,7 @@ def _from_system(
         settings = replace(settings, report=report)
         point = start_point(curve, first, None, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
-    return _branch(system, parameter, trace, settings, _options(settings, wanted, {parameter: (first, last)}))
-
-
-def _curve(
-    system: System, name: str, omega: float, span: float, harmonics: Harmonics, nu: int, linear: LinearPart | None
-) -> ResponseCurve:
-    loaded = max([1] + [c.harmonic for c in system.load_components()])
-    rule = AdaptiveHarmonics() if isinstance(harmonics, str) and harmonics == "adaptive" else harmonics
-    adaptive: AdaptiveHarmonics | None = None
-    if isinstance(rule, AdaptiveHarmonics):
-        adaptive, high = rule, max(rule.minimum, loaded)
-    elif isinstance(rule, (int, np.integer)) and not isinstance(rule, bool) and rule >= 1:
-        high = int(rule)
-    else:
-        raise InputError(
-            f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
-        )
-    if linear is not None and not isinstance(linear, LinearPart):
-        raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
-    size = system.n if linear is None else linear.size
-    unknowns = size * (2 * high * nu + 1)
-    if unknowns > _DENSE_UNKNOWNS:
-        raise InputError(
-            f"{size} DOFs with {high} harmonics are {unknowns} unknowns with dense matrices, more than "
-            f"{_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
-            "(linear=)"
-        )
-    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
-    return ResponseCurve(balance, name, omega, span, adaptive)
-
-
-def _options(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[float, float]]) -> dict[str, Any]:
-    return {
-        "bounds": bounds,
-        "harmonics": asdict(harmonics) if isinstance(harmonics, AdaptiveHarmonics) else harmonics,
-        "newton": asdict(settings.newton),
-        "stepping": asdict(settings.stepping),
-        "stability": _written(settings.stability),
-        "observe": settings.observe,
-    }
-
-
-def _written(method: StabilityMethod) -> str:
-    """A stability method by the name that gives it again, or in full."""
-    return method.name if METHODS.get(method.name) == method else repr(method)
-
-
-def _branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
-    with one_thread():
-        trace = with_verdicts(trace, settings.stability, name)
-    context = {"system": system, "parameter": name, **options}
-    bifurcations, events = (
-        [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
-    )
-    return Branch(
-        system,
-        name,
-        trace.points,
-        bifurcations,
-        events,
-        trace.closed,
-        trace.ended,
-        settings.observe,
-        options,
-        tuple(trace.warnings),
-        trace.audit,
-    )
+    return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
 
 
 __all__ = ["continue_branch", "frequency_response"]

@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.analysis.audit import Unsettled
 from suboctave.analysis.branch import BranchPoint
-from suboctave.analysis.follow import Trace
+from suboctave.analysis.trace import Trace
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.stability import FloquetResult, StabilityMethod
 from suboctave.stability.result import written
@@ -38,11 +38,18 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     bifurcations = [_at_event(item, method) for item in trace.bifurcations]
     events = [_at_event(item, method) for item in trace.events]
     in_doubt = [i for i, p in enumerate(points) if not p.floquet.decided]
-    open_ones = [i for run in _runs(in_doubt) for i in _unexpected(run, points, bifurcations)]
+    # a branch that leaves or meets another does so with a multiplier at +1
+    ends = [replace(item, kind="BP") for item in (trace.departs, trace.arrives) if item is not None]
+    known = [*bifurcations, *ends]
+    if trace.closed and points:
+        # what lies at the seam lies at both ends
+        whole = points[-1].arclength
+        known += [replace(item, arclength=item.arclength + way) for item in bifurcations for way in (-whole, whole)]
+    open_ones = [i for run in _runs(in_doubt) for i in _unexpected(run, points, known)]
     unsettled, notes = _stretches(points, open_ones, name)
     for probe in trace.open:
-        stretch = _between(probe, points, bifurcations, name)
-        if stretch is not None and not any(_within(stretch, known) for known in (*trace.audit.unsettled, *unsettled)):
+        stretch = _between(probe, points, known, name)
+        if stretch is not None and not any(_within(stretch, told) for told in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
             notes.append(f"{stretch}; more harmonics may settle it")
     notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]

@@ -59,6 +59,8 @@ class Bifurcation:
         about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.
     criticality
         "supercritical", "subcritical" or None where it has not been computed.
+    tangent
+        At a branch point: the direction (dX, d parameter) of the branch that it was found on; else None.
     arclength
         Position on the branch in scaled arclength; `context` is what the point was found with.
     """
@@ -75,6 +77,7 @@ class Bifurcation:
     criticality: str | None = None
     arclength: float = 0.0
     contact: GrazingContact | None = None
+    tangent: tuple[float, ...] | None = field(default=None, repr=False)
     context: Any = field(default=None, repr=False)
 
     @property

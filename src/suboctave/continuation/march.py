@@ -78,6 +78,14 @@ class CurvePoint:
         return float(self.u[self.curve.parameter])
 
 
+@dataclass(frozen=True)
+class Arrival:
+    """A curve meets another one and ends there: its last point before that (None: the one it has), and why in words."""
+
+    point: CurvePoint | None
+    reason: str
+
+
 def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
     """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
     t = tangent(solved)
@@ -126,12 +134,14 @@ class March:
     start
         Solved start with its parameter inside the bounds.
     direction
-        +1 to set out towards larger values of the parameter, -1 towards smaller ones.
+        +1 to set out towards larger values of the parameter, -1 towards smaller ones, 0 along the start's tangent.
     bounds
         (low, high) of the parameter; the curve ends exactly on them.
     inspect
         Called with two neighbours before the second is accepted; returning False has the step halved (unless it is
         shorter than `min_step` already).
+    arrive
+        Called with two neighbours; where the curve meets another one between them and ends there, it says so.
     """
 
     def __init__(
@@ -142,12 +152,14 @@ class March:
         newton: NewtonOptions,
         stepping: SteppingOptions,
         inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None,
+        arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None,
     ) -> None:
         self.start = start
         self.bounds = bounds
         self.newton = newton
         self.stepping = stepping
         self.inspect = inspect
+        self.arrive = arrive
         self.closed = False
         self.ended = "not started"
         self._direction = direction
@@ -176,6 +188,12 @@ class March:
                     f"step size fell below {options.min_step:.0e} at {point.curve.where(point.u)}: {failure}. "
                     "Try more harmonics, a smoother law, or a smaller min_step"
                 )
+                return
+            arrival = None if self.arrive is None else self.arrive(point, new)
+            if arrival is not None:
+                self.ended = arrival.reason
+                if arrival.point is not None:
+                    yield arrival.point
                 return
             largest = max(largest, new.curve.size(new.u))
             end = self._bound_passed(point, new)

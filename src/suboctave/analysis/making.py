@@ -1,0 +1,98 @@
+"""What the verbs that follow curves share: the curve from their arguments, the branch from what was followed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.junction import Junction
+from suboctave.analysis.response import ResponseCurve
+from suboctave.analysis.trace import Settings, Trace
+from suboctave.analysis.verdicts import with_verdicts
+from suboctave.continuation.linear import one_thread
+from suboctave.errors import InputError
+from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.model.system import System
+from suboctave.stability import StabilityMethod
+from suboctave.stability.arbitration import METHODS
+
+__all__ = ["Harmonics", "make_branch", "make_curve", "options_of"]
+
+#: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
+_DENSE_UNKNOWNS = 8000
+
+Harmonics = int | str | AdaptiveHarmonics
+
+
+def make_curve(
+    system: System, name: str, omega: float, span: float, harmonics: Harmonics, nu: int, linear: LinearPart | None
+) -> ResponseCurve:
+    loaded = max([1] + [c.harmonic for c in system.load_components()])
+    rule = AdaptiveHarmonics() if isinstance(harmonics, str) and harmonics == "adaptive" else harmonics
+    adaptive: AdaptiveHarmonics | None = None
+    if isinstance(rule, AdaptiveHarmonics):
+        adaptive, high = rule, max(rule.minimum, loaded)
+    elif isinstance(rule, (int, np.integer)) and not isinstance(rule, bool) and rule >= 1:
+        high = int(rule)
+    else:
+        raise InputError(
+            f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
+        )
+    if linear is not None and not isinstance(linear, LinearPart):
+        raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
+    size = system.n if linear is None else linear.size
+    unknowns = size * (2 * high * nu + 1)
+    if unknowns > _DENSE_UNKNOWNS:
+        raise InputError(
+            f"{size} DOFs with {high} harmonics are {unknowns} unknowns with dense matrices, more than "
+            f"{_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
+            "(linear=)"
+        )
+    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
+    return ResponseCurve(balance, name, omega, span, adaptive)
+
+
+def options_of(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[float, float]]) -> dict[str, Any]:
+    return {
+        "bounds": bounds,
+        "harmonics": asdict(harmonics) if isinstance(harmonics, AdaptiveHarmonics) else harmonics,
+        "newton": asdict(settings.newton),
+        "stepping": asdict(settings.stepping),
+        "stability": _written(settings.stability),
+        "observe": settings.observe,
+    }
+
+
+def _written(method: StabilityMethod) -> str:
+    """A stability method by the name that gives it again, or in full."""
+    return method.name if METHODS.get(method.name) == method else repr(method)
+
+
+def make_branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
+    with one_thread():
+        trace = with_verdicts(trace, settings.stability, name)
+    context = {"system": system, "parameter": name, **options}
+    bifurcations, events = (
+        [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
+    )
+    return Branch(
+        system,
+        name,
+        trace.points,
+        bifurcations,
+        events,
+        trace.closed,
+        trace.ended,
+        settings.observe,
+        options,
+        tuple(trace.warnings),
+        trace.audit,
+        None if trace.departs is None else Junction.of(trace.departs),
+        None if trace.arrives is None else Junction.of(trace.arrives),
+    )

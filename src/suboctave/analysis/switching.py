@@ -1,0 +1,292 @@
+"""Onto the other branch at a bifurcation: `switch_branch`.
+
+At a period doubling the branch of twice the period leaves along the half-odd null vector, and is followed until it
+meets its parent again, closes or leaves the range. At a branch point the other branch leaves along the second solution
+of the algebraic branching equation (`bifurcation.branching`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.checks import check_bounds, make_settings
+from suboctave.analysis.follow import follow, same_event
+from suboctave.analysis.junction import BESIDE, beside, emanating, period_name
+from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
+from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.response import ResponseCurve
+from suboctave.analysis.trace import Settings, Trace
+from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.bifurcation.bordered import null_vectors
+from suboctave.bifurcation.branching import branching_equation
+from suboctave.bifurcation.solve import Singular
+from suboctave.compiled import computation_begins
+from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
+from suboctave.continuation.linear import length, one_thread
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+from suboctave.stability import StabilityMethod
+from suboctave.stability.arbitration import METHODS
+
+__all__ = ["Inherited", "leave_along", "own_linear_part", "switch_branch"]
+
+_NO_OTHER = {
+    "LP": "at a limit point the branch only turns back, and nothing leaves it",
+    "NS": "what leaves at a Neimark-Sacker point is quasi-periodic: no branch of periodic motions",
+    "grazing": "a contact that begins to touch does not split the branch",
+}
+
+
+@timed
+def switch_branch(
+    bifurcation: Bifurcation,
+    side: int | None = None,
+    *,
+    bounds: tuple[float, float] | None = None,
+    harmonics: Harmonics | None = None,
+    max_step: float | None = None,
+    observe: int | None = None,
+    events: Sequence[Event] = (),
+    progress: Any = None,
+    newton: NewtonOptions | None = None,
+    stepping: SteppingOptions | None = None,
+    stability: StabilityMethod | str | None = None,
+) -> Branch:
+    """The branch that leaves another one at a period doubling or a branch point, with stability and bifurcations.
+
+    At a period doubling (PD) the motions of twice the period: there is one such branch, either sign of the null vector
+    leads onto the same motions, a period of the parent apart. It is followed until it meets its parent again at a
+    period doubling (`branch.arrives`), closes, or leaves the range. At a branch point (BP) the other branch, both ways.
+
+    Parameters
+    ----------
+    bifurcation
+        A located PD or BP, of a branch or of a file. System, range, harmonics and options are those that it was found
+        with unless given here.
+    side
+        At a BP +1 or -1 for one half of the other branch, up to where it meets the first one again; +1 is the half on
+        which the free parameter grows, at a pitchfork that towards which the largest coefficient of the null vector
+        does. At a PD it only chooses which of the two copies of each motion is reported.
+    bounds
+        Range of the free parameter, default that of the branch that it was found on.
+
+    Other parameters as `frequency_response`.
+
+    Raises
+    ------
+    InputError
+        If nothing can be switched to there.
+    ConvergenceError
+        If no point of the other branch is found beside the bifurcation.
+    """
+    if not isinstance(bifurcation, Bifurcation):
+        raise InputError(
+            f"switch_branch takes a Bifurcation, not {type(bifurcation).__name__} (branch.bifurcations[0]?)"
+        )
+    kind = bifurcation.kind
+    if kind not in ("PD", "BP"):
+        raise InputError(f"{_NO_OTHER.get(kind, 'nothing leaves a user event')}. switch_branch takes a PD or a BP")
+    if side not in (None, 1, -1) or isinstance(side, bool):
+        raise InputError(f"side must be +1, -1 or None, not {side!r}")
+    if bifurcation.uncertainty and bifurcation.null_vectors is None:
+        raise InputError(
+            f"this {kind} could only be bracketed, to +- {bifurcation.uncertainty:.1e}: the direction of the other "
+            "branch is not known there"
+        )
+    orbit, name = bifurcation.orbit, bifurcation.parameter_name
+    known = Inherited(bifurcation)
+    first, last = check_bounds(orbit.system, name, known.bounds(name) if bounds is None else bounds)
+    value = bifurcation.parameter(name)
+    low, high = min(first, last), max(first, last)
+    if not low <= value <= high:
+        raise InputError(f"the {KINDS[kind]} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+    settings = make_settings(
+        orbit.system,
+        max_step,
+        known.options.get("observe") if observe is None else observe,
+        events,
+        known.newton if newton is None else newton,
+        known.stepping if stepping is None else stepping,
+        known.stability if stability is None else stability,
+    )
+    settings = replace(settings, half=kind == "BP" and side is not None)
+    nu = orbit.basis.nu * (2 if kind == "PD" else 1)
+    wanted = known.harmonics if harmonics is None else harmonics
+    curve = make_curve(orbit.system, name, orbit.omega, high - low, wanted, nu, own_linear_part(orbit))
+    computation_begins()
+    title = f"{period_name(nu)} branch along {name}"
+    with one_thread(), reporting(progress, title) as report:
+        settings = replace(settings, report=report)
+        if kind == "PD":
+            trace = _doubled(bifurcation, curve, 1.0 if side is None else float(side), (low, high), settings)
+        else:
+            trace = _other(bifurcation, curve, side, np.sign(last - first), (low, high), settings)
+    return make_branch(orbit.system, name, trace, settings, options_of(settings, wanted, {name: (first, last)}))
+
+
+# ------------------------------------------------------------------------------------------------ what is inherited
+class Inherited:
+    """What a bifurcation was found with: range, harmonics and options, as far as they are known."""
+
+    def __init__(self, item: Bifurcation) -> None:
+        self.item = item
+        self.options: Mapping[str, Any] = item.context or {}
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """The range of the free parameter."""
+        known = self.options.get("bounds", {}).get(name)
+        if known is None:
+            raise InputError(f"this {self.item.kind} does not know its range: give bounds=(from, to) of {name}")
+        return known[0], known[1]
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """Rule or number, as the motion was computed."""
+        orbit = self.item.orbit
+        return orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
+
+    @property
+    def newton(self) -> NewtonOptions | None:
+        """Newton's method."""
+        known = self.options.get("newton")
+        return None if known is None else NewtonOptions(**known)
+
+    @property
+    def stepping(self) -> SteppingOptions | None:
+        """Step lengths."""
+        known = self.options.get("stepping")
+        return None if known is None else SteppingOptions(**known)
+
+    @property
+    def stability(self) -> str | None:
+        """The name of the stability method; one with options of its own has to be given again."""
+        known = self.options.get("stability")
+        return known if known in METHODS else None
+
+
+def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
+    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
+    linear = orbit.balance.linear
+    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
+
+
+# ------------------------------------------------------------------------------------------------------- departures
+def _doubled(
+    item: Bifurcation, curve: ResponseCurve, sign: float, bounds: tuple[float, float], settings: Settings
+) -> Trace:
+    """The branch of twice the period."""
+    parent = item.orbit
+    basis = HarmonicBasis(2 * parent.basis.harmonics, 2 * parent.basis.nu)
+    curve = curve.with_basis(basis if curve.adaptive is not None else curve.balance.basis)
+    vectors = item.null_vectors or null_vectors(parent.state(), Kind.HALF)
+    u = curve.join(parent.basis.resized(parent.coefficients, curve.balance.basis), item.parameter(item.parameter_name))
+    weights = curve.weights(u, 0.0)
+    found = Singular(parent.state(), vectors, 0.0, item.residual, 0)
+    direction = sign * emanating(found, curve, weights)
+    trace = follow(_away(item, curve, u, direction, weights, settings), 0.0, bounds, settings)
+    trace.departs = replace(item, arclength=0.0)
+    return trace
+
+
+def _other(
+    item: Bifurcation,
+    curve: ResponseCurve,
+    side: int | None,
+    ahead: float,
+    bounds: tuple[float, float],
+    settings: Settings,
+) -> Trace:
+    """The branch that crosses another at a branch point, or one half of it."""
+    state = item.orbit.state()
+    equation = branching_equation(state, curve.name, curve.span, item.null_vectors)
+    if item.tangent is None:
+        # the branch that it was found on is unknown: that which follows the parameter most
+        direction = min(equation.directions, key=lambda d: abs(d[-1]))
+    else:
+        direction = equation.other(np.array(item.tangent))
+    direction = _oriented(direction, equation.weights)
+    if side is None:
+        return leave_along(item, curve, direction, ahead, bounds, settings)
+    curve, u, weights = _at(item, curve)
+    trace = follow(_away(item, curve, u, side * direction, weights, settings), 0.0, bounds, settings)
+    trace.departs = replace(item, arclength=0.0)
+    return trace
+
+
+def leave_along(
+    item: Bifurcation,
+    curve: ResponseCurve,
+    direction: Array,
+    ahead: float,
+    bounds: tuple[float, float],
+    settings: Settings,
+) -> Trace:
+    """The branch through a branch point along a direction, both ways; it ends where it is `ahead` in the parameter."""
+    if direction[-1] * ahead < 0.0:
+        direction = -direction
+    curve, u, weights = _at(item, curve)
+    one, other = (_away(item, curve, u, sign * direction, weights, settings) for sign in (1.0, -1.0))
+    here = replace(item, tangent=tuple(direction.tolist()))
+    forward = follow(one, 0.0, bounds, settings)
+    if forward.closed or forward.interrupted:
+        met = [b for b in forward.bifurcations if not same_event(b, here)]
+        forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
+        return forward
+    back = follow(other, 0.0, bounds, settings)
+    gap = _distance(one, u, curve) + _distance(other, u, curve)
+    trace = back.reversed_before(forward, gap)
+    place = back.points[-1].arclength + _distance(other, u, curve)
+    at = sum(b.arclength < place for b in trace.bifurcations)
+    trace.bifurcations.insert(at, replace(here, arclength=place))
+    return trace
+
+
+def _distance(point: CurvePoint, u: Array, curve: ResponseCurve) -> float:
+    """How far a point lies from a point u of a curve, in scaled arclength."""
+    return length(point.weights * (point.u - point.curve.transfer(u, curve)))
+
+
+def _at(item: Bifurcation, curve: ResponseCurve) -> tuple[ResponseCurve, Array, Array]:
+    """The curve in the harmonics of a bifurcation, that point on it, and the weights there."""
+    orbit = item.orbit
+    curve = curve.with_basis(orbit.basis)
+    u = curve.join(orbit.coefficients, item.parameter(item.parameter_name))
+    return curve, u, curve.weights(u, 0.0)
+
+
+def _oriented(direction: Array, weights: Array) -> Array:
+    """A direction such that the parameter grows, or, where it hardly moves, the largest coefficient."""
+    scaled = weights * direction
+    leading = scaled[-1] if abs(scaled[-1]) > 1e-3 * length(scaled) else scaled[int(np.argmax(np.abs(scaled[:-1])))]
+    return direction if leading >= 0.0 else -direction
+
+
+def _away(
+    item: Bifurcation, curve: ResponseCurve, u: Array, direction: Array, weights: Array, settings: Settings
+) -> CurvePoint:
+    """The first point of a branch that leaves a bifurcation, in the harmonics that it needs."""
+    x, omega, values = curve.split(u)
+    curve = curve.with_balance(curve.balance.settle(x, omega, values))
+    point = beside(curve, u, direction / length(weights * direction), weights, BESIDE, settings.newton)
+    if point is None:
+        raise ConvergenceError(
+            f"no point of the other branch was found beside the {KINDS[item.kind]} at {curve.where(u)}: its direction "
+            "may be too close to that of the first branch, or too few harmonics are kept"
+        )
+    adapted = curve.adapted(point.u, point.evaluation)
+    if adapted is curve:
+        return point
+    assert isinstance(adapted, ResponseCurve)
+    u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
+    weights = adapted.weights(u, 0.0)
+    again = beside(adapted, u, direction / length(weights * direction), weights, BESIDE, settings.newton)
+    return point if again is None else again
