@@ -189,7 +189,7 @@ class HarmonicBalance:
         kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
 
-    def packed(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
+    def packed_laws(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
         """The groups' laws at parameter values, as arrays, and points on the circle for their polynomials, (2, N)."""
         laws = self.coefficients(values)[2]
         if self._packed is None or self._packed[0] is not laws:

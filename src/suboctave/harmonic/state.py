@@ -119,7 +119,7 @@ class BalanceState:
         """`spectra_table` and both of `_parts` without elements that have nodes of their own."""
         balance, basis, linear = self.balance, self.basis, self.linear
         count, size = len(balance.groups), balance.size
-        packed, nodes = balance.packed(self.values)
+        packed, nodes = balance.packed_laws(self.values)
         table = np.zeros((3, count, balance.top + 1), dtype=complex)
         if packed.sampled:
             laws = balance.coefficients(self.values)[2]

@@ -65,7 +65,7 @@ class ClosedSingle:
     def __init__(self, state: BalanceState, silent: bool, largest: float) -> None:
         balance = state.balance
         self.state, self.silent, self.largest = state, silent, largest
-        self.laws = laws = balance.packed(state.values)[0]
+        self.laws = laws = balance.packed_laws(state.values)[0]
         degree = max(laws.polynomial.shape[1] - 2, 1 if len(laws.steps) else 0)
         self.varying = degree > 0
         self.longest = longest_panel(state.motions, degree)
