@@ -101,7 +101,7 @@ class ResponseCurve:
         self.adaptive = adaptive
         self.reference = reference
         self._cache = {balance.basis: balance} if cache is None else cache
-        self._weight = np.tile(balance.scales()[0], balance.basis.size)
+        self._weight = balance.column_weights
 
     @property
     def parameter(self) -> int:

@@ -97,6 +97,7 @@ class HarmonicBalance:
         self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
         self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
         self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
+        self._row_weights: dict[int, Array] = {}
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -219,6 +220,18 @@ class HarmonicBalance:
             raise InputError("every unknown DOF needs a mass behind it")
         weight = 1.0 / np.sqrt(mobility)
         return weight, 1.0 / weight
+
+    def row_weights(self, rows: int) -> Array:
+        """The weights of residual entries (`scales`) for as many rows of an operator."""
+        found = self._row_weights.get(rows)
+        if found is None:
+            found = self._row_weights[rows] = np.tile(self.scales()[1], rows // self.size)
+        return found
+
+    @lazy
+    def column_weights(self) -> Array:
+        """The weights of displacements (`scales`) for all coefficients, shape (dimension,)."""
+        return np.tile(self.scales()[0], self.basis.size)
 
     def scales(self) -> tuple[Array, Array]:
         """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_i)` and its inverse.

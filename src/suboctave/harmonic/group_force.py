@@ -263,10 +263,10 @@ def curvature_of(
     if law.polynomial.shape[0] > 2:
         nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
         u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
-        second = np.polynomial.polynomial.polyder(law.polynomial, 2)
-        parts.append(
-            Curvature(nodes.zr, nodes.zi, nodes.weights * np.polynomial.polynomial.polyval(u, second), None, None)
-        )
+        bend = np.zeros_like(u)
+        for p in range(len(law.polynomial) - 1, 1, -1):
+            bend = bend * u + p * (p - 1) * law.polynomial[p]
+        parts.append(Curvature(nodes.zr, nodes.zi, nodes.weights * bend, None, None))
     for members, points, widths in (
         (law.told, *law.told_places),
         (law.sharp, law.points, law.widths),
