@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import QUICK, kernel
+from suboctave.harmonic.arctangent import arctangent
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
@@ -122,28 +123,42 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         point, width, factor = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
         for j in range(n):
             y = u[j] - point
-            ratio = y / width
-            angle = math.atan(ratio)
-            f[j] += factor * (y * angle - 0.5 * width * math.log1p(ratio * ratio))
+            angle = arctangent(y / width)
+            f[j] += factor * y * angle
             f_u[j] += factor * angle
+        # a loop of its own: the logarithm is called number by number. Its digits below 1e-16 are those of a width
+        for j in range(n):
+            ratio = (u[j] - point) / width
+            f[j] -= 0.5 * factor * width * math.log(1.0 + ratio * ratio)
     scale = 1.0 / (2.0 * math.pi)
     pr = np.empty(n)
     pi = np.empty(n)
     for j in range(n):
         pr[j] = weights[j] * scale
         pi[j] = 0.0
-    for q in range(force.shape[0]):
+    # two harmonics at a time: the arrays are read once for both
+    for q in range(0, force.shape[0], 2):
         fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
+        gr, gi, tr, ti = 0.0, 0.0, 0.0, 0.0
         for j in range(n):
-            fr += f[j] * pr[j]
-            fi += f[j] * pi[j]
-            sr += f_u[j] * pr[j]
-            si += f_u[j] * pi[j]
-            t = pr[j] * zr[j] - pi[j] * zi[j]
-            pi[j] = pr[j] * zi[j] + pi[j] * zr[j]
-            pr[j] = t
+            a, b, c, d = pr[j], pi[j], zr[j], zi[j]
+            fr += f[j] * a
+            fi += f[j] * b
+            sr += f_u[j] * a
+            si += f_u[j] * b
+            e = a * c - b * d
+            b = a * d + b * c
+            gr += f[j] * e
+            gi += f[j] * b
+            tr += f_u[j] * e
+            ti += f_u[j] * b
+            pr[j] = e * c - b * d
+            pi[j] = e * d + b * c
         force[q] += complex(fr, -fi)
         stiffness[q] += complex(sr, -si)
+        if q + 1 < force.shape[0]:
+            force[q + 1] += complex(gr, -gi)
+            stiffness[q + 1] += complex(tr, -ti)
 
 
 @kernel()

@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import QUICK, kernel
+from suboctave.harmonic.arctangent import arctangent
 from suboctave.stability.passages import depths, events_along, grown
 
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
@@ -249,10 +250,12 @@ def lay_out(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, pass
         point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
         for j in range(total):
             y = path[g, 0, j] - point
-            ratio = y / width
-            angle = math.atan(ratio)
-            law[g, 0, j] += k * (y * angle - 0.5 * width * math.log1p(ratio * ratio))
+            angle = arctangent(y / width)
+            law[g, 0, j] += k * y * angle
             law[g, 3, j] += k * angle
+        for j in range(total):
+            ratio = (path[g, 0, j] - point) / width
+            law[g, 0, j] -= 0.5 * k * width * math.log(1.0 + ratio * ratio)
     for g in range(groups):
         for j in range(total):
             law[g, 1, j] += law[g, 3, j]
