@@ -20,7 +20,8 @@ _P4, _P5, _P6, _P7 = -0.09090904578123903, 0.07692183190826087, -0.0666451144738
 _P8, _P9, _P10 = -0.0508544973794026, 0.03923165829558719, -0.01917688711906226
 
 
-@kernel(at_once=True)
+# without the check for a division by zero, which would be a branch
+@kernel(at_once=True, error_model="numpy")
 def arctangent(x):
     """The inverse tangent, to within two units in the last place."""
     a = abs(x)

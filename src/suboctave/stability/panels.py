@@ -248,13 +248,14 @@ def lay_out(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, pass
     for s in range(steps.shape[0]):
         g = step_owner[s]
         point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
+        sharpness = 1.0 / width
         for j in range(total):
             y = path[g, 0, j] - point
-            angle = arctangent(y / width)
+            angle = arctangent(y * sharpness)
             law[g, 0, j] += k * y * angle
             law[g, 3, j] += k * angle
         for j in range(total):
-            ratio = (path[g, 0, j] - point) / width
+            ratio = (path[g, 0, j] - point) * sharpness
             law[g, 0, j] -= 0.5 * k * width * math.log(1.0 + ratio * ratio)
     for g in range(groups):
         for j in range(total):
