@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from suboctave.bifurcation.gaps import contact_side, levels, told_levels
+from suboctave.bifurcation.gaps import contact_side, levels
 from suboctave.errors import InputError
 from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array
@@ -20,6 +20,7 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.coupled import as_coupled
+from suboctave.model.sampling import told_levels
 from suboctave.model.system import System
 
 __all__ = ["check_element", "contact_of", "gapped_elements", "peak_force"]

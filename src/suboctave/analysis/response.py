@@ -23,7 +23,7 @@ _REST = 1e-8
 _TINY = float(np.finfo(float).tiny)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ResponseEvaluation:
     """Harmonic balance and its derivatives at one u; `reference`: a size of the motion elsewhere on the curve."""
 

@@ -47,7 +47,7 @@ class NewtonOptions:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, slots=True)
 class Solved:
     """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`."""
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from suboctave.compiled import kernel
 from suboctave.harmonic.group_kernels import add_pieces, add_polynomial, balance_residual, tangent_matrix
 
@@ -123,4 +125,21 @@ def jacobian(out, table, moving, rate, mean, starts, dofs, shape, matrices, mult
                 out[at + n + i, last] += other
 
 
-__all__ = ["along_directions", "evaluate", "jacobian"]
+@kernel()
+def neglected_of_one(force, shape, multiples, omega, matrices, out):
+    """Answer of one DOF to the harmonics of the element forces beyond the basis, into `out` (H + 1, 1).
+
+    force (G, 2 H + 2): spectra along the directions, whose entries are `shape` (G,); multiples (H + 1,): the harmonics
+    beyond, in units of omega; matrices: mass, damping, stiffness (3, 1, 1).
+    """
+    high = multiples.shape[0] - 1
+    for h in range(high + 1):
+        om = multiples[h] * omega
+        total = 0.0 + 0.0j
+        for g in range(shape.shape[0]):
+            total += 2.0 * shape[g] * force[g, high + 1 + h]
+        block = complex(matrices[2, 0, 0] - om * om * matrices[0, 0, 0], om * matrices[1, 0, 0])
+        out[h, 0] = -total / block if abs(block) > 0.0 else complex(np.inf, np.inf)
+
+
+__all__ = ["along_directions", "evaluate", "jacobian", "neglected_of_one"]

@@ -35,6 +35,7 @@ from suboctave.model.sampling import (
     PolynomialSampling,
     Sampling,
     SharpSampling,
+    told_levels,
 )
 
 _NONE = np.zeros(0)
@@ -68,6 +69,8 @@ class GroupLaw:
         The elements (index, coefficients) that these belong to.
     degree
         Highest degree of polynomials that need samples.
+    levels
+        Displacements at which a law has a corner, or is sharp: element, which of its own, displacement.
     """
 
     pieces: Array
@@ -80,6 +83,7 @@ class GroupLaw:
     line: Array
     told: tuple[tuple[int, Array], ...]
     degree: int
+    levels: tuple[tuple[int, int, float], ...] = ()
 
     @cached_property
     def told_places(self) -> tuple[Array, Array]:
@@ -96,9 +100,11 @@ class GroupLaw:
         line = np.zeros(2)
         points: list[Array] = []
         widths: list[Array] = []
+        levels: list[tuple[int, int, float]] = []
         degree = 0
         for i in group.members:
             kind, c = kinds[i], numbers[i]
+            levels += [(i, place, level) for place, level in enumerate(told_levels(kind, c))]
             if isinstance(kind, PiecewiseLinear):
                 pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
             elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
@@ -131,6 +137,7 @@ class GroupLaw:
             line,
             tuple(told),
             degree,
+            tuple(levels),
         )
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 from suboctave.errors import InputError
-from suboctave.harmonic import group_kernels
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
 
@@ -57,16 +57,21 @@ def motion_size(state: BalanceState) -> float:
 
 def truncation(state: BalanceState) -> float:
     """Estimated size of the neglected harmonics relative to the motion."""
-    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
+    tail, size = state.tails
     return float(tail[state.basis.harmonics]) if size > 0.0 else 0.0
 
 
-def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
+def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, ...]:
     """Numbers of harmonics of omega to choose from."""
-    nu, high = state.basis.nu, state.basis.harmonics
-    lowest = max(options.minimum, state.balance.highest_load)
-    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-    return [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
+    basis = state.basis
+    return _rungs(options, basis.harmonics, basis.nu, state.balance.size, state.balance.highest_load)
+
+
+@lru_cache(maxsize=256)
+def _rungs(options: AdaptiveHarmonics, high: int, nu: int, size: int, highest_load: int) -> tuple[int, ...]:
+    lowest = max(options.minimum, highest_load)
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / size - 1) / (2 * nu)))
+    return tuple(h for h in _LADDER if lowest <= h <= most) or (max(lowest, high // nu),)
 
 
 def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
@@ -96,7 +101,7 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
     """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
     basis = state.basis
     nu, high = basis.nu, basis.harmonics
-    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
+    tail, size = state.tails
     if size == 0.0:
         return basis
     ladder = _ladder(options, state)

@@ -361,8 +361,13 @@ class BalanceState:
 
         To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
         """
-        basis, size = self.basis, self.balance.size
+        basis, size, linear = self.basis, self.balance.size, self.linear
         high = basis.harmonics
+        if size == 1 and isinstance(linear, StructuralMatrices) and not self.nodal:
+            found = np.empty((high + 1, 1), dtype=complex)
+            shape = self.balance.directions[2]
+            evaluation.neglected_of_one(self.spectra_table[0], shape, basis.beyond, self.omega, linear.matrices, found)
+            return found
         force = np.zeros((high + 1, size), dtype=complex)
         for group, spectrum, _, _ in self.spectra:
             force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
@@ -375,6 +380,12 @@ class BalanceState:
         blocks = self.linear.stiffness(frequency)
         motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
         return -motion.astype(complex, copy=False)
+
+    @lazy
+    def tails(self) -> tuple[Array, float]:
+        """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
+        tail, size = group_kernels.tails(self.x, self.neglected, self.balance.scales()[0])
+        return tail, float(size)
 
     @lazy
     def completed(self) -> BalanceState:
