@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 
 import suboctave as so
+
+
+@pytest.fixture(scope="session")
+def reference():
+    """Numbers found by shooting, not by harmonic balance (the file says of which system)."""
+    return json.loads((Path(__file__).parents[1] / "data" / "reference.json").read_text())
 
 
 @pytest.fixture(scope="session")

@@ -49,6 +49,23 @@ def test_same_bifurcations(full, condensed_branch):
         np.testing.assert_allclose(one.multipliers[0], other.multipliers[0], atol=1e-5)
 
 
+def test_same_normal_forms(full, condensed_branch):
+    """The null vectors have other lengths: per squared amplitude at the common mass they foretell the same."""
+    compared = 0
+    for one, other in zip(condensed_branch.bifurcations, full.bifurcations, strict=True):
+        assert one.criticality == other.criticality
+        if one.normal_form is None:
+            continue
+        sizes = []
+        for b in (one, other):
+            weight = b.orbit.balance.scales()[1]
+            phi = b.null_vectors.right.reshape(-1, len(weight)) * weight
+            sizes.append(b.normal_form["curvature"] / np.sum(np.abs(phi[:, 0]) ** 2))
+        assert sizes[0] == pytest.approx(sizes[1], rel=1e-7)
+        compared += 1
+    assert compared
+
+
 def test_same_curve(full, condensed_branch):
     """Every point of the condensed curve, expanded to all DOFs, solves the full model; stability is the same there."""
     balance = HarmonicBalance(chain(0), HarmonicBasis(9))

@@ -242,6 +242,7 @@ class Branch(BranchReadings):
                     "amplitude": item.amplitude,
                     "multiplier_real": mu.real,
                     "multiplier_imag": mu.imag,
+                    "criticality": item.criticality or "",
                     "residual": item.residual,
                     "uncertainty": item.uncertainty,
                     "arclength": item.arclength,
@@ -249,7 +250,7 @@ class Branch(BranchReadings):
                 }
             )
         names = ["kind", "omega", *self.system.parameters, "amplitude", "multiplier_real", "multiplier_imag"]
-        names += ["residual", "uncertainty", "arclength", "remark"]
+        names += ["criticality", "residual", "uncertainty", "arclength", "remark"]
         return pd.DataFrame(rows, columns=list(dict.fromkeys(names)))  # a parameter may bear one of these names
 
     def plot(self, path: Any = None, **options: Any) -> Any:

@@ -65,7 +65,8 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
             arclength=arclength,
             contact=beside,
         )
-    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength)
+    unit = curve.unit(located.sample.point.weights)
+    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit)
     return replace(found, tangent=_tangent(a, b, located.fraction, found)) if found.kind == "BP" else found
 
 
@@ -84,10 +85,11 @@ def solved_bifurcation(
     observe: int,
     warnings: list[str],
     arclength: float = 0.0,
+    size: float = 0.0,
 ) -> Bifurcation:
-    """A solved bifurcation with the harmonics that events ask for, labelled."""
-    solution, coarser = _refined(kind, solution, curve, warnings)
-    guess = _guess_from(solution, curve)
+    """A solved bifurcation with the harmonics that events ask for, labelled; `size` as in `Guess`."""
+    solution, coarser = _refined(kind, solution, curve, warnings, size)
+    guess = _guess_from(solution, curve, size)
     state = solution.state
     layer = layer_of(kind, solution, guess)
     orbit = as_orbit(state, solution.residual, truncation(state), curve)
@@ -153,7 +155,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
 
 
 def _refined(
-    kind: BifurcationKind, solution: Singular, curve: ResponseCurve, warnings: list[str]
+    kind: BifurcationKind, solution: Singular, curve: ResponseCurve, warnings: list[str], size: float
 ) -> tuple[Singular, tuple[int, float] | None]:
     """Solved again with the harmonics that events ask for; with how many it was found before that, and where."""
     adaptive = curve.adaptive
@@ -174,7 +176,7 @@ def _refined(
         x = state.completed.basis.resized(state.completed.x, basis)
         # more harmonics need more samples of a law that tells nothing of itself
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-        guess = replace(_guess_from(solution, curve), balance=balance, x=x)
+        guess = replace(_guess_from(solution, curve, size), balance=balance, x=x)
         try:
             better = solve_or_behind(kind, guess)
         except ConvergenceError as failure:
@@ -215,13 +217,13 @@ def guess_at(u: Array, point: CurvePoint, kappa: float) -> Guess:
     curve = point.curve
     assert isinstance(curve, ResponseCurve)
     x, omega, values = curve.split(u)
-    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa)
+    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa, size=curve.unit(point.weights))
 
 
-def _guess_from(solution: Singular, curve: ResponseCurve) -> Guess:
+def _guess_from(solution: Singular, curve: ResponseCurve, size: float = 0.0) -> Guess:
     state = solution.state
     at = (state.balance, state.x, state.omega, state.values)
-    return Guess(*at, curve.name, curve.span, solution.kappa, solution.vectors)
+    return Guess(*at, curve.name, curve.span, solution.kappa, solution.vectors, size)
 
 
 def _kappa(located: Located) -> float:

@@ -140,6 +140,10 @@ class ResponseCurve:
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
         return self.join(self._weight / size, 1.0 / self.span)
 
+    def unit(self, weights: Array) -> float:
+        """Size of a motion that counts as one in `weights`."""
+        return float(self._weight[0] / weights[0])
+
     def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
         """The curve with the number of harmonics (and blind samples) that this point needs."""
         assert isinstance(evaluation, ResponseEvaluation)

@@ -20,6 +20,7 @@ from suboctave.analysis.junction import Junction
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.normal_form import NormalForm
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
 
 __all__ = ["branch_from_dataset", "branch_to_dataset"]
 
-_CLASSES = {c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult)}
+_CLASSES = {
+    c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
+}
 _MEANINGS = {
     "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
     "event_coefficients": "the same of the motions at events",
@@ -240,6 +243,7 @@ class _Writer:
             "truncation": orbit.truncation,
             "orbit": self._orbit(orbit, event.floquet),
             "null": None,
+            "normal_form": event.normal_form,
             "context": None,
         }
         if event.null_vectors is not None:
@@ -351,9 +355,8 @@ class _Reader:
             if said["context"] is not None:
                 context = dict(self.tables["contexts"][said["context"]])
                 context["system"] = self.systems[context["system"]]
-            events.append(
-                Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **said["fields"])
-            )
+            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **said["fields"])
+            events.append(event.with_normal_form(said["normal_form"]))
         return events
 
 

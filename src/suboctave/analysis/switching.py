@@ -39,6 +39,9 @@ from suboctave.stability.arbitration import METHODS
 
 __all__ = ["Inherited", "leave_along", "own_linear_part", "switch_branch"]
 
+#: share by which forces must deviate from linear ones for a motion to count as nonlinear
+_NOTICED = 0.01
+
 _NO_OTHER = {
     "LP": "at a limit point the branch only turns back, and nothing leaves it",
     "NS": "what leaves at a Neimark-Sacker point is quasi-periodic: no branch of periodic motions",
@@ -189,9 +192,11 @@ def _doubled(
     curve = curve.with_basis(basis if curve.adaptive is not None else curve.balance.basis)
     vectors = item.null_vectors or null_vectors(parent.state(), Kind.HALF)
     u = curve.join(parent.basis.resized(parent.coefficients, curve.balance.basis), item.parameter(item.parameter_name))
-    weights = curve.weights(u, 0.0)
     found = Singular(parent.state(), vectors, 0.0, item.residual, 0)
-    direction = sign * emanating(found, curve, weights)
+    direction = emanating(found, curve, curve.weights(u, 0.0))
+    _scale_from_rest(curve, u, direction)
+    weights = curve.weights(u, 0.0)
+    direction *= sign / length(weights * direction)
     trace = follow(_away(item, curve, u, direction, weights, settings), 0.0, bounds, settings)
     trace.departs = replace(item, arclength=0.0)
     return trace
@@ -214,9 +219,11 @@ def _other(
     else:
         direction = equation.other(np.array(item.tangent))
     direction = _oriented(direction, equation.weights)
+    curve, u, weights = _at(item, curve)
+    _scale_from_rest(curve, u, direction)
     if side is None:
         return leave_along(item, curve, direction, ahead, bounds, settings)
-    curve, u, weights = _at(item, curve)
+    weights = curve.weights(u, 0.0)
     trace = follow(_away(item, curve, u, side * direction, weights, settings), 0.0, bounds, settings)
     trace.departs = replace(item, arclength=0.0)
     return trace
@@ -248,6 +255,23 @@ def leave_along(
     at = sum(b.arclength < place for b in trace.bifurcations)
     trace.bifurcations.insert(at, replace(here, arclength=place))
     return trace
+
+
+def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
+    """Where a branch leaves rest nothing says how large a motion is: one whose forces deviate from linear ones."""
+    if curve.size(u) > 1e-8 * curve.reference > 0.0:
+        return
+    x, omega, values = curve.split(u)
+    balance = curve.balance.settle(x, omega, values)
+    rest, phi = balance.at(x, omega, values), direction[:-1]
+    slope = rest.force_jacobian @ phi
+    linear = length(rest.linear_jacobian @ phi) + length(slope)
+    unit = curve.size(curve.join(phi.reshape(x.shape), 0.0))
+    for size in np.geomspace(1e-12, 1e12, 145):
+        bent = balance.at(x + size * phi.reshape(x.shape), omega, values).force - rest.force
+        if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > _NOTICED * linear:
+            break
+    curve.reference = 100.0 * float(size) * unit
 
 
 def _distance(point: CurvePoint, u: Array, curve: ResponseCurve) -> float:

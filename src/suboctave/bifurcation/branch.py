@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from suboctave.bifurcation.bordered import Bordered, bordered, null_vectors
-from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
+from suboctave.bifurcation.solve import NOTHING, Extra, Guess, Singular, newton
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
@@ -34,7 +34,8 @@ def locate_branch_point(guess: Guess) -> Singular:
     borders = null_vectors(guess.state(), Kind.INTEGER)
     start = guess.state()
     rows = 1.0 / np.tile(start.balance.scales()[1], start.basis.size)
-    force = start.force_scale()
+    # at rest nothing balances, yet a motion may branch off (parametric excitation)
+    force = max(start.force_scale(), guess.size * guess.omega**2, NOTHING)
     last: list[Bordered] = []
 
     def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:

@@ -28,7 +28,9 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 _TOLERANCE = 1e-10
 _STEP = 1e-9
 #: size of motion and forces at rest: products of it with others neither overflow nor vanish
-_NOTHING = 1e-100
+NOTHING = 1e-100
+#: share of the motions in the neighbourhood below which a motion, and the forces on it, count as no smaller
+_SHRUNK = 0.01
 #: step below which the matrix is not computed anew
 _SHORT = 1e-4
 #: step, in units of the motion and of the parameter's range, that leads to no bifurcation of this neighbourhood
@@ -38,7 +40,8 @@ _AWAY = 4.0
 @dataclass(frozen=True)
 class Guess:
     """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter,
-    kappa; null vectors of the operator nearby, where they are known (with any number of harmonics).
+    kappa; null vectors of the operator nearby, where they are known (with any number of harmonics); size of the motions
+    in the neighbourhood, where it may pass rest.
     """
 
     balance: HarmonicBalance
@@ -49,6 +52,7 @@ class Guess:
     span: float
     kappa: float = 0.0
     vectors: NullVectors | None = None
+    size: float = 0.0
 
     def state(self) -> BalanceState:
         """The equations at the guess."""
@@ -134,6 +138,8 @@ def newton(
     weight = balance.column_weights
     state = guess.state() if start is None else start
     rows = residual_scale(state)
+    # a motion that shrinks to rest keeps the scales of its neighbourhood
+    least = _SHRUNK * guess.size, _SHRUNK * guess.size * guess.omega**2
     previous, contraction = np.inf, 0.0
     nearest: tuple[BalanceState, Array, float, int] | None = None
     linear: tuple[Factor, Array, Array, list[float], float] | None = None
@@ -147,7 +153,7 @@ def newton(
         if not all(e.size > 0.0 for e in equations):
             raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
-        force = max(state.force_scale(), _NOTHING)
+        force = max(state.force_scale(), least[1], NOTHING)
         error = length(residual * rows) / force
         error = max([error] + [abs(e.value) / e.size for e in equations])
         if not math.isfinite(error):
@@ -159,7 +165,7 @@ def newton(
             break
         # after a short step that contracts, the old factors take the next one as far
         if linear is None or previous > _SHORT or contraction > 0.03:
-            linear = _linearised(state, guess, equations, columns, spans, weight, rows, force)
+            linear = _linearised(state, guess, equations, columns, spans, weight, rows, force, least[0])
         factor, scale_x, scale_rows, sizes, steepest = linear
         # right behind a grazing the equations are so steep that the last digit of an unknown is more than tolerated
         if previous <= _STEP and error <= np.finfo(float).eps * steepest and (nearest is None or error < nearest[2]):
@@ -197,13 +203,14 @@ def _linearised(
     weight: Array,
     rows: Array,
     force: float,
+    least: float,
 ) -> tuple[Factor, Array, Array, list[float], float]:
     """The factorised matrix of the augmented system in dimensionless unknowns and equations, the units of the
     coefficients, the factors of the residual's entries, the sizes of the other equations, and by how much the
     steepest equation changes at most with its unknowns.
     """
     n, q = len(rows), len(spans)
-    scale_x = max(motion_size(state), _NOTHING) / weight
+    scale_x = max(motion_size(state), least, NOTHING) / weight
     scale_rows = rows / force
     packed = kernels.scaled_transposed(state.jacobian, scale_rows, scale_x, 1 + q)
     matrix = packed.T

@@ -188,6 +188,7 @@ class Law:
 
         names = {state.name: f"q{i}" for i, state in enumerate(self.q)}
         names |= {one.name: f"c{i}" for i, one in enumerate(self.c)} | {_THETA: "theta"}
+        parts = [_off_corners(part) for part in parts]
         fresh = sympy.numbered_symbols("(common)")
         common, reduced = sympy.cse(parts, symbols=fresh)
         lines = ["def law(q, theta, c):"]
@@ -252,6 +253,19 @@ _NUMPY = (
     "empty", "sqrt", "exp", "log", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh",
     "absolute", "sign", "maximum", "heaviside",
 )  # fmt: skip
+
+
+def _off_corners(expression: Any) -> Any:
+    """Derivatives of powers of ramps divide by them, and multiply by steps that are zero where the ramps are."""
+    corner = corner_functions()
+    powers = [p for p in expression.atoms(_power()) if isinstance(p.base, corner.Ramp) and not p.exp.is_nonnegative]
+    return expression.xreplace({p: corner.PositiveRamp(*p.base.args) ** p.exp for p in powers})
+
+
+def _power() -> Any:
+    import sympy
+
+    return sympy.Pow
 
 
 def _functions(expression: Any) -> list[Any]:

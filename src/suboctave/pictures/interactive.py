@@ -124,11 +124,8 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> 
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
     words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
-    kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
     traces = []
-    for kind in dict.fromkeys(kinds):
-        mark = style.kind_style(kind)
-        chosen = np.flatnonzero(kinds == kind)
+    for _, mark, chosen in style.marks(dataset):
         named = html.escape(mark.name)
         traces.append(
             {

@@ -68,7 +68,8 @@ def _covers(figure: Figure, axes: Axes, legend: Legend) -> bool:
 
 def ordered(entries: dict[str, Line2D]) -> dict[str, Line2D]:
     """Curves first, then stable and unstable, then the kinds in the order of the style table, then a user's own."""
-    lines, kinds = ["stable", "unstable"], [look.name for look in style.KINDS.values()]
+    lines = ["stable", "unstable"]
+    kinds = [name for look in style.KINDS.values() for name in (look.name, f"{look.name}{style.SUBCRITICAL}")]
 
     def rank(name: str) -> tuple[int, int]:
         if name in lines:

@@ -178,9 +178,7 @@ def _draw_events(
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
-    kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
-    for kind in dict.fromkeys(kinds):
-        mark = style.kind_style(kind)
+    for kind, mark, which in style.marks(dataset):
         drawing: dict[str, Any] = {
             "linestyle": "none",
             "marker": mark.marker,
@@ -189,7 +187,7 @@ def _draw_events(
             "markeredgecolor": edge,
             "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
-        chosen = positions[kinds == kind]
+        chosen = positions[which]
         axes.plot(
             chosen[:, 0],
             chosen[:, 1],
