@@ -145,7 +145,7 @@ class HarmonicBalance:
 
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
         """These equations with sample counts chosen for a motion and frozen from here on."""
-        if self._settled:
+        if self.settled:
             return self
         state = self.at(x, omega, values)
         samples = tuple(
@@ -155,7 +155,7 @@ class HarmonicBalance:
         return self.with_samples(samples + tuple(force.settled() for force in state.nodal))
 
     @lazy
-    def _settled(self) -> bool:
+    def settled(self) -> bool:
         """True if no element needs a number of samples."""
         kinds = self.coefficients(self.values)[1]
         blind = AdaptiveSampling | CornerSampling

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
 _NO_MATRICES = np.zeros((0, 1, 1))
+_NO_ELEMENTS: list[NodalForce] = []
 
 
 class BalanceState:
@@ -59,6 +60,8 @@ class BalanceState:
     @lazy
     def compliance(self) -> ComplexArray | None:
         """B at the harmonics, None for the identity."""
+        if isinstance(self.linear, StructuralMatrices):
+            return None
         return self.linear.compliance(self.frequencies)
 
     @lazy
@@ -94,7 +97,7 @@ class BalanceState:
         """The elements with nodes of their own, along the motion."""
         balance = self.balance
         if not balance.own:
-            return []
+            return _NO_ELEMENTS
         known = balance.coefficients(self.values)[:2]
         amplitudes = to_complex(self.x)
         return nodal_forces(balance.own, known, balance.samples, amplitudes, self.basis, self.omega, balance.top)
@@ -155,6 +158,8 @@ class BalanceState:
         )
         known = self.__dict__
         known["motions"], known["blocks"] = motions, blocks
+        if not balance.own:
+            known["nodal"] = _NO_ELEMENTS
         if not finite:
             self._refuse()
         return table, parts, sizes
@@ -403,7 +408,8 @@ class BalanceState:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
         sizes = self._parts[1]
         if self.compliance is None:
-            return float(sizes[1] + sizes[2] + sizes[3])
+            _, linear, force, load = sizes.tolist()
+            return float(linear + force + load)
         weight = self.balance.scales()[1]
         load = self.balance.load(self.values, self.omega)
         return float(sizes[1]) + sum(
