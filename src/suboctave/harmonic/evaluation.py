@@ -7,11 +7,20 @@ system spends more time than in them.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.group_force import add_sampled_spectra
 from suboctave.harmonic.group_kernels import add_pieces, add_polynomial, balance_residual, tangent_matrix
+from suboctave.harmonic.linear_part import StructuralMatrices
+
+if TYPE_CHECKING:
+    from suboctave.harmonic.state import BalanceState
+
+_NO_MATRICES = np.zeros((0, 1, 1))
 
 
 @kernel()
@@ -142,4 +151,50 @@ def neglected_of_one(force, shape, multiples, omega, matrices, out):
         out[h, 0] = -total / block if abs(block) > 0.0 else complex(np.inf, np.inf)
 
 
-__all__ = ["along_directions", "evaluate", "jacobian", "neglected_of_one"]
+def evaluated(state: BalanceState) -> tuple[tuple[ComplexArray, Array, Array], bool]:
+    """Spectra along all directions, A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P; whether they are
+    finite. The state gets its displacements and the blocks of A besides.
+    """
+    balance, basis, linear = state.balance, state.basis, state.linear
+    count, size = len(balance.groups), balance.size
+    packed, nodes = balance.packed_laws(state.values)
+    table = np.zeros((3, count, balance.top + 1), dtype=complex)
+    if packed.sampled:
+        laws = balance.coefficients(state.values)[2]
+        for g, (law, motion) in enumerate(zip(laws, state.motions, strict=True)):
+            out = (table[0, g], table[1, g], table[2, g])
+            add_sampled_spectra(law, balance.elements, balance.samples, motion, state.rate, out)
+    if isinstance(linear, StructuralMatrices):
+        matrices = linear.matrices
+        blocks = np.empty((basis.harmonics + 1, size, size), dtype=complex)
+    else:
+        matrices, blocks = _NO_MATRICES, np.ascontiguousarray(state.blocks, dtype=complex)
+    motions = np.empty((count, basis.harmonics + 1), dtype=complex)
+    parts, sizes = np.empty((3, *state.x.shape)), np.empty(4)
+    finite = evaluate(
+        state.x,
+        state.omega,
+        basis.multiples,
+        matrices,
+        blocks,
+        *balance.directions,
+        packed.pieces,
+        packed.first,
+        packed.polynomial,
+        balance.grid,
+        nodes,
+        balance.load(state.values, state.omega),
+        balance.scales()[1],
+        table,
+        motions,
+        parts,
+        sizes,
+    )
+    known = state.__dict__
+    known["motions"], known["blocks"] = motions, blocks
+    if not balance.own:
+        known["nodal"] = []
+    return (table, parts, sizes), finite
+
+
+__all__ = ["along_directions", "evaluate", "evaluated", "jacobian", "neglected_of_one"]

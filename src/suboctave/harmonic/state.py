@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
-from suboctave.harmonic.group_force import Group, add_sampled_spectra, curvature_of
+from suboctave.harmonic.group_force import Group, curvature_of
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from suboctave.harmonic.balance import HarmonicBalance
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
-_NO_MATRICES = np.zeros((0, 1, 1))
-_NO_ELEMENTS: list[NodalForce] = []
 
 
 class BalanceState:
@@ -97,7 +95,7 @@ class BalanceState:
         """The elements with nodes of their own, along the motion."""
         balance = self.balance
         if not balance.own:
-            return _NO_ELEMENTS
+            return []
         known = balance.coefficients(self.values)[:2]
         amplitudes = to_complex(self.x)
         return nodal_forces(balance.own, known, balance.samples, amplitudes, self.basis, self.omega, balance.top)
@@ -120,49 +118,10 @@ class BalanceState:
     @lazy
     def _evaluated(self) -> tuple[ComplexArray, Array, Array]:
         """`spectra_table` and both of `_parts` without elements that have nodes of their own."""
-        balance, basis, linear = self.balance, self.basis, self.linear
-        count, size = len(balance.groups), balance.size
-        packed, nodes = balance.packed_laws(self.values)
-        table = np.zeros((3, count, balance.top + 1), dtype=complex)
-        if packed.sampled:
-            laws = balance.coefficients(self.values)[2]
-            for g, (law, motion) in enumerate(zip(laws, self.motions, strict=True)):
-                add_sampled_spectra(
-                    law, balance.elements, balance.samples, motion, self.rate, (table[0, g], table[1, g], table[2, g])
-                )
-        if isinstance(linear, StructuralMatrices):
-            matrices = linear.matrices
-            blocks = np.empty((basis.harmonics + 1, size, size), dtype=complex)
-        else:
-            matrices, blocks = _NO_MATRICES, np.ascontiguousarray(self.blocks, dtype=complex)
-        motions = np.empty((count, basis.harmonics + 1), dtype=complex)
-        parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
-        finite = evaluation.evaluate(
-            self.x,
-            self.omega,
-            basis.multiples,
-            matrices,
-            blocks,
-            *balance.directions,
-            packed.pieces,
-            packed.first,
-            packed.polynomial,
-            balance.grid,
-            nodes,
-            balance.load(self.values, self.omega),
-            balance.scales()[1],
-            table,
-            motions,
-            parts,
-            sizes,
-        )
-        known = self.__dict__
-        known["motions"], known["blocks"] = motions, blocks
-        if not balance.own:
-            known["nodal"] = _NO_ELEMENTS
+        found, finite = evaluation.evaluated(self)
         if not finite:
             self._refuse()
-        return table, parts, sizes
+        return found
 
     def _refuse(self) -> None:
         for local in self.local_motions:
