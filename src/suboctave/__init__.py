@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         switch_branch,
         verify,
     )
-    from suboctave.bifurcation import Bifurcation
+    from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
     from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
-    from suboctave.pictures import plot, write_report
+    from suboctave.pictures import plot, plot_history, plot_phase, plot_spectrum, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -97,6 +97,9 @@ _HOME = {
     "Event": "suboctave.continuation",
     "Bifurcation": "suboctave.bifurcation",
     "BifurcationDiagram": "suboctave.analysis",
+    "BorderedSystem": "suboctave.bifurcation",
+    "ExtendedSystem": "suboctave.bifurcation",
+    "Alcorta2019": "suboctave.bifurcation",
     "Branch": "suboctave.analysis",
     "bifurcation_diagram": "suboctave.analysis",
     "find_subharmonics": "suboctave.analysis",
@@ -114,6 +117,9 @@ _HOME = {
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
     "plot": "suboctave.pictures",
+    "plot_history": "suboctave.pictures",
+    "plot_phase": "suboctave.pictures",
+    "plot_spectrum": "suboctave.pictures",
     "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
@@ -122,11 +128,13 @@ _HOME = {
 
 __all__ = [
     "AdaptiveHarmonics",
+    "Alcorta2019",
     "Arbitration",
     "BaseAcceleration",
     "BaseDisplacement",
     "Bifurcation",
     "BifurcationDiagram",
+    "BorderedSystem",
     "Branch",
     "Callable",
     "Clearance",
@@ -137,6 +145,7 @@ __all__ = [
     "Element",
     "Event",
     "Expression",
+    "ExtendedSystem",
     "Freeplay",
     "Gravity",
     "HarmonicBalance",
@@ -168,6 +177,9 @@ __all__ = [
     "load",
     "periodic_orbit",
     "plot",
+    "plot_history",
+    "plot_phase",
+    "plot_spectrum",
     "stability",
     "switch_branch",
     "verify",

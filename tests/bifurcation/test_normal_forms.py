@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.bifurcation.normal_form_real import doubling_predictor
-from suboctave.timedomain import integrate
+from suboctave.bifurcation.normal_form_terms import with_criticality
+from suboctave.errors import InputError
+from suboctave.timedomain import integrate, shoot
 
 
 def along(balance, start, first, eps, at, values, omega, name):
@@ -88,6 +91,37 @@ def test_the_doubled_branch_bends_as_foretold(system, omega, share, rel):
         assert doubled_curvature(b, share) == pytest.approx(form["curvature"], rel=rel)
         # it lies where the parent is unstable (d > 0: above) exactly if it is supercritical
         assert (b.criticality == "supercritical") == (form["d"] * form["curvature"] > 0.0)
+
+
+def test_the_doubled_branch_by_shooting():
+    """Motions of two load periods, found without harmonics: their halves differ by 2 eps phi, eps^2 as foretold."""
+    (b,) = so.frequency_response(so.library.reference_oscillator(p=0.55), (2.4, 2.2)).bifurcations["PD"]
+    predictor = doubling_predictor(b.orbit.state(), b.null_vectors, "omega")
+    eps = 0.01 * size_of(b)
+    x, change = predictor.at(eps)
+    frequency = np.arange(1, predictor.basis.harmonics + 1) * 0.5 * b.omega
+    state = [x[0, 0] + x[1::2].sum(), frequency @ x[2::2, 0]]
+    found = shoot(b.orbit.balance.system, state, b.omega + change, periods=2)
+    half = integrate(b.orbit.balance.system, found.state, [0.0, 2.0 * np.pi / found.omega], found.omega)
+    phi = np.array([predictor.first[1::2].sum(), frequency @ predictor.first[2::2, 0]])
+    across = 0.5 * (found.state - np.array([half.x[-1, 0], half.v[-1, 0]]))
+    assert across / eps == pytest.approx(phi, abs=2e-3)
+    assert found.stable
+
+
+def test_doubled_branches_leave_on_the_side_foretold():
+    """Beside a stable parent a supercritical branch is stable, a subcritical one is not."""
+    curve = so.frequency_response(so.library.reference_oscillator(p=1.7), (1.45, 1.3))
+    words = []
+    for b in curve.bifurcations["PD"]:
+        branch = so.switch_branch(b)
+        begin = int(np.argmin(np.abs(branch.omega - b.omega)))
+        near = slice(begin + 1, begin + 4) if begin < len(branch) // 2 else slice(begin - 3, begin)
+        side = np.sign(b.normal_form["curvature"])
+        assert np.all(np.sign(branch.omega[near] - b.omega) == side)
+        assert np.all(branch.stable[near] == (b.criticality == "supercritical"))
+        words.append(b.criticality)
+    assert words == ["supercritical", "subcritical"]
 
 
 @pytest.mark.parametrize("hardening", [0.3, -0.3])
@@ -185,6 +219,18 @@ def test_self_excitation_against_its_closed_form(cubic, damping, quadratic, prod
     assert b.criticality == ("supercritical" if growth < 0.0 else "subcritical")
 
 
+@pytest.mark.parametrize(("omega", "words"), [(3.0, "1:3"), (4.0, "1:4"), (3.02, "1:3")])
+def test_strong_resonances_are_stated(omega, words):
+    """An oscillator of frequency one beside a load of three or four: the normal form has further terms there."""
+    force = "0.1*x'**3 + 0.4*x**2"
+    loads = [so.HarmonicLoad(0, 1e-3)]
+    system = so.System(1.0, "mu", 1.0, [so.Expression(0, force)], loads, parameters={"mu": 0.02})
+    start = so.frequency_response(system, (omega, omega + 0.01)).orbits[0]
+    (b,) = so.continue_branch(start, "mu", (0.02, -0.02)).bifurcations
+    assert f"strong resonance {words}" in b.remark()
+    assert b.criticality == ("supercritical" if omega == 3.02 else None)
+
+
 def test_decay_towards_a_neimark_sacker_point():
     """At the point itself `1 / |A|^2` grows by -2 c3 per time: A from a long integration, by the left eigenvector."""
     curve = so.frequency_response(so.library.nltva(0.11), (1.1, 1.12), 9)
@@ -220,6 +266,32 @@ def test_generalised_period_doublings_of_the_sharp_law():
         signs.append(b.criticality)
         assert b.normal_form["curvature"] == pytest.approx(doubled_curvature(b, 1e-4), rel=1e-2)
     assert signs == ["supercritical", "subcritical", "supercritical"]
+
+
+@pytest.mark.parametrize(
+    ("c3", "g", "criticality", "words"),
+    [
+        (-1.0, 1.0, "supercritical", ""),
+        (1.0, 1.0, "subcritical", ""),
+        (-0.05, 1.0, None, "zero within its error"),
+        (-1.0, 1e-9, None, "double multiplier"),
+        (np.nan, 1.0, None, "zero within its error"),
+    ],
+)
+def test_a_sign_is_read_where_it_is_certain(c3, g, criticality, words):
+    form = with_criticality(NormalForm("PD", "omega", {"c3": c3, "g": g}, {"c3": 0.1, "g": 1e-6}))
+    assert form.criticality == criticality
+    assert words in form.remark
+
+
+def test_wrong_names_are_refused(duffing):
+    b = duffing.bifurcations[0]
+    with pytest.raises(InputError, match="did you mean 'omega'"):
+        normal_form("LP", b.orbit.state(), b.null_vectors, "omga")
+    with pytest.raises(InputError, match="has no normal form"):
+        normal_form("grazing", b.orbit.state(), b.null_vectors, "omega")
+    with pytest.raises(InputError, match="did you mean 'curvature'"):
+        b.normal_form["curvatur"]
 
 
 def test_no_verdict_behind_a_grazing():

@@ -120,3 +120,19 @@ def test_time_integration_is_refused(condensed):
     system = chain(0)
     with pytest.raises(ConvergenceError, match="full system"):
         so.frequency_response(system, (0.3, 0.4), harmonics=5, linear=condensed(system, [0]), start=[0.1, 0.0])
+
+
+@pytest.mark.parametrize("formulation", ["extended", "alcorta2019"])
+def test_period_doublings_by_other_formulations(condensed, formulation):
+    """Extended systems see the linear part through its contract alone, as the bordered one does."""
+    k = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+    elements = [so.ElasticStop(0, 9.0, 0.0), so.CubicSpring(0, 0.1)]
+    system = so.System(np.eye(3), 0.03 * k, 2.0 * k, elements, [so.HarmonicLoad(0, 0.5)])
+    linear = condensed(system, [0], 2.0)
+    whole = so.frequency_response(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
+    small = so.frequency_response(system, (2.8, 2.2), 9, linear=linear, formulation=formulation).bifurcations["PD"]
+    default = so.frequency_response(system, (2.8, 2.2), 9, linear=linear).bifurcations["PD"]
+    assert len(default) == 2
+    assert [b.omega for b in small] == pytest.approx([b.omega for b in whole], abs=1e-9)
+    exact = formulation == "extended"
+    assert [b.omega for b in small] == pytest.approx([b.omega for b in default], abs=1e-10 if exact else 1e-4)

@@ -10,6 +10,7 @@ import pytest
 
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis, real_form
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator, parameter_gradient
+from suboctave.harmonic.perturbation_rate import operator_along
 from suboctave.harmonic.second import Direction, second_derivative
 from suboctave.harmonic.third import Multilinear, third_derivative
 from suboctave.harmonic.waves import Frequencies, Waves
@@ -288,3 +289,28 @@ def test_the_flexibility_form_has_the_same_motions(elements, condensed):
     flexible = np.einsum("kij,kj->ki", other.state.compliance, c)
     s = other.state.residual.reshape(plain.x.shape)
     np.testing.assert_allclose(np.vstack((s[:1], s[1::2] - 1j * s[2::2])), flexible, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_operator_along_directions(case, kind):
+    """`(J_kappa v)'` along several directions at once; for J_0 it is R'' as well, for all the adjoint gradient."""
+    state = case.state
+    matrix = operator(state, kind, KAPPA)
+    right = case.random.normal(size=len(matrix)).astype(matrix.dtype)
+    if kind is Kind.FREE:
+        right = right + 1j * case.random.normal(size=len(matrix))
+    rates = [{"omega": 0.7}, {"omega": -0.2, **dict.fromkeys(NAMES, 0.3)}]
+    shifts = [0.4, -0.9]
+    directions = [Direction(case.vector(), change) for change in rates]
+    found = operator_along(state, kind, right, directions, KAPPA, shifts)
+    for column, a, shift in zip(found.T, directions, shifts, strict=True):
+        assert_close(column, lambda h: operator(case.at(h, a.x, **a.rates), kind, KAPPA + h * shift) @ right)  # noqa: B023
+    left = case.random.normal(size=len(matrix))
+    adjoint = bilinear_gradient(state, kind, left, right, ("omega", *NAMES), KAPPA)
+    for column, a, shift in zip(found.T, directions, shifts, strict=True):
+        expected = (adjoint.x * a.x).sum() + sum(adjoint.rates[name] * rate for name, rate in a.rates.items())
+        expected += adjoint.kappa * shift if kind is Kind.FREE else 0.0
+        assert left @ column == pytest.approx(expected, rel=1e-9)
+    if kind is Kind.INTEGER:
+        along = Direction(right.reshape(case.basis.size, 2))
+        np.testing.assert_allclose(found[:, 1], second_derivative(state, directions[1], along), rtol=1e-9, atol=1e-9)

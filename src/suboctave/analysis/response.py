@@ -49,7 +49,8 @@ class ResponseEvaluation:
         """Transpose of `[F_u / weights; row]`, (N + 1, N + 1): what Newton's method factorises."""
         state = self.state
         balance = state.balance
-        if self.name != "omega" or not balance.steady or not isinstance(state.linear, StructuralMatrices):
+        plain = self.name == "omega" and balance.steady and balance.basis.kept is None
+        if not plain or not isinstance(state.linear, StructuralMatrices):
             found: Array = bordered_transposed(self.jacobian, row, weights)
             return found
         return _bordered(
@@ -143,15 +144,15 @@ class ResponseCurve:
 
     def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
-        x = u[:-1].reshape(self.balance.basis.size, self.balance.size)
+        x = self.balance.spread(u[:-1])
         if self.name == "omega":
             return x, float(u[-1]), self.balance.values
         return x, self.omega, {**self.balance.values, self.name: float(u[-1])}
 
     def join(self, x: Array, value: float) -> Array:
-        """The vector u of coefficients and a value of the free parameter."""
-        u = np.empty(x.size + 1)
-        u[:-1] = x.ravel()
+        """The vector u of coefficients (2 H + 1, size) and a value of the free parameter."""
+        u = np.empty(self.balance.dimension + 1)
+        u[:-1] = self.balance.packed(x)
         u[-1] = value
         return u
 
@@ -171,7 +172,10 @@ class ResponseCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
-        return self.join(self._weight / size, 1.0 / self.span)
+        weights = np.empty(len(u))
+        weights[:-1] = self._weight / size
+        weights[-1] = 1.0 / self.span
+        return weights
 
     def unit(self, weights: Array) -> float:
         """Size of a motion that counts as one in `weights`."""
@@ -182,7 +186,7 @@ class ResponseCurve:
         assert isinstance(evaluation, ResponseEvaluation)
         basis = self.balance.basis
         if self.adaptive is not None:
-            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance)
+            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance, dropping=True)
         balance = self.balance if basis is self.balance.basis else self._in_basis(basis)
         if balance is self.balance and balance.settled:
             return self
@@ -211,7 +215,7 @@ class ResponseCurve:
         assert isinstance(origin, ResponseCurve)
         if origin.balance is self.balance or origin.balance.basis == self.balance.basis:
             return u
-        x = u[:-1].reshape(origin.balance.basis.size, -1)
+        x = origin.balance.spread(u[:-1])
         return self.join(origin.balance.basis.resized(x, self.balance.basis), u[-1])
 
     def images(self, u: Array) -> list[Array]:
@@ -219,7 +223,7 @@ class ResponseCurve:
         basis = self.balance.basis
         if basis.nu == 1:
             return [u]
-        x = u[:-1].reshape(basis.size, -1)
+        x = self.balance.spread(u[:-1])
         shifted = []
         for shift in range(basis.nu):
             angle = 2.0 * np.pi * shift * np.arange(1, basis.harmonics + 1)[:, None] / basis.nu

@@ -174,6 +174,7 @@ class _Discretisation:
     samples: tuple[int | None, ...]
     values: tuple[float, ...]
     linear: str
+    kept: tuple[int, ...] | None = None
 
 
 class _Writer:
@@ -215,6 +216,7 @@ class _Writer:
                 tuple(None if s is None else int(s) for s in balance.samples),
                 tuple(float(balance.values[name]) for name in balance.system.parameters),
                 "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
+                balance.basis.kept,
             )
             self._balances[id(balance)] = (balance, self._shared.setdefault(shared, len(self._shared)))
         return self._balances[id(balance)][1]
@@ -293,7 +295,7 @@ class _Reader:
             )
         values = dict(zip(system.parameters, d.values, strict=True))
         given = linear if d.linear else None
-        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu), values, given, d.samples)
+        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu, d.kept), values, given, d.samples)
 
     def array(self, name: str) -> np.ndarray:
         if name in self.dataset:
@@ -355,8 +357,10 @@ class _Reader:
             if said["context"] is not None:
                 context = dict(self.tables["contexts"][said["context"]])
                 context["system"] = self.systems[context["system"]]
-            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **said["fields"])
-            events.append(event.with_normal_form(said["normal_form"]))
+            # older files hold no normal forms: they are computed when asked for
+            fields = {name: value for name, value in said["fields"].items() if name != "criticality"}
+            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            events.append(event.with_normal_form(said["normal_form"]) if "normal_form" in said else event)
         return events
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.stability import StabilityMethod
 
@@ -23,6 +24,7 @@ class Settings:
     stability: StabilityMethod
     events: Sequence[Event] = ()
     observe: int = 0
+    formulation: Formulation = BORDERED
     report: Callable[[float, str], None] | None = None
     #: end at a branch point at which the branch turns back: where it meets the one that it bifurcates from
     half: bool = False
@@ -76,6 +78,13 @@ class Trace:
             self.arrives,
             other.arrives,
         )
+
+    def settle_end(self, reach: float) -> None:
+        """Take back what is in doubt within a distance of the end, where a known bifurcation explains it."""
+        whole = self.points[-1].arclength
+        explained = [u for u in self.audit.unsettled if u.arclength[0] >= whole - reach]
+        self.warnings = [w for w in self.warnings if not any(w.startswith(str(u)) for u in explained)]
+        self.audit = replace(self.audit, unsettled=tuple(u for u in self.audit.unsettled if u not in explained))
 
     def end_at(self, item: Bifurcation) -> None:
         """Drop what lies behind a bifurcation, which the trace arrives at."""

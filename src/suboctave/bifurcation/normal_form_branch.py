@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import NormalForm, Terms, with_criticality
 from suboctave.bifurcation.normal_form_real import Expansion
+from suboctave.bifurcation.normal_form_terms import NormalForm, Terms, with_criticality
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
@@ -72,7 +72,7 @@ def _quadratic_size(own: Expansion) -> float:
     for bend in own.forms.bends:
         zr, zi, weights = bend.second
         if len(zr):
-            q = own.forms._values(bend, phi, zr, zi)
-            left = own.forms._values(replace(bend, ins=bend.out[None], moving=False), psi, zr, zi)
+            q = own.forms.values(bend, phi, zr, zi)
+            left = own.forms.values(replace(bend, ins=bend.out[None], moving=False), psi, zr, zi)
             total += float(np.einsum("rsn,rn,sn,n->", *(np.abs(part) for part in (weights, q, q, left[0]))))
     return total / np.pi

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import ROUNDING, Terms, unweighted
+from suboctave.bifurcation.normal_form_terms import ROUNDING, Terms, unweighted
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient
@@ -94,8 +94,8 @@ def doubled(own: Expansion, name: str) -> tuple[float, float, float, Array]:
 class DoublingPredictor:
     """Motions of twice the period beside a period doubling, to second order in their amplitude.
 
-    In the basis `basis` (2 nu, harmonics up to 2 H + 1): `X + eps first + eps^2 second` at `p + eps^2 curvature`, of
-    the free parameter p. Arrays of shape (2 basis.harmonics + 1, size). `first` is phi, of unit length in the norm
+    In the basis `basis`: `X + eps first + eps^2 second` at `p + eps^2 curvature`, of the free parameter p. Arrays of
+    shape (2 basis.harmonics + 1, size). `first` is phi, of unit length in the norm
     weighted by masses; both signs of eps are the same motion, half a period apart.
     """
 
@@ -110,19 +110,25 @@ class DoublingPredictor:
         return self.motion + eps * self.first + eps**2 * self.second, eps**2 * self.curvature
 
 
-def doubling_predictor(state: BalanceState, vectors: NullVectors, name: str) -> DoublingPredictor:
-    """The doubled branch beside a located period doubling: see `DoublingPredictor`."""
+def doubling_predictor(
+    state: BalanceState, vectors: NullVectors, name: str, basis: HarmonicBasis | None = None
+) -> DoublingPredictor:
+    """The doubled branch beside a located period doubling: see `DoublingPredictor`.
+
+    `basis`: one of twice the period; unless given, that of all harmonics up to 2 H + 1, which drops nothing.
+    """
     own = Expansion.of(state, Kind.HALF, vectors, name)
     c3, d, _, second = doubled(own, name)
-    basis = HarmonicBasis(2 * state.basis.harmonics + 1, 2 * state.basis.nu)
+    full = HarmonicBasis(2 * state.basis.harmonics + 1, 2 * state.basis.nu)
+    basis = full if basis is None else basis
     half = own.phi.reshape(-1, state.balance.size)
-    first = np.zeros((basis.size, state.balance.size))
+    first = np.zeros((full.size, state.balance.size))
     first[1::4], first[2::4] = half[::2], half[1::2]
 
     def rebased(x: Array) -> Array:
         return state.basis.resized(x.reshape(state.x.shape), basis)
 
-    return DoublingPredictor(basis, rebased(state.x), first, rebased(second), _ratio(-c3, d))
+    return DoublingPredictor(basis, rebased(state.x), full.resized(first, basis), rebased(second), _ratio(-c3, d))
 
 
 def growth_size(state: BalanceState, kind: Kind, psi: np.ndarray, phi: np.ndarray, kappa: float = 0.0) -> float:

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.normal_form import NormalForm, Terms, unweighted
+from suboctave.bifurcation.normal_form_terms import NormalForm, Terms, unweighted
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.state import BalanceState
@@ -75,5 +75,5 @@ def labelled(form: NormalForm, share: float) -> NormalForm:
         return form
     words = f"kappa lies {distance:.1e} w0 from the strong resonance 1:{q}"
     if distance > _RESONANT:
-        return replace(form, remark=words)
-    return replace(form, remark=words, errors={**form.errors, "c3": float("inf")})
+        return replace(form, remark="; ".join(part for part in (words, form.remark) if part))
+    return replace(form, remark=words, criticality=None)

@@ -46,4 +46,21 @@ def arctangent(x):
     return math.copysign(base + (t + t * z * p), x)
 
 
-__all__ = ["arctangent"]
+@kernel(fastmath={"reassoc", "contract", "nsz"})
+def add_step(u, point, width, factor, force, stiffness):
+    """Add `factor (y atan(y / width) - width / 2 log(1 + (y / width)^2))`, y = u - point, and its derivative by u to
+    force and stiffness (N,), in place.
+    """
+    sharpness = 1.0 / width
+    for j in range(u.shape[0]):
+        y = u[j] - point
+        angle = arctangent(y * sharpness)
+        force[j] += factor * y * angle
+        stiffness[j] += factor * angle
+    # a loop of its own: the logarithm is called number by number. What it loses below 1e-16 is nothing beside a width
+    for j in range(u.shape[0]):
+        ratio = (u[j] - point) * sharpness
+        force[j] -= 0.5 * factor * width * math.log(1.0 + ratio * ratio)
+
+
+__all__ = ["add_step", "arctangent"]

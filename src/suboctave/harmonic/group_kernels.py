@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import QUICK, kernel
-from suboctave.harmonic.arctangent import arctangent
+from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
@@ -120,17 +120,7 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         f[j] = line[0] + line[1] * u[j]
         f_u[j] = line[1]
     for s in range(steps.shape[0]):
-        point, width, factor = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
-        sharpness = 1.0 / width
-        for j in range(n):
-            y = u[j] - point
-            angle = arctangent(y * sharpness)
-            f[j] += factor * y * angle
-            f_u[j] += factor * angle
-        # a loop of its own: the logarithm is called number by number. Its digits below 1e-16 are those of a width
-        for j in range(n):
-            ratio = (u[j] - point) * sharpness
-            f[j] -= 0.5 * factor * width * math.log(1.0 + ratio * ratio)
+        add_step(u, steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, f, f_u)
     scale = 1.0 / (2.0 * math.pi)
     pr = np.empty(n)
     pi = np.empty(n)

@@ -105,7 +105,7 @@ def contact_spectrum(tau, above, side, top):
     return out
 
 
-@kernel(patience=QUICK)
+@kernel(patience=QUICK, fastmath=_FAST)
 def product_spectrum(c, shift, chi, top):
     """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
     H.

@@ -41,11 +41,11 @@ def nodal_third(force: NodalForce) -> list[Third]:
 
 
 def _finite_part(force: NodalForce, row: int, level: float, at: Array) -> Third:
-    """What Gauss rules miss of `f_rrr ~ K y^(-3/2)` beside a corner, y = |q_r - level|: Hadamard's finite part.
+    """What Gauss rules miss of `f_rrr ~ K y^-p` beside a corner, y = |q_r - level|: Hadamard's finite part.
 
-    On the panel next to a corner instants run like the square of its variable s, and the integrand is `E(s) / s^2` with
-    `E(0) = 2 K |q_r'|^(-3/2) / sqrt(length)`. Its finite part over [0, 1] is `int (E(s) - E(0)) / s^2 ds - E(0)`; the
-    rule takes `sum_i w_i / s_i^2` for the -1.
+    On the panel next to a corner instants run like the square of its variable s, `y ~ |q_r'| length s^2`, and the
+    finite part of `int 2 s^(1 - 2 p) ds` over [0, 1] is `1 / (1 - p)`. The rule is exact for what is left of laws with
+    half powers (p = 3/2: contact after Hertz).
     """
     s, share = 0.5 + 0.5 * GAUSS[0], 0.5 * GAUSS[1]
     zr, zi = np.cos(at), np.sin(at)
@@ -53,28 +53,38 @@ def _finite_part(force: NodalForce, row: int, level: float, at: Array) -> Third:
     slope = _rates_of_state(force, zr, zi)[0][row]
     slope = np.where(np.abs(slope) < 1e-12 * force.size(row), 1e-12 * force.size(row), slope)
     nodes = force.nodes.tau.reshape(-1, len(s))
-    total = np.zeros(len(at))
-    for side in (1.0, -1.0):
-
-        def strength(distance: float, side: float = side) -> Array:
-            y = distance * force.size(row)
-            there = q.copy()
-            there[row] = level + side * y
-            found: Array = np.asarray(force.own.law.third(there, theta, force.c))[row, row, row] * y**1.5
-            return found
-
-        # K is the limit of a function that is smooth in y
-        limit = (4.0 * strength(_NEAR) - strength(4.0 * _NEAR)) / 3.0
-        for i, corner in enumerate(at):
-            if slope[i] * side > 0.0:
-                away = np.mod(nodes - corner, 2.0 * np.pi)
-            else:
-                away = np.mod(corner - nodes[:, ::-1], 2.0 * np.pi)
-            length = away[np.argmin(away[:, 0]), -1] / s[-1] ** 2
-            total[i] += 2.0 * limit[i] / np.sqrt(abs(slope[i]) ** 3 * length)
     weights = np.zeros((len(q),) * 3 + (len(at),))
-    weights[row, row, row] = -(1.0 + float((share / s**2).sum())) * total
+    for side in (1.0, -1.0):
+        for i, (power, strength) in enumerate(zip(*_singularity(force, row, level, side, q, theta), strict=True)):
+            if not 0.1 < power < 1.95 or power == 1.0:
+                continue
+            if slope[i] * side > 0.0:
+                away = np.mod(nodes - at[i], 2.0 * np.pi)
+            else:
+                away = np.mod(at[i] - nodes[:, ::-1], 2.0 * np.pi)
+            length = away[np.argmin(away[:, 0]), -1] / s[-1] ** 2
+            missed = 1.0 / (1.0 - power) - 2.0 * float((share * s ** (1.0 - 2.0 * power)).sum())
+            weights[row, row, row, i] += missed * strength * length * (abs(slope[i]) * length) ** -power
     return Third(zr, zi, weights, None)
+
+
+def _singularity(force: NodalForce, row: int, level: float, side: float, q: Array, theta: Array) -> tuple[Array, Array]:
+    """Exponent p and strength K of f_rrr on one side of a corner; p = 0 where it is not singular."""
+    y = _NEAR * force.size(row)
+
+    def third(distance: float) -> Array:
+        there = q.copy()
+        there[row] = level + side * distance
+        return np.asarray(force.own.law.third(there, theta, force.c))[row, row, row]
+
+    near, far = third(y), third(4.0 * y)
+    with np.errstate(all="ignore"):
+        power = np.nan_to_num(-np.log(far / near) / np.log(4.0), posinf=0.0, neginf=0.0)
+    half = np.round(2.0 * power) / 2.0
+    power = np.where(np.abs(power - half) < 1e-3, half, power)
+    # K is the limit of a function that is smooth in y
+    strength: Array = (4.0 * near * y**power - far * (4.0 * y) ** power) / 3.0
+    return power, strength
 
 
 def _corner(force: NodalForce, row: int, level: float, at: Array) -> Third:
@@ -97,8 +107,7 @@ def _corner(force: NodalForce, row: int, level: float, at: Array) -> Third:
 
     eta = force.jump(row, level, q, theta)
     if isinstance(force.kind, CornerSampling) and force.kind.rough:
-        # a jump between half powers: those of -1/2 and 1/2 in the distance cancel
-        by = -2.0 * bend(_NEAR) + 5.0 * bend(4.0 * _NEAR) - 2.0 * bend(16.0 * _NEAR)
+        by = _without_powers([bend(share * _NEAR) for share in (1.0, 4.0, 16.0)], row)
     else:
         by = bend(BESIDE)
     by[row] *= 0.5
@@ -118,6 +127,22 @@ def _corner(force: NodalForce, row: int, level: float, at: Array) -> Third:
     slopes = np.zeros_like(weights)
     slopes[row, row, row] = -eta / (slope * np.abs(slope))
     return Third(zr, zi, weights, slopes)
+
+
+def _without_powers(values: list[Array], row: int) -> Array:
+    """Limits of functions K + k d^-p + k' d^(1 - p) of the distance d from their values (Q, N) at d, 4 d, 16 d.
+
+    p is that of the given row, where it is singular at all.
+    """
+    near, middle, far = (value[row] for value in values)
+    with np.errstate(all="ignore"):
+        power = np.log((near - middle) / (middle - far)) / np.log(4.0)
+    half = np.round(2.0 * power) / 2.0
+    power = np.where(np.abs(power - half) < 1e-2, half, power)
+    power = np.where(np.isfinite(power) & (np.abs(power) > 0.02) & (np.abs(power - 1.0) > 0.02), power, 0.5)
+    first, second = 4.0**-power, 4.0 ** (1.0 - power)
+    limit: Array = values[0] * first * second - values[1] * (first + second) + values[2]
+    return limit / ((1.0 - first) * (1.0 - second))
 
 
 def _rates_of_state(force: NodalForce, zr: Array, zi: Array) -> tuple[Array, Array]:

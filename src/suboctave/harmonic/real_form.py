@@ -91,7 +91,7 @@ def _linear_rates(left, right, mean, multiples, omega, matrices):
 def applies(state: BalanceState, names: tuple[str, ...]) -> bool:
     """Whether the forces depend on displacements alone, and the linear part is the structure's own."""
     balance = state.balance
-    plain = not balance.own and not balance.any_moving and names in ((), ("omega",))
+    plain = balance.basis.kept is None and not balance.own and not balance.any_moving and names in ((), ("omega",))
     return plain and isinstance(state.linear, StructuralMatrices)
 
 

@@ -41,7 +41,7 @@ class Multilinear:
             zr, zi, weights = bend.second
             if not len(zr):
                 continue
-            values = [self._values(bend, one, zr, zi) for one in (a, b)]
+            values = self._all_values(bend, (a, b), zr, zi)
             products = np.einsum("rsn,rn,sn->n", weights, *values)
             total += np.multiply.outer(_project(products, zr, zi, shift, out.count), bend.out)
         return Waves(self._response(total, out), out)
@@ -55,11 +55,11 @@ class Multilinear:
                 zr, zi = part.zr, part.zi
                 if not len(zr):
                     continue
-                values = [self._values(bend, one, zr, zi) for one in (a, b, c)]
+                values = self._all_values(bend, (a, b, c), zr, zi)
                 plain = _trilinear(part.weights, *values)
                 spectrum = np.zeros(out.count, dtype=complex)
                 if part.slopes is not None:
-                    slopes = [self._values(bend, one.slope, zr, zi) for one in (a, b, c)]
+                    slopes = self._all_values(bend, (a.slope, b.slope, c.slope), zr, zi)
                     x, y, z = values
                     plain = plain + _trilinear(part.slopes, slopes[0], y, z)
                     plain += _trilinear(part.slopes, x, slopes[1], z) + _trilinear(part.slopes, x, y, slopes[2])
@@ -69,7 +69,13 @@ class Multilinear:
                 total += np.multiply.outer(spectrum, bend.out)
         return Waves(self._response(total, out), out)
 
-    def _values(self, bend: Bends, a: Waves, zr: Array, zi: Array) -> ComplexArray:
+    def _all_values(self, bend: Bends, waves: tuple[Waves, ...], zr: Array, zi: Array) -> list[ComplexArray]:
+        """The same wave is evaluated once."""
+        known = {id(one): one for one in waves}
+        values = {key: self.values(bend, one, zr, zi) for key, one in known.items()}
+        return [values[id(one)] for one in waves]
+
+    def values(self, bend: Bends, a: Waves, zr: Array, zi: Array) -> ComplexArray:
         """Change of q along a perturbation at instants, (Q, N), without the factor of its lowest wave."""
         rows = (a.amplitudes @ bend.ins.T).T
         if bend.moving:

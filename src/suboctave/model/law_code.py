@@ -256,16 +256,19 @@ _NUMPY = (
 
 
 def _off_corners(expression: Any) -> Any:
-    """Derivatives of powers of ramps divide by them, and multiply by steps that are zero where the ramps are."""
-    corner = corner_functions()
-    powers = [p for p in expression.atoms(_power()) if isinstance(p.base, corner.Ramp) and not p.exp.is_nonnegative]
-    return expression.xreplace({p: corner.PositiveRamp(*p.base.args) ** p.exp for p in powers})
+    """Derivatives of powers of ramps divide by them, and multiply by steps that are zero where the ramps are.
 
-
-def _power() -> Any:
+    Those by an exponent have their logarithms.
+    """
     import sympy
 
-    return sympy.Pow
+    corner = corner_functions()
+    swaps = {}
+    for found in expression.atoms(sympy.Pow, sympy.log):
+        base = found.args[0]
+        if isinstance(base, corner.Ramp) and not (found.is_Pow and found.exp.is_nonnegative):
+            swaps[found] = found.func(corner.PositiveRamp(*base.args), *found.args[1:])
+    return expression.xreplace(swaps)
 
 
 def _functions(expression: Any) -> list[Any]:

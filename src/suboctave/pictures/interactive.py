@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.pictures import style
-from suboctave.pictures.strokes import line
+from suboctave.pictures.periods import curve_styles, period_of, several_periods
+from suboctave.pictures.strokes import line, repeated
 from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
@@ -30,12 +31,13 @@ _DIGITS = 9
 def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str) -> dict[str, Any]:
     """Traces and layout of one figure with the curves over `horizontal`, ready for JSON."""
     several = len(curves) > 1
+    styles = curve_styles(list(curves.values()), list(curves))
+    told = several or several_periods(list(curves.values()))
     data: list[dict[str, Any]] = []
     for index, (label, dataset) in enumerate(curves.items()):
-        curve = style.curve_style(index) if several else style.ONE_CURVE
-        data += _lines(dataset, horizontal, html.escape(label), curve, index, several)
+        data += _lines(dataset, horizontal, html.escape(label), styles[index], index, several)
     for index, (label, dataset) in enumerate(curves.items()):
-        edge = style.curve_style(index).colour if several else style.INK
+        edge = styles[index].colour if told else style.INK
         data += _markers(dataset, horizontal, html.escape(label), edge, several)
     first = next(iter(curves.values()))
     across = "forcing frequency ω" if horizontal == "omega" else html.escape(horizontal)
@@ -75,10 +77,11 @@ def _lines(
 ) -> list[dict[str, Any]]:
     whole = line(dataset, horizontal)
     words = _Words(dataset)
+    again = repeated(whole)
     verdicts = [None] if whole.stable is None else [True, False]
     traces = []
     for verdict in verdicts:
-        vertices = _of_verdict(whole.stable, verdict, whole.x.size)
+        vertices = _of_verdict(whole.stable, verdict, whole.x.size, again)
         if not vertices:
             continue
         word = "motions" if verdict is None else "stable" if verdict else "unstable"
@@ -109,12 +112,12 @@ def _lines(
     return traces
 
 
-def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> list[int]:
-    """Vertices of all pieces of one verdict, -1 between two strokes."""
+def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int, again: np.ndarray) -> list[int]:
+    """Vertices of all pieces of one verdict, -1 between two strokes, without those that are there `again`."""
     if stable is None or stable.size == 0:
         return list(range(count)) if not verdict else []
     vertices: list[int] = []
-    for piece in np.flatnonzero(stable == verdict):
+    for piece in np.flatnonzero((stable == verdict) & ~again):
         if not vertices or vertices[-1] != piece:
             vertices += [-1, int(piece)] if vertices else [int(piece)]
         vertices.append(int(piece) + 1)
@@ -124,6 +127,7 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> 
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
     words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
+    smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
     traces = []
     for _, mark, chosen in style.marks(dataset):
         named = html.escape(mark.name)
@@ -139,7 +143,7 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
                 "hovertemplate": f"{label}: {named}<br>%{{text}}<extra></extra>",
                 "marker": {
                     "symbol": _SYMBOLS[mark.marker],
-                    "size": 1.5 * mark.size,
+                    "size": 1.5 * mark.size * smaller,
                     "color": mark.colour,
                     "line": {"color": edge, "width": 1.8},
                 },

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,10 +38,14 @@ def plot(
 ) -> Figure:
     """Draw one or several branches: stable parts solid, unstable ones dashed, bifurcations marked.
 
+    Motions of period T, 2T, 4T, ... (T that of the load) have a colour for each; amplitudes are largest values over
+    one period of the response. Markers of subcritical bifurcations are hollow, where that is known.
+
     Parameters
     ----------
     curves
-        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), or a sequence of these.
+        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a sequence of these, or what has
+        `branches`, such as the results of a study.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
     quantity
@@ -71,7 +75,10 @@ def plot(
     if quantity is None:
         quantity = "amplitude" if harmonic is None else "harmonic"
     view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
-    given = list(curves) if isinstance(curves, list | tuple) else [curves]
+    several = getattr(curves, "branches", curves)
+    if isinstance(several, Mapping) and several is not curves:
+        several = list(several.values())
+    given = list(several) if isinstance(several, list | tuple) else [several]
     datasets = [_dataset(item, view) for item in given]
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
 

@@ -27,10 +27,12 @@ __all__ = [
     "CURVE_COLOURS",
     "INK",
     "KINDS",
+    "OF_SUBHARMONICS",
     "ONE_CURVE",
     "PRINT",
     "SCREEN",
     "SIZES",
+    "SOFT",
     "STABLE_DASH",
     "UNSTABLE_DASH",
     "CurveStyle",
@@ -44,6 +46,7 @@ __all__ = [
 ]
 
 INK = "#1a1a1a"
+SOFT = "#8c8c8c"
 GRID = "#d9d9d9"
 CURVE_COLOURS = ("#0072B2", "#E69F00", INK, "#009E73", "#CC79A7", "#56B4E9")  # then again from the first
 
@@ -54,6 +57,8 @@ SUBCRITICAL = ", subcritical"  # in a legend, behind the kind
 
 LINE_WIDTH = 1.5
 MARKER_SIZE = 6.5
+#: sub-harmonic motions branch off where their parents have a marker: theirs, on top, lets that one show
+OF_SUBHARMONICS = 0.6
 
 #: inches; the widths are 84 mm and 174 mm
 SIZES = {"single-column": (3.31, 2.4), "double-column": (6.85, 3.6)}

@@ -15,7 +15,8 @@ from suboctave.harmonic.sharp_nodes import singular_instants
 from suboctave.harmonic.state import BalanceState
 from suboctave.stability.magnus import BETWEEN, STEPS
 from suboctave.stability.nodes import NODES
-from suboctave.stability.panels import closed_changes, lay_out, longest_panel
+from suboctave.stability.panels import _filled, _panels, closed_changes, longest_panel
+from suboctave.stability.passages import events_along
 from suboctave.stability.single import corrected_single, standing_single
 
 _NO_PASSAGE = np.zeros((2, 0))
@@ -31,9 +32,9 @@ def _multipliers(
     silent: whether the force that the motion leaves unbalanced is left out. Other arguments: see `panels.lay_out` and
     `single.standing_single`; scaled by `1 / rate`.
     """
-    stretch, path, law, base, events, start = lay_out(
-        c, f, rate, pieces, owner, polynomial, steps, step_owner, line, passed, longest, grid[0], grid[1], nodes
-    )
+    events = events_along(c, pieces, owner, passed, grid[0], grid[1])
+    panels, start = _panels(events, longest)
+    stretch, path, law, base = _filled(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, panels, nodes)
     if silent:
         for g in range(law.shape[0]):
             for j in range(law.shape[2]):
@@ -87,6 +88,7 @@ class ClosedSingle:
         balance = state.balance
         return (
             balance.size == 1
+            and balance.basis.kept is None
             and not balance.own
             and isinstance(state.linear, StructuralMatrices)
             and not any(law.sharp or law.uniform for law in balance.coefficients(state.values)[2])

@@ -65,6 +65,10 @@ class Linearisation:
                     finest = min(finest, _BLIND / (balance.samples[i] or FEWEST))
         self.varying = degree > 0
         forces = np.concatenate((state.spectra_table[0], own.forces)) if own.forces else state.spectra_table[0]
+        if state.basis.kept is not None:
+            # the force at harmonics that are left out is unbalanced, like that beyond the highest
+            forces = forces.copy()
+            forces[:, state.basis.left_out] = 0.0
         high = state.basis.harmonics
         grid = search_grid(high)
         motions = c = np.concatenate((state.motions, own.motions)) if own.motions else state.motions
