@@ -7,42 +7,22 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_follow import Box, TrackedTrace, follow_tracked
+from suboctave.analysis.track_start import discretisation, is_extremum, kind_of, linear_part, solved_start
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_sample import null_row
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.augmented import (
-    Augmentation,
-    BranchPointUnfolded,
-    GrazingContactEquations,
-    SingularOperator,
-)
-from suboctave.bifurcation.extremum import extremal_of
-from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
-from suboctave.continuation.march import make_point
-from suboctave.continuation.newton import correct
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import AdaptiveHarmonics
-from suboctave.harmonic.state import BalanceState
 from suboctave.stability import StabilityMethod
-
-_OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
-#: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
-_NEAR = 0.05
 
 Range = tuple[float, float]
 
@@ -104,14 +84,14 @@ def track(
     Minimally augmented systems (`bifurcation.augmented`) and pseudo-arclength. A branch point can be followed only
     where a symmetry forces it; the curve ends where that is broken.
     """
-    turning = bifurcation.parameter_name if _is_extremum(bifurcation) else ""
+    turning = bifurcation.parameter_name if is_extremum(bifurcation) else ""
     names, ranges = (_third if turning else _free)(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit
     system = orbit.system
     settings = make_settings(system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability)
     basis = orbit.basis
     wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
-    adaptive, basis = _discretisation(basis, wanted)
+    adaptive, basis = discretisation(basis, wanted)
     second = ranges[1]
     assert second is not None
     ends = (min(second), max(second))
@@ -120,8 +100,8 @@ def track(
     computation_begins()
     with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[-1]}") as report:
         settings = replace(settings, report=report)
-        balance = HarmonicBalance(system, basis, linear=_linear_part(bifurcation))
-        start = _start(bifurcation, balance, adaptive, names, box, settings)
+        balance = HarmonicBalance(system, basis, linear=linear_part(bifurcation))
+        start = solved_start(bifurcation, balance, adaptive, names, box, settings)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     options = {
         "bounds": {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None},
@@ -133,7 +113,7 @@ def track(
     }
     context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
-        _kind(bifurcation),
+        kind_of(bifurcation),
         names,
         system,
         names[-1],
@@ -147,15 +127,6 @@ def track(
         tuple(trace.warnings),
         turning=turning,
     )
-
-
-def _is_extremum(item: Any) -> bool:
-    return isinstance(item, TrackedEvent) and item.kind == "extremum"
-
-
-def _kind(item: Bifurcation) -> str:
-    """Kind of the bifurcations that are followed."""
-    return item.curve if isinstance(item, TrackedEvent) else item.kind
 
 
 def _third(
@@ -190,7 +161,9 @@ def _free(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
         )
     if item.kind not in TRACKED_KINDS:
-        raise InputError(f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves; this is a {item.kind}")
+        raise InputError(
+            f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves; this is a {item.kind}"
+        )
     system = item.orbit.system
     if isinstance(parameter, str):
         names: tuple[str, str] = ("omega", parameter)
@@ -230,116 +203,6 @@ def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range
 
 def _observed(item: Bifurcation, observe: int | None) -> int | None:
     return item.context.get("observe") if observe is None and item.context else observe
-
-
-def _discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
-    if isinstance(wanted, str) and wanted == "adaptive":
-        wanted = AdaptiveHarmonics()
-    if isinstance(wanted, AdaptiveHarmonics):
-        return wanted, basis.filled
-    if isinstance(wanted, (int, np.integer)) and not isinstance(wanted, bool) and wanted >= 1:
-        return None, HarmonicBasis(int(wanted) * basis.nu, basis.nu)
-    raise InputError(
-        f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {wanted!r}'
-    )
-
-
-def _linear_part(item: Bifurcation) -> LinearPart | None:
-    """The linear part a bifurcation was solved with, at its parameters; None for its system's own matrices."""
-    linear = item.orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
-
-
-def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[Augmentation, np.ndarray]:
-    """What singles the bifurcation out, and the start of its extra unknowns."""
-    if _kind(item) == "grazing":
-        assert item.contact is not None
-        places = np.array(levels(state.local(item.contact.element)))
-        index = int(np.argmin(np.abs(places - item.contact.gap)))
-        tau = item.contact.time * state.rate
-        return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
-    if _kind(item) == "BP":
-        return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
-    kind = _OPERATORS[_kind(item)]
-    extra = np.zeros(0)
-    if kind is Kind.FREE:
-        kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
-        extra = np.array([kappa])
-    return SingularOperator.of(state, kind, float(extra.sum())), extra
-
-
-def _start(
-    item: Bifurcation,
-    balance: HarmonicBalance,
-    adaptive: AdaptiveHarmonics | None,
-    names: tuple[str, ...],
-    box: Box,
-    settings: Settings,
-) -> CurvePoint:
-    """The bifurcation solved again as a point of the curve, in a basis that suits it."""
-    orbit = item.orbit
-    x = orbit.basis.resized(orbit.coefficients, balance.basis)
-    balance = balance.settle(x, orbit.omega)
-    state = balance.at(x, orbit.omega)
-    augmentation, extra = _augmentation(item, state, names)
-    values = np.array([item.parameter(name) for name in names])
-    for i, ends in ((0, box.first), (-1, box.second)):
-        if ends is not None:
-            values[i] = min(ends[1], max(ends[0], values[i]))
-    spans = tuple(_span(item, name, value) for name, value in zip(names[:-1], values, strict=False))
-    if box.first is not None:
-        spans = (box.first[1] - box.first[0], *spans[1:])
-    spans = (*spans, box.second[1] - box.second[0])
-    if _is_extremum(item):
-        turning = item.parameter_name
-        (beside,) = set(names[:2]) - {turning}
-        sizes = dict(zip(names, spans, strict=True))
-        augmentation = extremal_of(augmentation, state, extra, beside, turning, sizes)
-    force = state.force_scale()
-    floor = 0.0 if force > 0.0 else 1e-8 * orbit.omega**2
-    curve = TrackedCurve(
-        balance,
-        augmentation,
-        names,
-        spans,
-        orbit.omega,
-        adaptive,
-        # between what a response curve needs and what a located event does
-        0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
-        max(force, floor),
-        floor,
-        {balance.basis: balance},
-    )
-    u = curve.join(x, extra, values)
-    begin = u
-    origin = curve
-    try:
-        for _ in range(8):
-            weights = curve.weights(u, 0.0)
-            row = null_row(curve, u, weights)
-            if abs(row[-1]) > 1e-2:
-                row = np.eye(1, len(row), len(row) - 1)[0]
-            solved = correct(curve, u, row, weights, settings.newton)
-            adapted = curve.adapted(solved.u, solved.evaluation)
-            same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
-            if same:
-                break
-            u, curve = adapted.transfer(solved.u, curve), adapted
-        moved = weights * (solved.u - curve.transfer(begin, origin))
-        if float(np.linalg.norm(moved)) > _NEAR:
-            raise ConvergenceError(f"what was found lies elsewhere, at {curve.where(solved.u)}")
-        return make_point(solved, curve, None, 0.0)
-    except ConvergenceError as failure:
-        raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
-
-
-def _span(item: Bifurcation, name: str, value: float) -> float:
-    """Width of the range of a parameter on the curve that an extremum lies on; its value where that has none."""
-    ends = (item.context or {}).get("bounds", {}) if _is_extremum(item) else {}
-    if name in ends:
-        first, last = ends[name]
-        return abs(float(last) - float(first))
-    return abs(float(value)) or 1.0
 
 
 def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> TrackedTrace:
