@@ -10,8 +10,8 @@ from typing import Any
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
-from suboctave.analysis.track_follow import Box, TrackedTrace, follow_tracked
-from suboctave.analysis.track_start import discretisation, is_extremum, kind_of, linear_part, solved_start
+from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
+from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, linear_part, solved_start
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from suboctave.analysis.extremum import polished
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
+from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
@@ -44,14 +46,6 @@ class TrackedTrace:
         same = self.ended == other.ended
         ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
         return TrackedTrace(points, events, self.warnings + other.warnings, False, ended, other.interrupted)
-
-
-@dataclass(frozen=True)
-class Box:
-    """Ranges of the first and the last free parameter, None where one is not bounded: the curve ends on them."""
-
-    first: tuple[float, float] | None
-    second: tuple[float, float]
 
 
 def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> TrackedTrace:
@@ -115,7 +109,7 @@ class _Tracker:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
         for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
-            item = refined(found, settings.newton, self.trace.warnings)
+            item = polished(refined(found, settings.newton, self.trace.warnings), settings.newton)
             self.trace.events.append(as_event(item, settings.stability, settings.observe))
         self._add(new)
         self.previous = new
@@ -209,4 +203,4 @@ def _drop_seam(events: list[TrackedEvent]) -> None:
             events.pop()
 
 
-__all__ = ["Box", "TrackedTrace", "follow_tracked"]
+__all__ = ["TrackedTrace", "follow_tracked"]

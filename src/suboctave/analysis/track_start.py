@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from suboctave.analysis.trace import Settings
-from suboctave.analysis.track_follow import Box
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import null_row
 from suboctave.bifurcation import Bifurcation
@@ -36,6 +35,14 @@ from suboctave.harmonic.state import BalanceState
 _OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
 #: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
 _NEAR = 0.05
+
+
+@dataclass(frozen=True)
+class Box:
+    """Ranges of the first and the last free parameter, None where one is not bounded: the curve ends on them."""
+
+    first: tuple[float, float] | None
+    second: tuple[float, float]
 
 
 def is_extremum(item: Any) -> bool:
@@ -176,4 +183,14 @@ def solved_start(
         raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
 
 
-__all__ = ["curve_through", "discretisation", "is_extremum", "kind_of", "linear_part", "solved_start", "with_extremum"]
+__all__ = [
+    "Box",
+    "curve_through",
+    "discretisation",
+    "is_extremum",
+    "kind_of",
+    "linear_part",
+    "solved_start",
+    "spans_of",
+    "with_extremum",
+]

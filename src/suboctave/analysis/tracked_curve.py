@@ -74,14 +74,14 @@ class TrackedEvaluation:
         """Derivatives by u, shape (N, N + 1)."""
         state, equations = self.state, self.equations
         n, q = state.balance.dimension, len(self.extra)
-        parameters = len(self.curve.names)
-        out = np.zeros((n + q + parameters - 1, n + q + parameters))
+        rows = equations.rows
+        out = np.zeros((n + rows.shape[0], rows.shape[1]))
         out[:n, :n] = state.jacobian
         if equations.column is not None:
             out[:n, n] = equations.column
         for i, name in enumerate(self.curve.names):
             out[:n, n + q + i] = state.residual_by(name)
-        out[n:] = equations.rows
+        out[n:] = rows
         out[n:] *= self.curve.force
         return out
 

@@ -25,6 +25,7 @@ from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
 from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.bifurcation.extremum import LimitPointExtremalEquations, extremal_of, isola_type
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.march import point_between
 from suboctave.continuation.newton import NewtonOptions
@@ -275,7 +276,22 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
         curve=curve.augmentation.name,
         names=curve.names,
         extreme=found.extreme,
+        isola=_isola(found),
+        turning=curve.augmentation.turning,
     )
+
+
+def _isola(found: Found) -> str:
+    """What happens to branches at an extremum along a curve of limit points."""
+    curve, sample = found.sample.curve, found.sample
+    if not isinstance(found.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
+        return ""
+    (beside,) = set(curve.names) - {found.test.name}
+    sizes = dict(zip(curve.names, curve.spans, strict=True))
+    extremal = extremal_of(curve.augmentation, sample.state, sample.evaluation.extra, beside, found.test.name, sizes)
+    equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
+    assert isinstance(equations, LimitPointExtremalEquations)
+    return isola_type(equations.form)
 
 
 __all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]

@@ -16,9 +16,9 @@ analytic,
     [R; g; psi . R_p] = 0.
 
 The form `psi . R''[t, t]` on the null space of `[R_X R_p]` tells what happens to branches over p when q passes its
-extremum: where it is definite a closed branch shrinks to a point and vanishes (isola centre), where it is indefinite two
-branches meet and reconnect (isola merging) (Golubitsky & Schaeffer, Singularities and Groups in Bifurcation Theory I,
-1985, chapter III).
+extremum: where it is definite a closed branch shrinks to a point and vanishes (isola centre), where it is indefinite
+two branches meet and reconnect (isola merging) (Golubitsky & Schaeffer, Singularities and Groups in Bifurcation Theory
+I, 1985, chapter III).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 
-__all__ = ["Extremal", "ExtremalEquations", "extremal_of", "isola_type"]
+__all__ = ["Extremal", "ExtremalEquations", "LimitPointExtremalEquations", "extremal_of", "isola_type"]
 
 #: step of the differences that h is differentiated by, in units of the motion and of the parameters' ranges
 _STEP = 3e-5

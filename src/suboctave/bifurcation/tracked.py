@@ -11,7 +11,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 TRACKED_KINDS = ("LP", "BP", "PD", "NS", "grazing")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrackedEvent(Bifurcation):
     """A bifurcation of a tracked curve at which the curve turns, or at which a second condition holds.
 
@@ -23,15 +23,23 @@ class TrackedEvent(Bifurcation):
         The two free parameters.
     extreme
         "minimum" or "maximum" of `parameter_name` at an extremum, else empty.
+    isola
+        At an extremum along limit points what happens to branches over the other parameter when `parameter_name`
+        passes it: "isola_centre" (a closed branch shrinks to a point), "isola_merging" (two branches meet and
+        reconnect), empty where that is not certain.
+    turning
+        On a curve of extrema the parameter that is extreme all along it, else empty.
     """
 
     curve: str = ""
     names: tuple[str, ...] = ()
     extreme: str = ""
+    isola: str = ""
+    turning: str = ""
 
     @property
     def free_names(self) -> tuple[str, ...]:
-        """The two free parameters."""
+        """The free parameters."""
         return self.names
 
     def critical_multiplier(self) -> complex:
@@ -45,6 +53,10 @@ class TrackedEvent(Bifurcation):
     def remark(self) -> str:
         """What a table says beside the numbers."""
         words = [f"{self.extreme} of {self.parameter_name}"] if self.extreme else []
+        if self.extreme and self.turning and self.parameter_name == self.names[-1]:
+            words.append(f"a minimum and a maximum of {self.turning} meet")
+        if self.isola:
+            words.append(self.isola.replace("_", " "))
         return "; ".join([*words, super().remark()] if super().remark() else words)
 
 
