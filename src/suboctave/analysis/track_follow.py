@@ -128,6 +128,8 @@ class _Tracker:
                 self.settings.stability,
                 sample.instant_or_frequency,
                 sample.coefficient,
+                extreme=sample.extreme,
+                isola=sample.isola,
             )
         )
 

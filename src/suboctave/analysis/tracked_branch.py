@@ -23,7 +23,8 @@ class TrackedPoint:
     """One point of a tracked curve: orbit, position in scaled arclength, Newton iterations, and the extra unknown.
 
     `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0; `coefficient` the one that decides the
-    normal form of an LP (a) or a PD (c3), else nan. The multipliers are computed when asked for.
+    normal form of an LP (a) or a PD (c3), else nan; `extreme` and `isola` say on a curve of extrema of which nature
+    they are (`TrackedEvent`). The multipliers are computed when asked for.
     """
 
     orbit: PeriodicOrbit
@@ -33,6 +34,8 @@ class TrackedPoint:
     extra: float = 0.0
     coefficient: float = float("nan")
     known: FloquetResult | None = None
+    extreme: str = ""
+    isola: str = ""
 
     @lazy
     def floquet(self) -> FloquetResult:
@@ -92,6 +95,16 @@ class TrackedBranch(Branch):
         return np.array([p.coefficient for p in self.tracked])
 
     @property
+    def extreme(self) -> list[str]:
+        """Along a curve of extrema whether each is a "minimum" or a "maximum" of `turning`; else empty texts."""
+        return [p.extreme for p in self.tracked]
+
+    @property
+    def isola(self) -> list[str]:
+        """Along a curve of extrema of limit points "isola_centre" or "isola_merging" (`TrackedEvent`), else empty."""
+        return [p.isola for p in self.tracked]
+
+    @property
     def tracked(self) -> tuple[TrackedPoint, ...]:
         """The points, with what only tracked curves have."""
         return self.points  # type: ignore[return-value]
@@ -123,14 +136,16 @@ def tracked_record(branch: TrackedBranch) -> dict[str, Any]:
         "turning": branch.turning,
         "extra": [p.extra for p in branch.tracked],
         "coefficient": [p.coefficient for p in branch.tracked],
+        "nature": [(p.extreme, p.isola) for p in branch.tracked],
     }
 
 
 def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> list[Any]:
     """Points that were read, as those of a tracked curve."""
+    natures = record.get("nature") or [("", "")] * len(points)
     return [
-        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet)
-        for p, extra, coefficient in zip(points, record["extra"], record["coefficient"], strict=True)
+        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet, *nature)
+        for p, extra, coefficient, nature in zip(points, record["extra"], record["coefficient"], natures, strict=True)
     ]
 
 

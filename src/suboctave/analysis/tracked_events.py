@@ -23,9 +23,11 @@ from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
-from suboctave.bifurcation.augmented import SingularOperator
+from suboctave.bifurcation.augmented import GrazingEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
-from suboctave.bifurcation.extremum import LimitPointExtremalEquations, extremal_of, isola_type
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.extremum import extremal_of
+from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.march import point_between
 from suboctave.continuation.newton import NewtonOptions
@@ -36,6 +38,10 @@ from suboctave.stability import StabilityMethod
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
+#: component of the tangent in scaled arclength that may be rounding at both ends of a step
+_LEVEL = 1e-9
+#: share of a step within which events coincide
+_SAME = 1e-5
 #: share of a step to which an event is located
 _RESOLVED = 1e-11
 
@@ -67,6 +73,12 @@ class Extremum(CurveTest):
         # at a cusp both change sign
         plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
         return slope / sample.bend if plane and sample.bend != 0.0 else slope
+
+    def level(self, *samples: TrackedSample) -> bool:
+        """Whether the parameter stays as it is but for rounding."""
+        indices = [sample.curve.index(self.name) for sample in samples]
+        points = [sample.point for sample in samples]
+        return all(abs(p.tangent[i] * p.weights[i]) < _LEVEL for p, i in zip(points, indices, strict=True))
 
 
 @dataclass(frozen=True)
@@ -174,6 +186,13 @@ def events_between(
                 found.append(Found(test, sample, _extreme(test, low)))
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
+    cusps = [item.sample.point.arclength for item in found if isinstance(item.test, Cusp)]
+    if b.curve.augmentation.turning and cusps:
+        # a symmetry may have the curve of extrema turn there in both parameters, which makes no extremum of either
+        near = _SAME * (b.point.arclength - a.point.arclength)
+        turns = [i for i in found if isinstance(i.test, Extremum)]
+        same = [i for i in turns if min(abs(i.sample.point.arclength - s) for s in cusps) < near]
+        found = [item for item in found if item not in same] if len(same) > 1 else found
     return sorted(found, key=lambda item: item.sample.point.arclength)
 
 
@@ -181,6 +200,8 @@ def _brackets(
     test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
 ) -> list[tuple[TrackedSample, TrackedSample]]:
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    if isinstance(test, Extremum) and test.level(a, b):
+        return []
     first, last = test.value(a), test.value(b)
     if first * last < 0.0 or (last == 0.0 and first != 0.0):
         return [(a, b)]
@@ -276,9 +297,22 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
         curve=curve.augmentation.name,
         names=curve.names,
         extreme=found.extreme,
+        contact=_contact(sample),
         isola=_isola(found),
         turning=curve.augmentation.turning,
     )
+
+
+def _contact(sample: TrackedSample) -> GrazingContact | None:
+    """What grazes along a curve of grazings."""
+    equations = sample.evaluation.equations.own
+    if not isinstance(equations, GrazingEquations):
+        return None
+    state, of = sample.state, equations.of
+    local = state.local(of.element)
+    time = sample.instant_or_frequency / state.rate
+    value = float(sample.point.u[-1])
+    return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
 
 
 def _isola(found: Found) -> str:
@@ -290,8 +324,7 @@ def _isola(found: Found) -> str:
     sizes = dict(zip(curve.names, curve.spans, strict=True))
     extremal = extremal_of(curve.augmentation, sample.state, sample.evaluation.extra, beside, found.test.name, sizes)
     equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
-    assert isinstance(equations, LimitPointExtremalEquations)
-    return isola_type(equations.form)
+    return equations.isola
 
 
 __all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]

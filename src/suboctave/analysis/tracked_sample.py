@@ -15,6 +15,7 @@ from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
+from suboctave.bifurcation.extremum import ExtremalEquations
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -109,6 +110,20 @@ class TrackedSample:
             return float("nan")
         turn = -1.0 if self.twist > 0.0 else 1.0
         return turn * (0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+
+    @lazy
+    def extreme(self) -> str:
+        """On a curve of extrema whether it is a "minimum" or a "maximum", else empty."""
+        equations = self.evaluation.equations
+        if not isinstance(equations, ExtremalEquations):
+            return ""
+        return "minimum" if equations.curvature > 0.0 else "maximum"
+
+    @lazy
+    def isola(self) -> str:
+        """On a curve of extrema of limit points the type of `bifurcation.extremum`, else empty."""
+        equations = self.evaluation.equations
+        return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
     @property
     def other(self) -> float:

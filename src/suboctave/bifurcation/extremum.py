@@ -110,6 +110,11 @@ class ExtremalEquations(Equations):
     def curvature(self) -> float:
         """Second derivative of the extreme parameter along the curve it is extreme on, up to a positive factor."""
 
+    @property
+    def isola(self) -> str:
+        """See `isola_type`; empty for all but limit points."""
+        return ""
+
 
 def extremal_of(
     base: Augmentation, state: BalanceState, extra: Array, beside: str, turning: str, spans: Mapping[str, float]
@@ -186,13 +191,12 @@ class LimitPointExtremalEquations(ExtremalEquations):
         bend = -float(by_motion[:n] @ b.right)
         mixed = float(by_slope[:n] @ b.right)
         other = float(by_slope[:n] @ tangent) + float(by_slope[at])
-        scale = self._size(tangent)
-        return np.array([[bend, mixed / scale], [mixed / scale, other / scale**2]])
+        return np.array([[bend, mixed], [mixed, other]])
 
-    def _size(self, tangent: Array) -> float:
-        """Length of (X', 1) over that of (phi, 0), weighted by masses."""
-        weight = self.state.balance.per_unknown(self.state.balance.scales()[0])
-        return (length(weight * tangent) / length(weight * self.base.bordered.right)) or 1.0
+    @property
+    def isola(self) -> str:
+        """See `isola_type`."""
+        return isola_type(self.form)
 
     @property
     def curvature(self) -> float:

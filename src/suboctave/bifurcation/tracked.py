@@ -42,6 +42,16 @@ class TrackedEvent(Bifurcation):
         """The free parameters."""
         return self.names
 
+    @property
+    def smooth(self) -> bool:
+        """False along a curve of grazings."""
+        return self.curve != "grazing"
+
+    @property
+    def discontinuous(self) -> bool:
+        """False: events are located along curves, not behind a grazing."""
+        return False
+
     def critical_multiplier(self) -> complex:
         """The multiplier on the unit circle that the curve's bifurcations have."""
         targets = {"LP": 1.0, "BP": 1.0, "PD": -1.0, "NS": cmath.exp(1j * self.kappa * self.orbit.period)}
@@ -57,7 +67,11 @@ class TrackedEvent(Bifurcation):
             words.append(f"a minimum and a maximum of {self.turning} meet")
         if self.isola:
             words.append(self.isola.replace("_", " "))
-        return "; ".join([*words, super().remark()] if super().remark() else words)
+        if self.contact is not None:
+            words.append(str(self.contact))
+        elif super().remark():
+            words.append(super().remark())
+        return "; ".join(words)
 
 
 __all__ = ["TRACKED_KINDS", "TrackedEvent"]
