@@ -186,14 +186,27 @@ def events_between(
                 found.append(Found(test, sample, _extreme(test, low)))
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
-    cusps = [item.sample.point.arclength for item in found if isinstance(item.test, Cusp)]
-    if b.curve.augmentation.turning and cusps:
-        # a symmetry may have the curve of extrema turn there in both parameters, which makes no extremum of either
-        near = _SAME * (b.point.arclength - a.point.arclength)
-        turns = [i for i in found if isinstance(i.test, Extremum)]
-        same = [i for i in turns if min(abs(i.sample.point.arclength - s) for s in cusps) < near]
-        found = [item for item in found if item not in same] if len(same) > 1 else found
+    if b.curve.augmentation.turning:
+        found = _without_consequences(found, b.curve, _SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
+    """Events along a curve of extrema without those that others bring about.
+
+    Where the third parameter turns the extreme one does so too: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M.
+    At a cusp a symmetry may have both turn, which makes no extremum of either.
+    """
+    extreme, last = curve.augmentation.turning, curve.names[-1]
+
+    def beside(item: Found, others: list[Found]) -> bool:
+        return any(abs(item.sample.point.arclength - o.sample.point.arclength) <= near for o in others)
+
+    turns = {name: [i for i in found if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
+    cusps = [item for item in found if isinstance(item.test, Cusp)]
+    both = [item for item in turns[extreme] if beside(item, turns[last])]
+    dropped = both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
+    return [item for item in found if not any(item is d for d in dropped)]
 
 
 def _brackets(
