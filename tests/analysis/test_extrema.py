@@ -178,7 +178,7 @@ def test_wrong_input_is_refused(folds):
     ):
         with pytest.raises(so.InputError, match=message):
             so.track(extremum, parameter, bounds)
-    with pytest.raises(so.InputError, match="starts from one of the .extrema"):
+    with pytest.raises(so.InputError, match=r"starts from one of the \.extrema"):
         so.locate_extremum(folds[0])
     with pytest.raises(so.InputError, match="unknown formulation 'alcorta'"):
         so.locate_extremum(extremum, formulation="alcorta")

@@ -1,4 +1,4 @@
-"""Extrema along curves of bifurcations of rattling and multi-DOF systems, against separate runs and published numbers."""
+"""Extrema along curves of bifurcations of systems with contacts and of several DOFs, against runs of their own."""
 
 from __future__ import annotations
 
@@ -51,13 +51,11 @@ def test_the_whole_curve_in_one_call_at_any_step(max_step):
     curve = so.track(extremum, "Kc", (2.0, 8.0), max_step=max_step)
     assert curve.parameter("Kc")[[0, -1]] == pytest.approx([2.0, 8.0])
     assert curve.ended.count("reached the end of the range") == 2
-    ends = [(2.0279637, 0.1743688), (2.0208686, 0.1777923)]
     for i, stiffness in enumerate((2.0, 8.0)):
         other = extreme_gap(3000.0, stiffness)
         assert (curve.omega[-i], curve.parameter("j")[-i]) == pytest.approx(
             (other.omega, other.parameter("j")), abs=1e-5
         )
-        assert ends[i] == pytest.approx((other.omega, other.parameter("j")), abs=1e-5)
     # its own extremum: omega turns
     (turn,) = (e for e in curve.extrema if e.parameter_name == "omega")
     assert turn.parameter("Kc") == pytest.approx(7.4, abs=0.1)

@@ -107,6 +107,8 @@ def newton_extremum(
         If Newton's method does not converge.
     """
     weights = curve.weights(u, 0.0)
+    # from a point of the curve both systems need but follow it
+    u = nearest_point(curve, u, weights, newton).u
     published = isinstance(formulation, Alcorta2019)
     solve = _Published(curve, u, turning, weights) if published else _Bordered(curve, u, turning, weights)
     size = np.inf

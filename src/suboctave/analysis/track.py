@@ -85,7 +85,10 @@ def track(
     where a symmetry forces it; the curve ends where that is broken.
     """
     turning = bifurcation.parameter_name if is_extremum(bifurcation) else ""
-    names, ranges = (_third if turning else _free)(bifurcation, parameter, bounds, omega)
+    if is_extremum(bifurcation):
+        names, ranges = _third(bifurcation, parameter, bounds, omega)
+    else:
+        names, ranges = _free(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit
     system = orbit.system
     settings = make_settings(system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class Box:
     second: tuple[float, float]
 
 
-def is_extremum(item: Any) -> bool:
+def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
     """Whether something is an extremum along a tracked curve."""
     return isinstance(item, TrackedEvent) and item.kind == "extremum"
 
