@@ -37,8 +37,8 @@ class TrackedTrace:
     def reversed_before(self, other: TrackedTrace) -> TrackedTrace:
         """This trace walked backwards, then `other`, which started from the same point."""
         whole = self.points[-1].arclength
-        points = [replace(p, arclength=whole - p.arclength) for p in reversed(self.points)]
-        points += [replace(p, arclength=whole + p.arclength) for p in other.points[1:]]
+        points = [p.at(whole - p.arclength) for p in reversed(self.points)]
+        points += [p.at(whole + p.arclength) for p in other.points[1:]]
         events = [replace(e, arclength=whole - e.arclength) for e in reversed(self.events)]
         events += [replace(e, arclength=whole + e.arclength) for e in other.events]
         same = self.ended == other.ended
