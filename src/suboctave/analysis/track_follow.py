@@ -13,14 +13,20 @@ from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.bifurcation.gaps import gap_extrema
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
+from suboctave.continuation.linear import length
 from suboctave.continuation.march import between, make_point
 from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 1e-4
+#: ways, in scaled arclength, on which the far side of a corner is looked for, and corners after which it is not
+_AROUND, _CORNERS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2), 5
+#: distance from a gap, in units of the motion, at which a contact grazes
+_GRAZES = 1e-3
 
 
 @dataclass
@@ -30,6 +36,7 @@ class TrackedTrace:
     points: list[TrackedPoint] = field(default_factory=list)
     events: list[TrackedEvent] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    corners: list[float] = field(default_factory=list)
     closed: bool = False
     ended: str = ""
     interrupted: bool = False
@@ -43,7 +50,8 @@ class TrackedTrace:
         events += [replace(e, arclength=whole + e.arclength) for e in other.events]
         same = self.ended == other.ended
         ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
-        return TrackedTrace(points, events, self.warnings + other.warnings, False, ended, other.interrupted)
+        warnings = self.warnings + other.warnings
+        return TrackedTrace(points, events, warnings, [], False, ended, other.interrupted)
 
 
 @dataclass(frozen=True)
@@ -73,13 +81,15 @@ class _Tracker:
     def run(self) -> TrackedTrace:
         trace = self.trace
         try:
-            for point in self.march:
-                stop = self._accept(point)
-                if stop is not None:
-                    trace.ended = stop
+            while True:
+                trace.ended = self._march()
+                beyond = None if trace.ended != self.march.ended or self.march.closed else self._beyond_corner()
+                if beyond is None:
                     break
-            else:
-                trace.closed, trace.ended = self.march.closed, self.march.ended
+                stepping = self.settings.stepping
+                heading = math.copysign(1.0, beyond.tangent[-1])
+                self.march = March(beyond, heading, self.box.second, self.settings.newton, stepping, self._clear)
+            trace.closed = self.march.closed
         except KeyboardInterrupt:
             where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
@@ -87,6 +97,46 @@ class _Tracker:
         if trace.closed:
             _drop_seam(trace.events)
         return trace
+
+    def _march(self) -> str:
+        """Take in points until the curve ends; why it does."""
+        for point in self.march:
+            stop = self._accept(point)
+            if stop is not None:
+                return stop
+        return self.march.ended
+
+    def _beyond_corner(self) -> CurvePoint | None:
+        """A point behind a corner that the steps could not get around: where another contact grazes.
+
+        On either side of it the curve is smooth, but its direction, and the terms that behave like square roots, change.
+        """
+        last = self.previous
+        if last is None or not self.march.ended.startswith("step size fell") or len(self.trace.corners) >= _CORNERS:
+            return None
+        contact = _grazing_label(last)
+        if contact is None:
+            return None
+        point = last.point
+        row = point.weights * point.tangent
+        row = row / length(row)
+        for way in _AROUND:
+            guess = point.u + way * row / point.weights
+            try:
+                solved = correct(point.curve, guess, row, point.weights, self.settings.newton)
+                new = make_point(solved, point.curve, point.tangent, point.arclength + way)
+            except ConvergenceError:
+                continue
+            if solved.distance < 2.0 * way and self._inside(TrackedSample(new)):
+                self.trace.corners.append(point.arclength)
+                self.trace.warnings.append(
+                    f"the curve has a corner at {last.curve.where(point.u)}, where {contact} grazes"
+                )
+                return new
+        self.trace.warnings.append(
+            f"{contact} grazes at {last.curve.where(point.u)}: the equations are not smooth there"
+        )
+        return None
 
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
@@ -98,11 +148,11 @@ class _Tracker:
     def _accept(self, point: CurvePoint) -> str | None:
         """Take a point in; a sentence if the curve ends there or before it."""
         settings, new = self.settings, TrackedSample(point)
-        if self.previous is None:
+        if self.previous is None or point is self.march.start:
             self._add(new)
             self.previous = new
             return None
-        if point.curve is self.march.start.curve:
+        if self.march.closed:
             new = self._closing(self.previous, new)
         a = same_discretisation(self.previous, new, settings.newton)
         end = end_between(a, new, settings.newton)
@@ -197,6 +247,15 @@ class _Tracker:
         solved.u[index] = bound
         arclength = a.point.arclength + right * (b.point.arclength - a.point.arclength)
         return TrackedSample(make_point(solved, b.curve, b.point.tangent, arclength))
+
+
+def _grazing_label(sample: TrackedSample) -> str | None:
+    """The contact nearest to a grazing, None if none is close to one."""
+    state = sample.state
+    size = float(np.abs(state.x).max())
+    near = [(float(np.abs(g.value - g.level).min()), g.element) for g in gap_extrema(state) if len(g.value)]
+    closest = min(near, default=(math.inf, 0))
+    return state.local(closest[1]).element.label if closest[0] < _GRAZES * size else None
 
 
 def _drop_seam(events: list[TrackedEvent]) -> None:
