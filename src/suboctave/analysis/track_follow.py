@@ -8,25 +8,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
-from suboctave.bifurcation.gaps import gap_extrema
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
-from suboctave.continuation.linear import length
 from suboctave.continuation.march import between, make_point
 from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 1e-4
-#: ways, in scaled arclength, on which the far side of a corner is looked for, and corners after which it is not
-_AROUND, _CORNERS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2), 5
-#: distance from a gap, in units of the motion, at which a contact grazes
-_GRAZES = 1e-3
+#: corners after which no further one is passed
+_CORNERS = 5
 
 
 @dataclass
@@ -36,7 +33,6 @@ class TrackedTrace:
     points: list[TrackedPoint] = field(default_factory=list)
     events: list[TrackedEvent] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    corners: list[float] = field(default_factory=list)
     closed: bool = False
     ended: str = ""
     interrupted: bool = False
@@ -51,7 +47,7 @@ class TrackedTrace:
         same = self.ended == other.ended
         ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
         warnings = self.warnings + other.warnings
-        return TrackedTrace(points, events, warnings, [], False, ended, other.interrupted)
+        return TrackedTrace(points, events, warnings, False, ended, other.interrupted)
 
 
 @dataclass(frozen=True)
@@ -77,6 +73,7 @@ class _Tracker:
         self.trace = TrackedTrace()
         self.tests: tuple[CurveTest, ...] = tests_of(start.curve)
         self.previous: TrackedSample | None = None
+        self.corners = 0
 
     def run(self) -> TrackedTrace:
         trace = self.trace
@@ -107,36 +104,18 @@ class _Tracker:
         return self.march.ended
 
     def _beyond_corner(self) -> CurvePoint | None:
-        """A point behind a corner that the steps could not get around: where another contact grazes.
-
-        On either side of it the curve is smooth, but its direction, and the terms that behave like square roots, change.
-        """
+        """A point behind a corner that the steps could not get around, None if there is none."""
         last = self.previous
-        if last is None or not self.march.ended.startswith("step size fell") or len(self.trace.corners) >= _CORNERS:
+        if last is None or not self.march.ended.startswith("step size fell") or self.corners >= _CORNERS:
             return None
-        contact = _grazing_label(last)
-        if contact is None:
+        self.corners += 1
+        before = (p.orbit for p in reversed(self.trace.points))
+        found = beyond_corner(last, before, self.settings.newton)
+        if found is None:
             return None
-        point = last.point
-        row = point.weights * point.tangent
-        row = row / length(row)
-        for way in _AROUND:
-            guess = point.u + way * row / point.weights
-            try:
-                solved = correct(point.curve, guess, row, point.weights, self.settings.newton)
-                new = make_point(solved, point.curve, point.tangent, point.arclength + way)
-            except ConvergenceError:
-                continue
-            if solved.distance < 2.0 * way and self._inside(TrackedSample(new)):
-                self.trace.corners.append(point.arclength)
-                self.trace.warnings.append(
-                    f"the curve has a corner at {last.curve.where(point.u)}, where {contact} grazes"
-                )
-                return new
-        self.trace.warnings.append(
-            f"{contact} grazes at {last.curve.where(point.u)}: the equations are not smooth there"
-        )
-        return None
+        point, note = found
+        self.trace.warnings.append(note)
+        return point if point is not None and self._inside(TrackedSample(point)) else None
 
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
@@ -247,15 +226,6 @@ class _Tracker:
         solved.u[index] = bound
         arclength = a.point.arclength + right * (b.point.arclength - a.point.arclength)
         return TrackedSample(make_point(solved, b.curve, b.point.tangent, arclength))
-
-
-def _grazing_label(sample: TrackedSample) -> str | None:
-    """The contact nearest to a grazing, None if none is close to one."""
-    state = sample.state
-    size = float(np.abs(state.x).max())
-    near = [(float(np.abs(g.value - g.level).min()), g.element) for g in gap_extrema(state) if len(g.value)]
-    closest = min(near, default=(math.inf, 0))
-    return state.local(closest[1]).element.label if closest[0] < _GRAZES * size else None
 
 
 def _drop_seam(events: list[TrackedEvent]) -> None:
