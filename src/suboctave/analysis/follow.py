@@ -12,7 +12,7 @@ from suboctave.analysis.count import CountCheck
 from suboctave.analysis.doublings import DoublingWatch
 from suboctave.analysis.guard import Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
-from suboctave.analysis.junction import Meeting, meeting
+from suboctave.analysis.junction import UNSEEN, Meeting, meeting
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.analysis.trace import Settings, Trace
@@ -122,6 +122,8 @@ class _Follower:
         met, arclength = self._meeting[2], self.trace.points[-1].arclength
         if self.march.ended != met.arrival.reason:
             return None
+        if met.doubt:
+            self.trace.warnings.append(f"{met.doubt}: {UNSEEN}")
         return solved_bifurcation(
             PERIOD_DOUBLING, met.solution, met.parent, self.settings.observe, self.trace.warnings, arclength
         )

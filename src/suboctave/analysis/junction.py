@@ -7,7 +7,7 @@ would grow again with the opposite sign, the same motions shifted by the parent'
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,19 +15,38 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.branching import doubled_direction
 from suboctave.bifurcation.finder import position
+from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import Arrival, CurvePoint, between, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.basis import ComplexArray, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind
+from suboctave.stability import FloquetResult, floquet_multipliers
 
-__all__ = ["Junction", "Meeting", "beside", "meeting"]
+__all__ = [
+    "UNSEEN",
+    "Beside",
+    "Junction",
+    "Meeting",
+    "beside",
+    "curvature_of",
+    "doubled",
+    "emanating",
+    "meeting",
+    "period_name",
+]
 
-#: distance from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
-BESIDE = 3e-3
+#: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
+_DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+#: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
+_CLOSE = 0.02
+#: way in the scaled parameter that rounding may account for
+_STILL = 1e-10
+#: what a branch says where it could not look closer
+UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
 
 
 @dataclass(frozen=True)
@@ -71,11 +90,15 @@ def period_name(nu: int) -> str:
 
 @dataclass(frozen=True)
 class Meeting:
-    """A branch that meets its parent: the parent's period doubling, its curve, and how the march ends."""
+    """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
+
+    `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere.
+    """
 
     solution: Singular
     parent: ResponseCurve
     arrival: Arrival
+    doubt: str = ""
 
 
 def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | None:
@@ -103,8 +126,8 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     if place is None or not -1e-6 <= place <= 1.0 + 1e-6 or found.vectors is None:
         return None
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
-    last = _last_before(a, b, there, found, parent, newton)
-    return Meeting(found, parent.with_balance(state.balance), Arrival(last, reason))
+    last, doubt = _last_before(a, b, there, found, newton)
+    return Meeting(found, parent.with_balance(state.balance), Arrival(last, reason), doubt)
 
 
 def _turned(a: CurvePoint, b: CurvePoint, curve: ResponseCurve) -> bool:
@@ -133,36 +156,25 @@ def _even_rows(parent: HarmonicBasis) -> Array:
 
 
 def _last_before(
-    a: CurvePoint, b: CurvePoint, there: Array, found: Singular, parent: ResponseCurve, newton: NewtonOptions
-) -> CurvePoint | None:
-    """The curve's point right before it meets its parent, None if a neighbour is that."""
+    a: CurvePoint, b: CurvePoint, there: Array, found: Singular, newton: NewtonOptions
+) -> tuple[CurvePoint | None, str]:
+    """The curve's point right before it meets its parent, None if a neighbour is that; and what remains in doubt."""
     curve = b.curve
     assert isinstance(curve, ResponseCurve)
     before = curve.transfer(a.u, a.curve)
     way = length(b.weights * (there - before))
-    if way <= 2.0 * BESIDE:
-        return None
     direction = emanating(found, curve, b.weights)
     if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
         direction = -direction
-    point = beside(curve, there, direction, b.weights, BESIDE, newton)
-    if point is None:
-        return None
+    assert found.vectors is not None
+    form = normal_form("PD", found.state, found.vectors, curve.name)
+    close = beside(curve, there, direction, b.weights, doubled(found.floquet), newton, curvature_of(form), 0.7 * way)
+    if close is None:
+        return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
+    point = close.point
     arclength = a.arclength + length(b.weights * (point.u - before))
-    if (b.weights * point.tangent) @ (b.weights * (there - point.u)) < 0.0:
-        return CurvePoint(
-            curve,
-            point.u,
-            -point.tangent,
-            point.weights,
-            point.evaluation,
-            -point.orientation,
-            arclength,
-            point.iterations,
-        )
-    return CurvePoint(
-        curve, point.u, point.tangent, point.weights, point.evaluation, point.orientation, arclength, point.iterations
-    )
+    last = replace(point, tangent=-point.tangent, orientation=-point.orientation, arclength=arclength)
+    return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
 
 
 def emanating(found: Singular, curve: ResponseCurve, weights: Array) -> Array:
@@ -175,20 +187,94 @@ def emanating(found: Singular, curve: ResponseCurve, weights: Array) -> Array:
     return direction / length(weights * direction)
 
 
-def beside(
-    curve: ResponseCurve, u: Array, direction: Array, weights: Array, distance: float, newton: NewtonOptions
-) -> CurvePoint | None:
-    """The curve's point at a distance from a bifurcation in a direction, with its tangent pointing away from it.
+@dataclass(frozen=True)
+class Beside:
+    """A point right beside a bifurcation; `smooth`: whether nothing else happens to the motion on the way there."""
 
-    The closer, the less regular the equations: larger distances are tried where the first one does not converge.
+    point: CurvePoint
+    smooth: bool
+
+
+def beside(
+    curve: ResponseCurve,
+    u: Array,
+    direction: Array,
+    weights: Array,
+    multipliers: ComplexArray,
+    newton: NewtonOptions,
+    curvature: float | None = None,
+    reach: float = np.inf,
+) -> Beside | None:
+    """The curve's point close to a bifurcation in a direction, with its tangent pointing away; None if there is none.
+
+    On the way the critical multiplier leaves +1, and the parameter its value, with the square of the distance. Where
+    the point's multipliers are not those of the bifurcation, or the parameter goes another way, something else happens
+    in between: then one closer to it is taken.
+
+    Parameters
+    ----------
+    u, direction
+        The bifurcation, and where the curve leaves it, of unit length in `weights`.
+    multipliers
+        Of the motion at u, over the period of the curve's motions.
+    curvature
+        Which way the parameter goes, by its sign, where a normal form tells.
+    reach
+        Distance that the point must not exceed.
     """
-    row = weights * direction
-    row = row / length(row)
-    for factor in (1.0, 0.3, 3.0, 0.1, 10.0):
+    points: list[tuple[float, CurvePoint]] = []
+    for distance in _DISTANCES:
+        if distance > reach:
+            continue
         try:
-            solved = correct(curve, u + factor * distance * direction, row, weights, newton)
+            point = _solved_beside(curve, u, distance * direction, weights, newton)
         except ConvergenceError:
             continue
-        if 0.5 <= length(weights * (solved.u - u)) / (factor * distance) <= 2.0:
-            return make_point(solved, curve, solved.u - u, 0.0)
-    return None
+        points.append((distance, point))
+        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1], curvature):
+            return Beside(points[-2][1], True)
+    return Beside(points[-1][1], False) if points else None
+
+
+def _solved_beside(curve: ResponseCurve, u: Array, way: Array, weights: Array, newton: NewtonOptions) -> CurvePoint:
+    row = weights * way
+    solved = correct(curve, u + way, row / length(row), weights, newton)
+    if not 0.5 <= length(weights * (solved.u - u)) / length(row) <= 2.0:
+        raise ConvergenceError("what was found lies elsewhere")
+    return make_point(solved, curve, way, 0.0)
+
+
+def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
+    """Whether a point has multipliers close to given ones."""
+    curve = point.curve
+    assert isinstance(curve, ResponseCurve)
+    x, omega, values = curve.split(point.u)
+    found = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
+    expected = np.sort_complex(multipliers)
+    return float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
+
+
+def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint], curvature: float | None) -> bool:
+    """Whether the parameter goes one way between two points beside a bifurcation, and goes on so at both.
+
+    The bifurcation's own place is not asked: cut off at a harmonic, the two curves meet a little elsewhere.
+    """
+    index = far[1].curve.parameter
+    way = far[1].u[index] - close[1].u[index]
+    slopes = [point.tangent[index] for _, point in (far, close)]
+    moved = abs(way) * far[1].weights[index]
+    foretold = curvature is None or curvature * way > 0.0
+    return moved <= _STILL or (foretold and all(slope * way > 0.0 for slope in slopes))
+
+
+def curvature_of(form: NormalForm | None) -> float | None:
+    """Which way the parameter goes on the branch that leaves a bifurcation; None where its form leaves that open."""
+    if form is None or form.criticality is None:
+        return None
+    return form.coefficients.get("curvature")
+
+
+def doubled(result: FloquetResult) -> ComplexArray:
+    """Multipliers over twice the period."""
+    squared: ComplexArray = result.multipliers**2
+    return squared

@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_bounds, make_settings
 from suboctave.analysis.follow import follow, same_event
-from suboctave.analysis.junction import BESIDE, beside, emanating, period_name
+from suboctave.analysis.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
@@ -206,7 +206,9 @@ def _doubled(
     _scale_from_rest(curve, u, direction)
     weights = curve.weights(u, 0.0)
     direction *= sign / length(weights * direction)
-    trace = follow(_away(item, curve, u, direction, weights, settings), 0.0, bounds, settings)
+    notes: list[str] = []
+    trace = follow(_away(item, curve, u, direction, weights, settings, notes), 0.0, bounds, settings)
+    trace.warnings[:0] = notes
     trace.departs = replace(item, arclength=0.0)
     return trace
 
@@ -233,7 +235,9 @@ def _other(
     if side is None:
         return leave_along(item, curve, direction, ahead, bounds, settings)
     weights = curve.weights(u, 0.0)
-    trace = follow(_away(item, curve, u, side * direction, weights, settings), 0.0, bounds, settings)
+    notes: list[str] = []
+    trace = follow(_away(item, curve, u, side * direction, weights, settings, notes), 0.0, bounds, settings)
+    trace.warnings[:0] = notes
     trace.departs = replace(item, arclength=0.0)
     return trace
 
@@ -250,12 +254,15 @@ def leave_along(
     if direction[-1] * ahead < 0.0:
         direction = -direction
     curve, u, weights = _at(item, curve)
-    one, other = (_away(item, curve, u, sign * direction, weights, settings) for sign in (1.0, -1.0))
+    notes: list[str] = []
+    one, other = (_away(item, curve, u, sign * direction, weights, settings, notes) for sign in (1.0, -1.0))
     here = replace(item, tangent=tuple(direction.tolist()))
     forward = follow(one, 0.0, bounds, settings)
+    forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
         met = [b for b in forward.bifurcations if not same_event(b, here)]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
+        forward.settle_end(2.0 * _distance(one, u, curve))
         return forward
     back = follow(other, 0.0, bounds, settings)
     gap = _distance(one, u, curve) + _distance(other, u, curve)
@@ -305,22 +312,36 @@ def _oriented(direction: Array, weights: Array) -> Array:
 
 
 def _away(
-    item: Bifurcation, curve: ResponseCurve, u: Array, direction: Array, weights: Array, settings: Settings
+    item: Bifurcation,
+    curve: ResponseCurve,
+    u: Array,
+    direction: Array,
+    weights: Array,
+    settings: Settings,
+    notes: list[str],
 ) -> CurvePoint:
     """The first point of a branch that leaves a bifurcation, in the harmonics that it needs."""
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
-    point = beside(curve, u, direction / length(weights * direction), weights, BESIDE, settings.newton)
-    if point is None:
+    expected = doubled(item.floquet) if item.kind == "PD" else item.floquet.multipliers
+    leads = curvature_of(item.normal_form)
+    close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
+    if close is None:
         raise ConvergenceError(
             f"no point of the other branch was found beside the {KINDS[item.kind]} at {curve.where(u)}: its direction "
             "may be too close to that of the first branch, or too few harmonics are kept"
         )
+    point = close.point
     adapted = curve.adapted(point.u, point.evaluation)
-    if adapted is curve:
-        return point
-    assert isinstance(adapted, ResponseCurve)
-    u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
-    weights = adapted.weights(u, 0.0)
-    again = beside(adapted, u, direction / length(weights * direction), weights, BESIDE, settings.newton)
-    return point if again is None else again
+    if adapted is not curve:
+        assert isinstance(adapted, ResponseCurve)
+        u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
+        weights = adapted.weights(u, 0.0)
+        direction = direction / length(weights * direction)
+        again = beside(adapted, u, direction, weights, expected, settings.newton, leads)
+        if again is not None and (again.smooth or not close.smooth):
+            close = again
+    if not close.smooth:
+        own = close.point.curve
+        notes.append(f"between {curve.where(u)} and {own.where(close.point.u)}: {UNSEEN}")
+    return close.point
