@@ -60,7 +60,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
-    from suboctave.pictures import plot, write_report
+    from suboctave.pictures import plot, plot_history, plot_phase, plot_spectrum, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -108,6 +108,9 @@ _HOME = {
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
     "plot": "suboctave.pictures",
+    "plot_history": "suboctave.pictures",
+    "plot_phase": "suboctave.pictures",
+    "plot_spectrum": "suboctave.pictures",
     "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
@@ -159,6 +162,9 @@ __all__ = [
     "library",
     "load",
     "plot",
+    "plot_history",
+    "plot_phase",
+    "plot_spectrum",
     "stability",
     "switch_branch",
     "verify",

@@ -25,6 +25,8 @@ LOAD = '{ type = "HarmonicLoad", dof = 0, amplitude = "F" }'
 VERIFY = '\n[[analyses]]\nname = "w"\ntype = "verify"\nbranch = "response"\n'
 STABILITY = '\n[[analyses]]\nname = "s"\ntype = "stability"\nbranch = "response"\n'
 FIGURE = '\n[outputs]\n[[outputs.figures]]\nfile = "a.png"\n'
+PHASE = FIGURE + 'kind = "phase"\nmotions = ["response"]\n'
+HISTORY = PHASE.replace("phase", "history")
 RESPONSE = "omega = [3.0, 0.5]\n"
 
 ROWS = [
@@ -175,6 +177,25 @@ ROWS = [
     ("formula that cannot be drawn", None, FIGURE + "title = '$\\frac{a$'\n", ["cannot be drawn"], "title ="),
     ("analysis with a name too long", 'name = "up"', f'name = "{"u" * 300}"', ["at most 60"], 'name = "uuu'),
     ("figure twice", None, FIGURE + '[[outputs.figures]]\nfile = "a.png"\n', ["twice"], 'file = "a.png"'),
+    ("figure of no known kind", None, FIGURE + 'kind = "phas"\n', ["did you mean 'phase'"], 'kind = "phas"'),
+    ("figure of no motion", None, FIGURE + 'kind = "phase"\n', ["motions", "missing"], "[[outputs.figures]]"),
+    ("figure of an empty list", None, PHASE.replace('["response"]', "[]"), ["at least 1"], "motions ="),
+    ("motion of an unknown analysis", None, PHASE.replace('"response"', '"respons"'), ["did you mean"], "motions ="),
+    ("motion chosen twice", None, PHASE.replace('["response"]', '[{ analysis = "up", point = 1, bifurcation = "LP" }]'),
+     ["not by several"], "motions ="),
+    ("misspelt key of a motion", None, PHASE.replace('["response"]', '[{ analysis = "up", pont = 1 }]'),
+     ["did you mean 'point'"], "motions ="),
+    ("motion of an unknown kind", None, PHASE.replace('["response"]', '[{ analysis = "up", bifurcation = "PDD" }]'),
+     ["did you mean 'PD'"], "motions ="),
+    ("misspelt key of a portrait", None, PHASE + "overlai = true\n", ["did you mean 'overlay'"], "overlai ="),
+    ("key of another kind of figure", None, PHASE + 'quantity = "velocity"\n', ["no such key"], "quantity ="),
+    ("portrait with too many labels", None, PHASE + 'labels = ["a", "b"]\n', ["2 labels for 1"], "labels ="),
+    ("portrait in no known unit", None, PHASE + 'frequency = "hz"\n', ["did you mean 'Hz'"], "[[outputs"),
+    ("portrait of a missing DOF", None, PHASE + "dof = 4\n", ["out of range"], "dof ="),
+    ("portrait of no known size", None, PHASE + 'size = "singlecolumn"\n', ["did you mean"], "size ="),
+    ("history of no element", None, HISTORY + 'quantity = "force"\n', ["give element="], "[[outputs"),
+    ("history of a missing element", None, HISTORY + 'quantity = "force"\nelement = 3\n', ["out of range"], "element ="),
+    ("spectrum up to nothing", None, PHASE.replace("phase", "spectrum") + "highest = 0.0\n", ["greater"], "highest ="),
     ("results of another form", None, '\n[outputs]\nresults = "a.csv"\n', [".nc"], "results ="),
     ("outputs misspelt", None, '\n[outputs]\nfoldr = "a"\n', ["did you mean 'folder'"], "foldr ="),
     ("tables of one name", None, '\n[[analyses]]\nname = "response_bifurcations"\ntype = "verify"\nbranch = "up"\n'

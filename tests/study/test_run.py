@@ -100,6 +100,47 @@ def test_figures_in_other_units_and_a_page_of_them_all(study_file, suboctave):
     assert "time taken" in page
 
 
+def test_figures_of_motions_are_those_of_a_script(study_file, by_script, tmp_path):
+    figures = (
+        '[[outputs.figures]]\nkind = "phase"\nfile = "a.svg"\nsize = "single-column"\n'
+        'motions = ["up", { analysis = "response", bifurcation = "LP", index = 1 }]\n'
+        '[[outputs.figures]]\nkind = "spectrum"\nfile = "b.svg"\nhighest = 5\n'
+        'motions = [{ analysis = "response", nearest = { omega = 1.0 } }]\n'
+        '[[outputs.figures]]\nkind = "history"\nfile = "c.svg"\nquantity = "force"\nelement = 0\n'
+        'motions = [{ analysis = "response", point = 3 }]\n'
+    )
+    path = study_file(DUFFING + f"[outputs]\n{figures}")
+    outcome = run_study(read_study(path))
+    folder = path.parent / "study_results"
+    assert [file.name for file in outcome.files] == ["results.nc", "a.svg", "b.svg", "c.svg"]
+    response, up = by_script
+    near = int(np.argmin(abs(response.omega - 1.0)))
+    so.plot_phase([up.orbits[-1], response.bifurcations["LP"][1]], tmp_path / "a.svg", size="single-column")
+    so.plot_spectrum(response, tmp_path / "b.svg", points=[near], highest=5)
+    so.plot_history(response.points[3], tmp_path / "c.svg", quantity="force", element=0)
+    for name in ("a.svg", "b.svg", "c.svg"):
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_a_motion_that_was_not_found_costs_nothing_else(study_file, suboctave):
+    figures = (
+        '[[outputs.figures]]\nkind = "phase"\nfile = "a.png"\n'
+        'motions = [{ analysis = "response", bifurcation = "PD" }]\n[[outputs.figures]]\nfile = "b.png"\n'
+        'analyses = ["response"]\n'
+    )
+    path = study_file(DUFFING + f"[outputs]\n{figures}")
+    status, _, err = suboctave("run", path)
+    assert status == 2
+    assert "figures[0] is not drawn: 'response' has no PD" in err
+    folder = path.parent / "study_results"
+    assert {file.name for file in folder.iterdir()} == {"results.nc", "b.png", "unfinished.journal"}
+    path.write_text(path.read_text().replace('"PD"', '"LP"'))
+    status, _, err = suboctave("run", path, "--resume")
+    assert status == 0, err
+    assert (folder / "a.png").exists()
+    assert not (folder / "unfinished.journal").exists()
+
+
 def test_parameters_may_differ_for_one_analysis(study_file, by_script):
     text = DUFFING.replace("F = 0.3 }", "F = 9.0 }").replace(
         "max_step = 0.2\n", "max_step = 0.2\nparameters = { F = 0.3 }\n", 1

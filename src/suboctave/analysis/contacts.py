@@ -13,13 +13,11 @@ import numpy as np
 
 from suboctave.bifurcation.gaps import contact_side, levels, told_levels
 from suboctave.errors import InputError
-from suboctave.harmonic import instants, kernels
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic import instants
+from suboctave.harmonic.element_force import displacements_read, force_along
 from suboctave.harmonic.grazing_instants import extrema
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.quadrature import search_grid
-from suboctave.harmonic.state import BalanceState
-from suboctave.model.coupled import as_coupled
 from suboctave.model.system import System
 
 __all__ = ["check_element", "contact_of", "gapped_elements", "peak_force"]
@@ -87,36 +85,21 @@ def peak_force(orbit: PeriodicOrbit, element: int) -> float:
     peaks, and the largest samples; the surroundings of each are narrowed down to rounding.
     """
     state = orbit.state()
-    chosen = state.local(element)
-    law = as_coupled(chosen.element)
-    coupled = next((nodal for nodal in state.nodal if nodal.own.index == element), None)
-    motions = [chosen.motion] if coupled is None else coupled.motions
-    high = chosen.motion.shape[0] - 1
+    motions, force = displacements_read(state, element), force_along(state, element)
+    high = motions[0].shape[0] - 1
     step = 2.0 * math.pi / (8 * high + 64)
     grid = search_grid(high)
     turns = np.concatenate([extrema(motion, grid.zr, grid.zi)[0] for motion in motions])
     tau = np.concatenate([turns, step * np.arange(8 * high + 64)])
 
-    def force(at: Array) -> Array:
-        zr, zi = np.cos(at), np.sin(at)
-        values = [kernels.motion(motion, zr, zi) for motion in motions]
-        q = [u for u, _ in values]
-        if chosen.element.depends_on_velocity:
-            q += [_rate(state) * du for _, du in values]
-        return np.abs(law.tangent(np.array(q), np.mod(state.basis.nu * at, 2.0 * math.pi), chosen.coefficients)[0])
-
-    size = force(tau)
+    size = np.abs(force(tau))
     best = float(size.max())
     centres = tau[np.argsort(-size, kind="stable")[:_CANDIDATES]]
     offsets = np.linspace(-1.0, 1.0, _AROUND)
     for _ in range(_ROUNDS):
         around = centres[:, None] + step * offsets
-        size = force(around.ravel()).reshape(around.shape)
+        size = np.abs(force(around.ravel())).reshape(around.shape)
         centres = around[np.arange(len(centres)), size.argmax(axis=1)]
         best = max(best, float(size.max()))
         step *= 2.0 / (_AROUND - 1)
     return best
-
-
-def _rate(state: BalanceState) -> float:
-    return float(state.rate)

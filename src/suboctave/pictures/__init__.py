@@ -5,10 +5,24 @@ from suboctave.pictures import plot
 plot(curve.to_xarray(), "curve.png")
 """
 
+from suboctave.pictures.history import plot_history
+from suboctave.pictures.phase import plot_phase
 from suboctave.pictures.plot import plot
 from suboctave.pictures.report import write_report
 from suboctave.pictures.response import draw_response, plot_panels, plot_response
 from suboctave.pictures.saving import save_figure
+from suboctave.pictures.spectrum import plot_spectrum
 from suboctave.pictures.view import View
 
-__all__ = ["View", "draw_response", "plot", "plot_panels", "plot_response", "save_figure", "write_report"]
+__all__ = [
+    "View",
+    "draw_response",
+    "plot",
+    "plot_history",
+    "plot_panels",
+    "plot_phase",
+    "plot_response",
+    "plot_spectrum",
+    "save_figure",
+    "write_report",
+]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.pictures import style
+from suboctave.pictures.periods import curve_styles, period_of, several_periods
 from suboctave.pictures.strokes import line
 from suboctave.store.layout import coordinate
 
@@ -30,12 +31,13 @@ _DIGITS = 9
 def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str) -> dict[str, Any]:
     """Traces and layout of one figure with the curves over `horizontal`, ready for JSON."""
     several = len(curves) > 1
+    styles = curve_styles(list(curves.values()), list(curves))
+    told = several or several_periods(list(curves.values()))
     data: list[dict[str, Any]] = []
     for index, (label, dataset) in enumerate(curves.items()):
-        curve = style.curve_style(index) if several else style.ONE_CURVE
-        data += _lines(dataset, horizontal, html.escape(label), curve, index, several)
+        data += _lines(dataset, horizontal, html.escape(label), styles[index], index, several)
     for index, (label, dataset) in enumerate(curves.items()):
-        edge = style.curve_style(index).colour if several else style.INK
+        edge = styles[index].colour if told else style.INK
         data += _markers(dataset, horizontal, html.escape(label), edge, several)
     first = next(iter(curves.values()))
     across = "forcing frequency ω" if horizontal == "omega" else html.escape(horizontal)
@@ -124,12 +126,15 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> 
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
     words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
-    kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
+    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
+    senses = [str(sense) for sense in dataset["event_criticality"].to_numpy()]
+    marks = list(zip(kinds, senses, strict=True))
+    smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
     traces = []
-    for kind in dict.fromkeys(kinds):
+    for kind, sense in dict.fromkeys(marks):
         mark = style.kind_style(kind)
-        chosen = np.flatnonzero(kinds == kind)
-        named = html.escape(mark.name)
+        chosen = np.flatnonzero([pair == (kind, sense) for pair in marks])
+        named = html.escape(style.in_words(kind, sense))
         traces.append(
             {
                 "type": "scatter",
@@ -142,8 +147,8 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
                 "hovertemplate": f"{label}: {named}<br>%{{text}}<extra></extra>",
                 "marker": {
                     "symbol": _SYMBOLS[mark.marker],
-                    "size": 1.5 * mark.size,
-                    "color": mark.colour,
+                    "size": 1.5 * mark.size * smaller,
+                    "color": style.filling(kind, sense),
                     "line": {"color": edge, "width": 1.8},
                 },
             }

@@ -29,6 +29,7 @@ def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line
         "edgecolor": style.GRID,
         "handlelength": 2.6,
     }
+    figure.draw_without_rendering()  # places the frames; a legend inside one of them moves nothing
     for axes in frames:
         for location in ("upper left", "upper right", "center left", "center right", "lower left", "lower right"):
             legend = axes.legend(entries.values(), entries.keys(), loc=location, **drawing)
@@ -47,13 +48,12 @@ def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line
 
 
 def _covers(figure: Figure, axes: Axes, legend: Legend) -> bool:
-    figure.draw_without_rendering()
     box = legend.get_window_extent().padded(figure.dpi / 72.0 * style.MARKER_SIZE)
     frame = axes.get_window_extent()
     if box.x0 < frame.x0 - 1 or box.x1 > frame.x1 + 1 + 2 * style.MARKER_SIZE or box.height > 0.7 * frame.height:
         return True  # it would stick out, or leave no room for anything else
     for line in axes.get_lines():
-        x, y = axes.transData.transform(np.column_stack([line.get_xdata(), line.get_ydata()])).T
+        x, y = line.get_transform().transform(np.column_stack([line.get_xdata(), line.get_ydata()])).T
         if x.size == 0:
             continue
         # Points every pixel or so along the line: a long piece may cross a box that holds none of its ends.
@@ -73,8 +73,8 @@ def ordered(entries: dict[str, Line2D]) -> dict[str, Line2D]:
     def rank(name: str) -> tuple[int, int]:
         if name in lines:
             return 1, lines.index(name)
-        if name in kinds:
-            return 2, kinds.index(name)
+        if name.split(",")[0] in kinds:
+            return 2, kinds.index(name.split(",")[0])
         return (0, 0) if entries[name].get_marker() == "None" else (3, 0)
 
     return {name: entries[name] for name in sorted(entries, key=rank)}

@@ -16,6 +16,7 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.legend import ordered, place_legend
+from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
 from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import Stroke, strokes
 from suboctave.pictures.view import View
@@ -88,10 +89,11 @@ def plot_panels(
     figure = Figure(figsize=inches, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     frames = figure.subplots(1, len(groups), squeeze=False, sharex=True, sharey=True)[0]
+    periods = several_periods([dataset for group in groups for dataset in group])
     legend: dict[str, Line2D] = {}
     for index, (axes, group) in enumerate(zip(frames, groups, strict=True)):
         told = None if labels is None else labels[index]
-        legend |= draw_response(axes, group, x=horizontal, labels=told, view=shown, look=look)
+        legend |= draw_response(axes, group, x=horizontal, labels=told, view=shown, look=look, by_period=periods)
         if titles is not None:
             axes.set_title(_plain(titles[index]), fontsize=look.large, color=style.INK)
         if index:
@@ -113,25 +115,32 @@ def draw_response(
     labels: Sequence[str] | None = None,
     view: View | None = None,
     look: style.Look = style.SCREEN,
+    by_period: bool | None = None,
 ) -> dict[str, Line2D]:
-    """Draws the curves into existing axes; returns the legend's entries, only of what occurs, without drawing it."""
+    """Draws the curves into existing axes; returns the legend's entries, only of what occurs, without drawing it.
+
+    `by_period`: whether colours tell the periods of the motions (default: where one is not that of the load).
+    """
     group, shown = _as_list(curves), view or View()
     horizontal = _common_axis(group, x)
     for dataset in group:
         shown.check(dataset)
     if labels is not None and len(labels) != len(group):
         raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
-    names = [_plain(name) for name in (labels if labels is not None else _tell_apart(group))]
+    periods = several_periods(group) if by_period is None else by_period
+    names = [_plain(name) for name in (labels if labels is not None else _tell_apart(group, periods))]
     several = len(group) > 1
+    styles = curve_styles(group, names, periods)
+    # sub-harmonic motions over those that they branch off from
+    order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
     legend: dict[str, Line2D] = {}
-    for index, dataset in enumerate(group):
-        name = names[index] if labels is not None or several else ""
-        curve = style.curve_style(index) if several else style.ONE_CURVE
-        pieces = strokes(dataset, horizontal, shown.variable)
-        legend |= _draw_line(axes, pieces, shown.factors(horizontal), curve, look, name)
-    for index, dataset in enumerate(group):  # markers after all lines: none is crossed out by another curve
-        edge = style.curve_style(index).colour if several else style.INK
-        legend |= _draw_events(axes, dataset, shown.values(dataset, horizontal)[0], edge, look, several)
+    for index in order:
+        name = names[index] if labels is not None or several or periods else ""
+        pieces = strokes(group[index], horizontal, shown.variable)
+        legend |= _draw_line(axes, pieces, shown.factors(horizontal), styles[index], look, name, periods)
+    for index in order:  # markers after all lines: none is crossed out by another curve
+        edge = styles[index].colour if several or periods else style.INK
+        legend |= _draw_events(axes, group[index], shown.values(group[index], horizontal)[0], edge, look, several)
     _dress(axes, *shown.labels(group[0], horizontal), look)
     return legend
 
@@ -143,6 +152,7 @@ def _draw_line(
     curve: style.CurveStyle,
     look: style.Look,
     name: str,
+    periods: bool,
 ) -> dict[str, Line2D]:
     from matplotlib.lines import Line2D
 
@@ -167,39 +177,44 @@ def _draw_line(
         if piece.stable is not None:
             key = "stable" if piece.stable else "unstable"
             drawn: Any = style.STABLE_DASH if piece.stable else style.UNSTABLE_DASH
-            legend[key] = Line2D([], [], color=style.INK, linewidth=look.line, linestyle=drawn)
+            # where ink is the colour of one period, the dashes are shown in a colour of none
+            said = style.SOFT if periods else style.INK
+            legend[key] = Line2D([], [], color=said, linewidth=look.line, linestyle=drawn)
     return legend
 
 
 def _draw_events(
     axes: Axes, dataset: xarray.Dataset, positions: np.ndarray, edge: str, look: style.Look, several: bool
 ) -> dict[str, Line2D]:
-    """Markers: the shape tells the kind; the edge the curve, where there are several."""
+    """Markers: the shape tells the kind, the filling the criticality; the edge the curve, where there are several."""
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
-    kinds = np.array([str(kind) for kind in dataset["event_kind"].to_numpy()])
-    for kind in dict.fromkeys(kinds):
+    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
+    senses = [str(sense) for sense in dataset["event_criticality"].to_numpy()]
+    marks = list(zip(kinds, senses, strict=True))
+    smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
+    for kind, sense in dict.fromkeys(marks):
         mark = style.kind_style(kind)
         drawing: dict[str, Any] = {
             "linestyle": "none",
             "marker": mark.marker,
-            "markersize": mark.size * look.marker,
-            "markerfacecolor": mark.colour,
+            "markersize": mark.size * look.marker * smaller,
+            "markerfacecolor": style.filling(kind, sense),
             "markeredgecolor": edge,
             "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
-        chosen = positions[kinds == kind]
+        chosen = positions[[pair == (kind, sense) for pair in marks]]
         axes.plot(
             chosen[:, 0],
             chosen[:, 1],
-            zorder=4 if kind == "grazing" else 5,
+            zorder=(4 if kind == "grazing" else 5) + (0.5 if smaller < 1.0 else 0.0),
             gid=kind,
             clip_on=False,
             **drawing,
         )
-        plain = {"markeredgecolor": style.INK, "markeredgewidth": look.edge}
-        legend[mark.name] = Line2D([], [], **{**drawing, **plain})
+        plain = {"markeredgecolor": style.INK, "markeredgewidth": look.edge, "markersize": mark.size * look.marker}
+        legend[style.in_words(kind, sense)] = Line2D([], [], **{**drawing, **plain})
     return legend
 
 
@@ -253,6 +268,10 @@ def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.D
         if not isinstance(dataset, xarray.Dataset):
             raise InputError(f"expected a dataset of a curve, got {type(dataset).__name__}; a branch has to_xarray()")
         check_layout(dataset)
+        if "point" not in dataset.sizes:
+            raise InputError(
+                "this dataset is no curve; one of a motion is drawn by plot_phase, plot_spectrum, plot_history"
+            )
         if dataset.sizes["point"] == 0:
             raise InputError("a curve without points cannot be drawn")
     return group
@@ -269,8 +288,11 @@ def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:
     return free[0]
 
 
-def _tell_apart(datasets: Sequence[xarray.Dataset]) -> list[str]:
-    """Names such as "j = 0" from the parameters that are constant on each curve and differ between curves."""
+def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:
+    """Names such as "j = 0" from the parameters that are constant on each curve and differ between curves.
+
+    Where the period is to be told it comes first: "2T", "2T, j = 0".
+    """
     constant: list[dict[str, float]] = []
     for dataset in datasets:
         table = dataset["parameters"].to_numpy()
@@ -282,6 +304,9 @@ def _tell_apart(datasets: Sequence[xarray.Dataset]) -> list[str]:
         constant.append(values)
     shared = [name for name in constant[0] if all(name in values for values in constant)]
     differing = [name for name in shared if len({values[name] for values in constant}) > 1]
-    if not differing:
+    if not differing and not by_period:
         return [f"curve {index + 1}" for index in range(len(datasets))]
-    return [", ".join(f"{name} = {values[name]:g}" for name in differing) for values in constant]
+    told = [[f"{name} = {values[name]:g}" for name in differing] for values in constant]
+    if by_period:
+        told = [[period_name(period_of(data)), *words] for data, words in zip(datasets, told, strict=True)]
+    return [", ".join(words) for words in told]

@@ -2,9 +2,10 @@
 
 The colours are those of Okabe and Ito (*Color Universal Design*, 2008). Shape carries the kind on its own, so that
 a black-and-white print loses nothing: circles for limit points and triangles for period doublings, as in Alcorta
-et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Grazing
-contacts, which need not change the response, are crosses beneath the others. Several curves in one frame differ in
-colour, in width and in the dashes of their unstable parts, and each one's markers have its colour at the edge.
+et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Markers of
+subcritical bifurcations are hollow. Grazing contacts, which need not change the response, are crosses beneath the
+others. Several curves in one frame differ in colour, in width and in the dashes of their unstable parts, and each one's
+markers have its colour at the edge.
 
 Widths of "single-column" and "double-column" are 84 mm and 174 mm, which fit the columns of the journals of the field;
 letters are then 7 to 8 points high.
@@ -20,22 +21,27 @@ __all__ = [
     "CURVE_COLOURS",
     "INK",
     "KINDS",
+    "OF_SUBHARMONICS",
     "ONE_CURVE",
     "PRINT",
     "SCREEN",
     "SIZES",
+    "SOFT",
     "STABLE_DASH",
     "UNSTABLE_DASH",
     "CurveStyle",
     "KindStyle",
     "Look",
     "curve_style",
+    "filling",
+    "in_words",
     "kind_style",
     "look_of",
     "size_in_inches",
 ]
 
 INK = "#1a1a1a"
+SOFT = "#8c8c8c"
 GRID = "#d9d9d9"
 CURVE_COLOURS = ("#0072B2", "#E69F00", INK, "#009E73", "#CC79A7", "#56B4E9")  # then again from the first
 
@@ -141,6 +147,21 @@ KINDS = {
     "BP": KindStyle("branch point", "D", "#F0E442", MARKER_SIZE * 0.88),
     "grazing": KindStyle("grazing contact", "x", INK, MARKER_SIZE * 1.4),
 }
+
+
+#: sub-harmonic motions branch off where their parents have a marker: theirs, on top, lets that one show
+OF_SUBHARMONICS = 0.6
+
+
+def in_words(kind: str, criticality: str = "") -> str:
+    """What a legend calls bifurcations of a kind, with "supercritical" or "subcritical" where that is known."""
+    name = kind_style(kind).name
+    return f"{name}, {criticality}" if criticality else name
+
+
+def filling(kind: str, criticality: str = "") -> str:
+    """The colour inside a marker: none (white) at a subcritical bifurcation."""
+    return "#ffffff" if criticality == "subcritical" else kind_style(kind).colour
 
 
 def kind_style(kind: str) -> KindStyle:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["QUANTITIES", "View"]
+__all__ = ["QUANTITIES", "View", "check_units"]
 
 # What the axis says, with {x} the observed displacement, {k} the harmonic, {e} the element.
 QUANTITIES = {
@@ -82,15 +82,7 @@ class View:
             raise InputError(f"the quantity {self.quantity!r} is one of an element: give element=, its index")
         if self.dof is not None and self.quantity not in _OF_A_DOF:
             raise InputError(f"the quantity {self.quantity!r} is not one of a degree of freedom: leave dof= out")
-        if self.frequency is not None and self.frequency not in _FREQUENCIES:
-            raise InputError(
-                f"frequency is 'rad/s' or 'Hz', not {self.frequency!r}{suggest(str(self.frequency), _FREQUENCIES)}"
-            )
-        for name, value in (("omega_reference", self.omega_reference), ("scale", self.scale)):
-            if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise InputError(f"{name} must be a positive number, not {value!r}")
-        if self.frequency is not None and self.omega_reference is not None:
-            raise InputError("frequency= gives the axis a unit, omega_reference= takes it away: choose one")
+        check_units(self.frequency, self.omega_reference, self.scale)
 
     @property
     def variable(self) -> str:
@@ -142,3 +134,14 @@ class View:
         if unit:
             upwards += f" ({unit})"
         return self.xlabel or across, self.ylabel or upwards
+
+
+def check_units(frequency: Any, omega_reference: Any, scale: Any) -> None:
+    """InputError where units of the axes are none, or contradict each other."""
+    if frequency is not None and frequency not in _FREQUENCIES:
+        raise InputError(f"frequency is 'rad/s' or 'Hz', not {frequency!r}{suggest(str(frequency), _FREQUENCIES)}")
+    for name, value in (("omega_reference", omega_reference), ("scale", scale)):
+        if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+            raise InputError(f"{name} must be a positive number, not {value!r}")
+    if frequency is not None and omega_reference is not None:
+        raise InputError("frequency= gives the axis a unit, omega_reference= takes it away: choose one")

@@ -18,6 +18,7 @@ from suboctave.model.description import describe
 from suboctave.model.system import System
 from suboctave.study.lines import Lines
 from suboctave.study.mistakes import Mistake, Mistakes, StudyError
+from suboctave.study.motion_figures import MOTION_FIGURES, MotionFigure
 from suboctave.study.outputs import FigureSection, Outputs, check_outputs
 from suboctave.study.steps import STEPS, Step, Surroundings
 from suboctave.study.system import SystemSection, make_system, overridden
@@ -241,12 +242,17 @@ def _outputs(
 ) -> Outputs | None:
     plain = dict(given)
     figures = plain.pop("figures", [])
-    sections: list[FigureSection] = []
+    sections: list[FigureSection | MotionFigure] = []
+    kinds: dict[str, type[BaseModel]] = {"response": FigureSection, **MOTION_FIGURES}
     if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
         mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
         figures = []
     for index, item in enumerate(figures):
-        figure = _validated(FigureSection, item, ("outputs", "figures", index), mistakes)
+        kind, place = item.get("kind", "response"), ("outputs", "figures", index)
+        if not isinstance(kind, str) or kind not in kinds:
+            mistakes.add((*place, "kind"), f"there is no figure of the kind {kind!r}{suggest(str(kind), kinds)}")
+            continue
+        figure = _validated(kinds[kind], item, place, mistakes)
         if figure is not None:
             sections.append(figure)
     outputs = _validated(Outputs, plain, ("outputs",), mistakes)

@@ -19,6 +19,7 @@ from suboctave.pictures import View, plot_response
 from suboctave.pictures.saving import SUFFIXES
 from suboctave.pictures.style import check_text, size_in_inches
 from suboctave.store import files
+from suboctave.study.motion_figures import MotionFigure
 from suboctave.study.steps import Step
 
 __all__ = ["FigureSection", "Outputs", "check_outputs", "csv_names", "places", "write_outputs"]
@@ -34,6 +35,7 @@ class FigureSection(BaseModel):
 
     model_config = _STRICT
 
+    kind: str = "response"
     file: str
     analyses: list[str] = Field(default_factory=list)
     x: str | None = None
@@ -94,6 +96,10 @@ def check_outputs(
         key = ("figures", index)
         names.append(((*key, "file"), figure.file))
         yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
+        yield from _wrong_texts(figure, key)
+        if isinstance(figure, MotionFigure):
+            yield from (((*key, *where), text) for where, text in figure.check(curves, system))
+            continue
         for i, name in enumerate(figure.analyses):
             if name not in curves:
                 yield (*key, "analyses", i), f"no analysis {name!r} gives a curve{suggest(name, curves)}"
@@ -105,11 +111,6 @@ def check_outputs(
         drawn = len(figure.analyses or curves)
         if figure.labels is not None and len(figure.labels) != drawn:
             yield (*key, "labels"), f"{len(figure.labels)} labels for {drawn} curves"
-        for where, text in figure.texts:
-            try:
-                check_text(text)
-            except InputError as error:
-                yield (*key, *where), str(error)
         try:
             size_in_inches(figure.size)
         except InputError as error:
@@ -139,6 +140,16 @@ def check_outputs(
 
 def _printable(name: str) -> bool:
     return all(character.isprintable() for character in name)
+
+
+def _wrong_texts(
+    figure: FigureSection | MotionFigure, key: tuple[str | int, ...]
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    for where, text in figure.texts:
+        try:
+            check_text(text)
+        except InputError as error:
+            yield (*key, *where), str(error)
 
 
 def _not_in(
@@ -186,13 +197,24 @@ def places(outputs: Outputs, steps: Sequence[Step], folder: Path) -> list[Path]:
 
 
 def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) -> Iterator[Path]:
-    """Write what was asked for of what there is, and yield each file; what stood there is replaced."""
+    """Write what was asked for of what there is, and yield each file; what stood there is replaced.
+
+    Raises InputError, after everything else is written, for figures of motions that the finished branches do not have.
+    """
     yield results.save(folder / outputs.results, overwrite=True)
     if outputs.csv:
         for name, item in results.items():
             yield from _tables(name, item, folder)
     curves = results.branches
-    for figure in outputs.figures:
+    missing = []
+    for index, figure in enumerate(outputs.figures):
+        if isinstance(figure, MotionFigure):
+            try:
+                if figure.draw(curves, folder / figure.file):
+                    yield folder / figure.file
+            except InputError as error:
+                missing.append(f"outputs.figures[{index}] is not drawn: {error}")
+            continue
         chosen = [name for name in figure.analyses or curves if name in curves and len(curves[name])]
         if not chosen:
             continue
@@ -214,6 +236,9 @@ def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) 
         }
         report.write_report(datasets, path, title=title or "Study", overwrite=True)
         yield path
+    if missing:
+        rest = "everything else is written; change the figure, and go on with --resume"
+        raise InputError("; ".join([*missing, rest]))
 
 
 def _tables(name: str, item: Branch | Table, folder: Path) -> Iterator[Path]:

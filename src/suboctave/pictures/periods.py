@@ -1,0 +1,82 @@
+"""Motions of several periods in one frame: each period has its colour, the same in every picture.
+
+`T` is the period of the load. A motion of period nu T has the colour of nu, wherever it is drawn; so has its part at
+frequencies k omega / nu in a spectrum. Curves of one period that differ otherwise (in a parameter, or in the names that
+their user gave them) differ in tint, width and dashes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from suboctave.pictures import style
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = [
+    "curve_styles",
+    "period_colour",
+    "period_name",
+    "period_of",
+    "several_periods",
+    "styles_of_periods",
+    "tinted",
+]
+
+# Okabe and Ito's; those of T, 2T, 3T, 4T and 8T stay apart for every kind of colour blindness
+_OF_PERIODS = {1: style.INK, 2: "#0072B2", 4: "#E69F00", 8: "#56B4E9", 3: "#D55E00", 6: "#009E73", 5: "#CC79A7"}
+#: share of white in the colours of the second and third curve of one period
+_TINTS = (0.0, 0.45, 0.25)
+
+
+def period_name(nu: int) -> str:
+    """T, 2T, 3T, ..."""
+    return "T" if nu == 1 else f"{nu}T"
+
+
+def period_colour(nu: int) -> str:
+    """The colour of motions of nu load periods; those of one subharmonic order keep it in every picture."""
+    return _OF_PERIODS.get(nu) or list(_OF_PERIODS.values())[1 + nu % (len(_OF_PERIODS) - 1)]
+
+
+def tinted(colour: str, share: float) -> str:
+    """The colour with a share of white in it."""
+    parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return colour if not share else "#" + "".join(f"{round(part + share * (255 - part)):02x}" for part in parts)
+
+
+def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[style.CurveStyle]:
+    """The styles of curves by their periods; those of one period and one name look alike."""
+    seen: dict[int, list[str]] = {}
+    styles = []
+    for nu, name in zip(periods, names, strict=True):
+        alike = seen.setdefault(nu, [])
+        if name not in alike:
+            alike.append(name)
+        place = alike.index(name)
+        like = style.curve_style(place)
+        styles.append(style.CurveStyle(tinted(period_colour(nu), _TINTS[place % len(_TINTS)]), like.width, like.dash))
+    return styles
+
+
+def several_periods(datasets: Sequence[xarray.Dataset]) -> bool:
+    """Whether the periods of motions are to be told: one of them is not that of the load."""
+    return any(period_of(dataset) != 1 for dataset in datasets)
+
+
+def period_of(dataset: xarray.Dataset) -> int:
+    """Load periods in one period of the motions of a dataset."""
+    return int(dataset.attrs.get("period", 1))
+
+
+def curve_styles(
+    datasets: Sequence[xarray.Dataset], names: Sequence[str], by_period: bool | None = None
+) -> list[style.CurveStyle]:
+    """The styles of the curves of one frame: by period (default: where one is not that of the load), or in turn."""
+    if several_periods(datasets) if by_period is None else by_period:
+        return styles_of_periods([period_of(dataset) for dataset in datasets], names)
+    if len(datasets) == 1:
+        return [style.ONE_CURVE]
+    return [style.curve_style(index) for index in range(len(datasets))]
