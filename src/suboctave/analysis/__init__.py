@@ -3,6 +3,7 @@
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.results import Results, Table, load
+from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
@@ -12,12 +13,15 @@ __all__ = [
     "Branch",
     "BranchPoint",
     "Results",
+    "Seeds",
     "Table",
     "Verification",
     "bifurcation_diagram",
     "continue_branch",
+    "find_subharmonics",
     "frequency_response",
     "load",
+    "periodic_orbit",
     "stability",
     "switch_branch",
     "verify",

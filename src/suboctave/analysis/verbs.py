@@ -13,13 +13,13 @@ from suboctave.analysis.checks import check_bounds, check_parameter, check_range
 from suboctave.analysis.follow import follow
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
 from suboctave.analysis.progress import reporting, timed
-from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
+from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.analysis.switching import leave_along, own_linear_part
-from suboctave.analysis.trace import Settings, Trace
+from suboctave.analysis.ways import both_ways
 from suboctave.bifurcation import Bifurcation
 from suboctave.compiled import computation_begins
-from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
+from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
@@ -35,6 +35,7 @@ def frequency_response(
     harmonics: Harmonics = "adaptive",
     *,
     start: Any = None,
+    subharmonic: int | None = None,
     max_step: float | None = None,
     observe: int | None = None,
     events: Sequence[Event] = (),
@@ -58,6 +59,10 @@ def frequency_response(
     start
         Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a point of a branch, a
         `Bifurcation`, a state `(x, dx/dt)` of shape (2 n,), or coefficients of shape (2 H + 1, n).
+    subharmonic
+        Period of the motions in periods of the load, where it is not one (or that of `start`): the state or
+        coefficients of `start` are then those of a motion of that period. Without `start` one is searched for over the
+        whole range and followed both ways (`find_subharmonics` gives all that it finds).
     max_step
         Largest distance between neighbours in scaled arclength (short for `stepping=SteppingOptions(max_step=...)`).
     observe
@@ -88,13 +93,22 @@ def frequency_response(
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
+    if subharmonic is not None and subharmonic != 1:
+        order = check_order(subharmonic)
+        if isinstance(start, PeriodicOrbit) and nu != order:
+            raise InputError(f"subharmonic={order}, but start is a motion of {nu} load periods: leave one of them out")
+        nu = order
     curve = make_curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
     computation_begins()
     with one_thread(), reporting(progress, "frequency response") as report:
         settings = replace(settings, report=report)
-        point = start_point(curve, first, start, settings.newton)
-        trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
-    if len(trace.points) > 1 and not trace.closed and trace.points[-1].orbit.omega == first:
+        searched = start is None and nu > 1
+        if searched:
+            trace = subharmonic_start(curve, (first, last), settings)
+        else:
+            point = start_point(curve, first, start, settings.newton)
+            trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
+    if len(trace.points) > 1 and not trace.closed and not searched and trace.points[-1].orbit.omega == first:
         trace.warnings.append(
             f"the branch folds back and leaves the range where it began, at omega = {first:.6g}: other motions there "
             "may lead through the range. Begin at the other end, or choose one with start="
@@ -172,30 +186,8 @@ def continue_branch(
             trace = leave_along(crossing, curve, np.array(crossing.tangent), ahead, (low, high), settings)
         else:
             point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
-            trace = _both_ways(point, ahead, (low, high), settings)
+            trace = both_ways(point, ahead, (low, high), settings)
     return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
-
-
-def _both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:
-    """Follow a curve from an inner point to both sides; from a bound inwards only."""
-    low, high = bounds
-    slack = 1e-9 * (high - low)
-    if abs(point.parameter - (low if ahead > 0 else high)) <= slack:
-        return follow(point, ahead, bounds, settings)
-    if abs(point.parameter - (high if ahead > 0 else low)) <= slack:
-        back = follow(point, -ahead, bounds, settings)
-        only = Trace(back.points[:1], ended=back.ended)
-        return back.reversed_before(only)
-    forward = follow(point, ahead, bounds, settings)
-    if forward.closed or forward.interrupted:
-        return forward
-    back = follow(point, -ahead, bounds, settings)
-    # between two folds the curve runs the other way: what matters is where it ends
-    assert isinstance(point.curve, ResponseCurve)
-    name, target = point.curve.name, high if ahead > 0 else low
-    ends = [t.points[-1].orbit for t in (forward, back)]
-    misses = [abs((o.omega if name == "omega" else o.values[name]) - target) for o in ends]
-    return back.reversed_before(forward) if misses[0] <= misses[1] else forward.reversed_before(back)
 
 
 def _from_system(

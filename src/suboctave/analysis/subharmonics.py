@@ -1,0 +1,340 @@
+"""Sub-harmonic motions that come from no period doubling: searched for by resonance, or from a state in time.
+
+Such a motion answers a load of frequency omega mostly at `k omega / nu`, near a nonlinear resonance there: a free
+vibration `A phi cos(k omega t / nu)` in a linear mode phi whose amplitude makes that its own frequency,
+
+    phi . [K - (k omega / nu)^2 M] phi A + (1 / pi) int_0^{2 pi} phi . f(A phi cos theta) cos theta dtheta = 0.
+
+Seeds are such vibrations, in several phases against the load, on top of the linear response; Newton's method decides
+whether there is a motion nearby. A branch is followed from each new one, both ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import gcd
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.checks import check_range, check_system, is_number, make_settings
+from suboctave.analysis.junction import period_name
+from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
+from suboctave.analysis.progress import reporting
+from suboctave.analysis.response import ResponseCurve
+from suboctave.analysis.starts import linear_response, start_point
+from suboctave.analysis.trace import Settings, Trace
+from suboctave.analysis.ways import both_ways
+from suboctave.compiled import computation_begins
+from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
+from suboctave.continuation.linear import length, one_thread
+from suboctave.continuation.march import solve_at
+from suboctave.continuation.newton import Solved
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.selection import truncation
+from suboctave.model.system import System
+from suboctave.stability import StabilityMethod
+from suboctave.timedomain import integrate
+
+__all__ = ["Seeds", "find_subharmonics", "periodic_orbit", "subharmonic_start"]
+
+#: part of a motion at fractions of omega below which it is taken for a motion of the load's period
+_SUBHARMONIC = 1e-3
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Where sub-harmonic motions are looked for.
+
+    frequencies
+        Values of omega tried over the range.
+    phases
+        Phases of the sub-harmonic part against the load.
+    modes
+        Linear modes tried, from the lowest.
+    """
+
+    frequencies: int = 16
+    phases: int = 6
+    modes: int = 3
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies", "phases", "modes"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise InputError(f"Seeds: {name} must be a whole number of at least 1, not {value!r}")
+
+
+def check_order(order: Any) -> int:
+    """A sub-harmonic's order: a whole number of load periods, at least 2."""
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 2:
+        raise InputError(f"subharmonic must be a whole number of at least 2 (periods of the load), not {order!r}")
+    return int(order)
+
+
+def find_subharmonics(
+    system: System,
+    omega: tuple[float, float],
+    subharmonic: int,
+    harmonics: Harmonics = "adaptive",
+    *,
+    seeds: Seeds | None = None,
+    max_step: float | None = None,
+    observe: int | None = None,
+    events: Sequence[Event] = (),
+    progress: Any = None,
+    newton: NewtonOptions | None = None,
+    stepping: SteppingOptions | None = None,
+    stability: StabilityMethod | str | None = None,
+    linear: LinearPart | None = None,
+) -> list[Branch]:
+    """Branches of motions of `subharmonic` load periods in a range of frequencies, each once; empty if none is found.
+
+    Isolated ones among them, which no sweep and no period doubling leads to. The search is one of resonances
+    (see the module): what is far from every nonlinear resonance of the linear modes it may miss.
+
+    Parameters
+    ----------
+    subharmonic
+        Period of the motions in periods of the load, at least 2.
+    seeds
+        How finely it is looked for, a `Seeds`.
+
+    Other parameters, and errors, as `frequency_response`.
+    """
+    order = check_order(subharmonic)
+    first, last = check_range("omega", omega, positive=True)
+    check_system(system, (first, last))
+    if seeds is not None and not isinstance(seeds, Seeds):
+        raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
+    low, high = min(first, last), max(first, last)
+    curve = make_curve(system, "omega", first, high - low, harmonics, order, linear)
+    curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
+    options = options_of(settings, harmonics, {"omega": (first, last)})
+    computation_begins()
+    found: list[Branch] = []
+    with one_thread(), reporting(progress, f"{period_name(order)} motions") as report:
+        settings = replace(settings, report=report)
+        for point in _motions(curve, (first, last), seeds or Seeds(), settings):
+            if any(_on(branch, point) for branch in found):
+                continue
+            trace = both_ways(point, float(np.sign(last - first)), (low, high), settings)
+            if trace.points:
+                found.append(make_branch(system, "omega", trace, settings, options))
+            if trace.interrupted:
+                break
+    return found
+
+
+def subharmonic_start(
+    curve: ResponseCurve, bounds: tuple[float, float], settings: Settings, seeds: Seeds | None = None
+) -> Trace:
+    """The first branch of a curve's sub-harmonic motions that a search over the range finds, followed both ways.
+
+    Raises ConvergenceError where it finds none.
+    """
+    first, last = bounds
+    curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
+    point = next(_motions(curve, bounds, seeds or Seeds(), settings), None)
+    if point is None:
+        raise ConvergenceError(
+            f"no motion of {curve.balance.basis.nu} load periods was found between {curve.name} = {first:g} and "
+            f"{last:g}: the search starts near nonlinear resonances of the linear modes at fractions of omega. Give a "
+            "state or an orbit as start="
+        )
+    return both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
+
+
+def periodic_orbit(
+    system: System,
+    omega: float,
+    state: Any,
+    subharmonic: int = 1,
+    harmonics: Harmonics = "adaptive",
+    *,
+    settle: int = 0,
+    newton: NewtonOptions | None = None,
+) -> PeriodicOrbit:
+    """The periodic motion near a state `(x, dx/dt)` in time, of one or several load periods, by harmonic balance.
+
+    Parameters
+    ----------
+    omega
+        Circular frequency of the load.
+    state
+        Displacements and velocities at t = 0, shape (2 n,).
+    subharmonic
+        Period of the motion in periods of the load.
+    settle
+        Periods of the motion that are integrated in time before, to come closer to an attracting one.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method finds no motion there.
+    """
+    order = 1 if subharmonic == 1 else check_order(subharmonic)
+    if not (is_number(omega) and omega > 0.0):
+        raise InputError(f"omega must be a positive number, not {omega!r}")
+    if isinstance(settle, bool) or not isinstance(settle, int) or settle < 0:
+        raise InputError(f"settle must be a whole number of periods, not {settle!r}")
+    check_system(system, (float(omega),))
+    try:
+        given = np.asarray(state, dtype=float)
+    except (TypeError, ValueError):
+        given = np.zeros(0)
+    if given.shape != (2 * system.n,) or not np.isfinite(given).all():
+        raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
+    curve = make_curve(system, "omega", float(omega), float(omega), harmonics, order, None)
+    computation_begins()
+    with one_thread():
+        if settle:
+            end = settle * order * 2.0 * np.pi / omega
+            trajectory = integrate(system, given, np.array([0.0, end]), float(omega), system.parameters, rtol=1e-8)
+            given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
+        point = start_point(curve, float(omega), given, newton or NewtonOptions())
+    return _orbit(point)
+
+
+def _orbit(point: CurvePoint) -> PeriodicOrbit:
+    curve, evaluation = point.curve, point.evaluation
+    assert isinstance(curve, ResponseCurve)
+    x, omega, values = curve.split(point.u)
+    state = curve.balance.at(x, omega, values)
+    error = float(evaluation.error)
+    return PeriodicOrbit(curve.balance, x.copy(), omega, dict(values), error, truncation(state), curve.adaptive)
+
+
+# ------------------------------------------------------------------------------------------------------------- search
+def _motions(
+    curve: ResponseCurve, bounds: tuple[float, float], seeds: Seeds, settings: Settings
+) -> Iterator[CurvePoint]:
+    """Solved sub-harmonic motions over the range, as the search meets them."""
+    nu = curve.balance.basis.nu
+    patient = replace(settings.newton, iterations=25, damped=True)
+    first, last = bounds
+    # away from the ends, where branches may just end
+    values = first + (last - first) * (np.arange(seeds.frequencies) + 0.5) / seeds.frequencies
+    for number, value in enumerate(values):
+        if settings.report is not None:
+            settings.report(number / len(values), f"looking at {curve.where(np.array([value]))}")
+        met: list[Array] = []
+        for guess in _guesses(curve, float(value), seeds):
+            try:
+                solved: Solved = solve_at(curve, guess, 0.0, patient)
+            except ConvergenceError:
+                continue
+            if not _lasts(curve, solved.u) or any(_same(curve, solved.u, u) for u in met):
+                continue
+            met.append(solved.u)
+            x = solved.u[:-1].reshape(curve.balance.basis.size, -1)
+            start = PeriodicOrbit(curve.balance, x, float(value), curve.balance.values, 0.0, 0.0, curve.adaptive)
+            try:
+                point = start_point(curve, float(value), start, settings.newton)
+            except ConvergenceError:
+                continue
+            own = point.curve
+            assert isinstance(own, ResponseCurve)
+            if _lasts(own, point.u) and own.balance.basis.nu == nu:
+                yield point
+
+
+def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array]:
+    """Free vibrations at a fraction of omega on top of the linear response."""
+    balance = curve.balance
+    basis, nu = balance.basis, balance.basis.nu
+    base = linear_response(curve, value)
+    for k in range(1, nu):
+        if gcd(k, nu) > 1:
+            continue
+        for shape in _modes(balance)[: seeds.modes]:
+            for amplitude in _resonant(curve, value, value * k / nu, shape):
+                for phase in 2.0 * np.pi * k / nu * np.arange(seeds.phases) / seeds.phases:
+                    x = base[:-1].reshape(basis.size, -1).copy()
+                    x[2 * k - 1] += amplitude * np.cos(phase) * shape
+                    x[2 * k] += amplitude * np.sin(phase) * shape
+                    yield curve.join(x, value)
+
+
+def _modes(balance: HarmonicBalance) -> list[Array]:
+    """Undamped linear modes in the unknowns, unit length in the masses' weights, the slowest first."""
+    from scipy.linalg import eigh
+
+    mass, _, stiffness = balance.system.matrices()
+    _, vectors = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+    shapes = [balance.linear.retain(v) for v in vectors.T]
+    weight = balance.scales()[0]
+    return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
+
+
+def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array) -> list[float]:
+    """Amplitudes at which a mode vibrates freely at a frequency, by its first harmonic; some guesses without any."""
+    single = HarmonicBalance(
+        curve.balance.system, HarmonicBasis(5), curve.balance.values, curve.balance.linear, curve.balance.samples
+    )
+    unit = curve.reference or 1.0
+    sizes = unit * np.geomspace(1e-3, 1e4, 71)
+    load = single.load(single.values, frequency)
+    pull = []
+    for size in sizes:
+        x = np.zeros((single.basis.size, single.size))
+        x[1] = size * shape
+        state = single.at(x, frequency)
+        rest = state.residual.reshape(x.shape) + (load if state.compliance is None else 0.0)
+        pull.append(float(shape @ rest[1]) / size)
+    values = np.array(pull)
+    crossed = np.flatnonzero(np.isfinite(values[1:]) & (values[:-1] * values[1:] < 0.0))
+    found = [float(sizes[i] + (sizes[i + 1] - sizes[i]) * values[i] / (values[i] - values[i + 1])) for i in crossed]
+    return found or [float(s) for s in unit * np.array([0.3, 1.0, 3.0, 10.0])]
+
+
+def _lasts(curve: ResponseCurve, u: Array) -> bool:
+    """Whether a motion has the period of its basis: for every prime factor something that a shorter one lacks."""
+    basis = curve.balance.basis
+    x = u[:-1].reshape(basis.size, -1) * curve.balance.scales()[0]
+    whole = length(x)
+    k = np.arange(1, basis.harmonics + 1)
+    for factor in _primes(basis.nu):
+        rows = k[k % factor != 0]
+        part = np.hypot(length(x[2 * rows - 1]), length(x[2 * rows]))
+        if part <= _SUBHARMONIC * whole:
+            return False
+    return True
+
+
+def _primes(number: int) -> list[int]:
+    return [p for p in range(2, number + 1) if number % p == 0 and all(p % q for q in range(2, p))]
+
+
+def _same(curve: ResponseCurve, u: Array, other: Array) -> bool:
+    """Whether two motions are one, up to a shift by load periods."""
+    size = length(u[:-1])
+    return any(length(image[:-1] - other[:-1]) <= 1e-4 * size for image in curve.images(u))
+
+
+def _on(branch: Branch, point: CurvePoint) -> bool:
+    """Whether a motion lies on a branch: between two of its points, by the moduli of its harmonics."""
+    curve = point.curve
+    assert isinstance(curve, ResponseCurve)
+    x, omega, _ = curve.split(point.u)
+    moduli = np.abs(PeriodicOrbit(curve.balance, x, omega, curve.balance.values, 0.0).amplitudes)
+    values = branch.omega
+    size = length(moduli)
+    for i in np.flatnonzero((values[:-1] - omega) * (values[1:] - omega) <= 0.0):
+        a, b = (np.abs(orbit.amplitudes) for orbit in branch.orbits[i : i + 2])
+        top = min(len(a), len(b), len(moduli))
+        span = values[i + 1] - values[i]
+        share = (omega - values[i]) / span if span else 0.5
+        middle = (1.0 - share) * a[:top] + share * b[:top]
+        reach = 0.2 * length(b[:top] - a[:top]) + 1e-3 * size
+        if length(middle - moduli[:top]) <= reach:
+            return True
+    return False
