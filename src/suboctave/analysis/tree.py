@@ -152,6 +152,19 @@ class BifurcationDiagram:
         """The branch that one leaves; None for the response."""
         return next((other for other in self if any(child is node for child in other.children)), None)
 
+    @property
+    def legend(self) -> list[str] | None:
+        """What a figure calls its curves (those with points); None where their periods tell them apart."""
+        drawn = [node for node in self if len(node.branch)]
+        if len({node.branch.nu for node in drawn}) > 1:
+            return None
+        return [
+            "response"
+            if node.origin is None
+            else f"from {node.origin.kind} {node.origin.parameter(node.branch.name):.4g}"
+            for node in drawn
+        ]
+
     def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
         """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has."""
         return self._joined([node.branch.to_dataframe(readings) for node in self])

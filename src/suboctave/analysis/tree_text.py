@@ -1,9 +1,9 @@
 """A bifurcation diagram as text: the tree of its branches, each with its number, label and bifurcations.
 
-    0  T, omega 4.5 to omega 1.3: 123 points, 30 unstable
-    │  PD 3.9816, 2.39144
-    └─ 1  2T, PD 3.981602 to PD 2.39144: 99 points, 34 unstable
-          LP 3.07344, 3.65104
+0  T, omega 4.5 to omega 1.3: 123 points, 30 unstable
+│  PD 3.9816, 2.39144
+└─ 1  2T, PD 3.981602 to PD 2.39144: 99 points, 34 unstable
+      LP 3.07344, 3.65104
 """
 
 from __future__ import annotations

@@ -41,7 +41,8 @@ def plot(
     Parameters
     ----------
     curves
-        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), or a sequence of these.
+        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a bifurcation diagram (all its branches),
+        or a sequence of these.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
     quantity
@@ -72,18 +73,19 @@ def plot(
         quantity = "amplitude" if harmonic is None else "harmonic"
     view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
     given = list(curves) if isinstance(curves, list | tuple) else [curves]
-    datasets = [_dataset(item, view) for item in given]
+    datasets = [dataset for item in given for dataset in _datasets(item, view)]
+    if labels is None and len(given) == 1:
+        labels = getattr(given[0], "legend", None)
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
 
 
-def _dataset(item: Any, view: View) -> xarray.Dataset:
+def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
+    """The dataset of a branch, those of all branches of a diagram."""
     import xarray
 
     if isinstance(item, xarray.Dataset):
-        return item
+        return [item]
     if not hasattr(item, "to_xarray"):
-        raise InputError(f"plot draws branches and their datasets, not {type(item).__name__}")
-    dataset: xarray.Dataset = (
-        item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
-    )
-    return dataset
+        raise InputError(f"plot draws branches, diagrams and their datasets, not {type(item).__name__}")
+    found = item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
+    return list(found.values()) if isinstance(found, dict) else [found]

@@ -219,9 +219,9 @@ def check_branch(curve: Curve, key: tuple[str | int, ...], around: Surroundings)
         yield (*key[:-1], given), f"the analysis {name!r} gives one branch, not a diagram: leave {given} out"
 
 
-def chosen_branch(curve: Curve, context: Context) -> Branch:
+def chosen_branch(curve: Curve, results: Mapping[str, Result]) -> Branch:
     """The branch that an earlier analysis gave, or one of those of a diagram; InputError where there is none."""
-    result = context.results.get(curve.analysis)
+    result = results.get(curve.analysis)
     if isinstance(result, BifurcationDiagram):
         try:
             return result[curve.branch if curve.label is None else curve.label].branch  # type: ignore[index]
@@ -232,15 +232,16 @@ def chosen_branch(curve: Curve, context: Context) -> Branch:
     return result
 
 
-def chosen(motion: Motion, context: Context) -> Any:
+def chosen(motion: Motion, results: Mapping[str, Result]) -> Any:
     """The point or bifurcation of an earlier branch; InputError where there is none."""
-    branch = chosen_branch(motion, context)
+    branch = chosen_branch(motion, results)
     said = repr(motion.analysis) if motion.said == motion.analysis else motion.said
     if motion.bifurcation is not None:
         found = branch.bifurcations[motion.bifurcation]
         if not -len(found) <= motion.index < len(found):
             count = "no" if not found else f"only {len(found)}"
-            raise InputError(f"{said} has {count} {motion.bifurcation}, so that there is none with index {motion.index}")
+            kind = motion.bifurcation
+            raise InputError(f"{said} has {count} {kind}, so that there is none with index {motion.index}")
         return found[motion.index]
     if motion.nearest is not None:
         distance = np.zeros(len(branch))

@@ -136,7 +136,7 @@ class CurveStep(Step):
     def started(self, context: Context) -> Any:
         """What the curve starts from: a motion of an earlier branch, numbers, or None."""
         if self.motion is not None:
-            found = chosen(self.motion, context)
+            found = chosen(self.motion, context.results)
             return self._moved(found.orbit, context)
         return self.start
 

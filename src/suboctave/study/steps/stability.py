@@ -65,12 +65,12 @@ class Stability(Step):
         """See `Step.run`."""
         motions: list[tuple[str, Any]] = []
         for point in self.points or []:
-            motions.append((f"point {point}", chosen_motion(self._motion(point=point), context)))
-        branch = chosen_branch(as_curve(self.branch), context)
+            motions.append((f"point {point}", chosen_motion(self._motion(point=point), context.results)))
+        branch = chosen_branch(as_curve(self.branch), context.results)
         for kind in self.bifurcations:
             motions += [(kind, item) for item in branch.bifurcations[kind]]
         if self.nearest is not None:
-            motions.append(("nearest", chosen_motion(self._motion(nearest=self.nearest), context)))
+            motions.append(("nearest", chosen_motion(self._motion(nearest=self.nearest), context.results)))
         rows, multipliers, errors = [], [], []
         for name, motion in motions:
             for method in self.methods or [None]:

@@ -18,7 +18,7 @@ class SwitchBranch(CurveStep):
 
     kind: ClassVar[str] = "switch_branch"
 
-    start: Motion  # type: ignore[assignment]
+    start: Motion
     side: Literal[1, -1] | None = None
     bounds: Range | None = None
 
@@ -27,7 +27,7 @@ class SwitchBranch(CurveStep):
         yield from super().check(around)
         kind = self.start.bifurcation
         if kind is None:
-            yield ("start",), 'name the bifurcation that it leaves at: bifurcation = "PD" or "BP", and index = 0, 1, ...'
+            yield ("start",), 'name the bifurcation that it leaves: bifurcation = "PD" or "BP", with index = 0, 1, ...'
         elif kind in KINDS:
             yield from tried("start", lambda: check_left(kind))
         if self.bounds is not None:
@@ -47,7 +47,7 @@ class SwitchBranch(CurveStep):
 
     def run(self, context: Context) -> Branch:
         """See `Step.run`."""
-        item = chosen(self.start, context)
+        item = chosen(self.start, context.results)
         self._moved(item.orbit, context)
         options: dict[str, Any] = self.options(context)
         if self.bounds is not None:

@@ -45,7 +45,7 @@ class Verify(Step):
     def run(self, context: Context) -> Table:
         """See `Step.run`."""
         curve = as_curve(self.branch)
-        branch = chosen_branch(curve, context)
+        branch = chosen_branch(curve, context.results)
         things: list[tuple[str, Any]] = []
         if self.what != "bifurcations":
             things += [(f"point {i}", branch.points[i]) for i in range(0, len(branch), self.every)]
