@@ -34,7 +34,10 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     name
         The free parameter.
     """
-    points = _settled(trace.points, method)
+    # right beside another branch a multiplier is as near +1 as one likes
+    beside = {0} if trace.departs is not None else set()
+    beside |= {len(trace.points) - 1} if trace.arrives is not None else set()
+    points = _settled(trace.points, method, beside)
     bifurcations = [_at_event(item, method) for item in trace.bifurcations]
     events = [_at_event(item, method) for item in trace.events]
     in_doubt = [i for i, p in enumerate(points) if not p.floquet.decided]
@@ -65,14 +68,14 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     )
 
 
-def _settled(points: Sequence[BranchPoint], method: StabilityMethod) -> list[BranchPoint]:
+def _settled(points: Sequence[BranchPoint], method: StabilityMethod, beside: set[int]) -> list[BranchPoint]:
     told: list[BranchPoint] = []
     in_vain = 0
-    for point in points:
+    for number, point in enumerate(points):
         found = point.floquet
         if found.decided:
             in_vain = 0
-        elif in_vain < _PATIENCE:
+        elif number not in beside and in_vain < _PATIENCE:
             found = method.settled(point.orbit.state(), found)
             in_vain = 0 if found.decided else in_vain + 1
         told.append(point if found is point.floquet else replace(point, floquet=found))
