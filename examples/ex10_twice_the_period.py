@@ -40,7 +40,7 @@ print(doubled.bifurcations)
 (fold,) = doubled.bifurcations["LP"]
 
 if len(sys.argv) > 1:
-    so.plot_phase([single.bifurcations["PD"][0], doubled.orbits[0], fold], sys.argv[1])
+    so.plot_phase([single.bifurcations["PD"][0], doubled.orbits[0], fold], sys.argv[1], size="double-column")
 
 # Shooting on the same equations: the fold of the 2T motions at omega = 2.94603063, max |x| = 0.6191226 there.
 assert abs(fold.omega - 2.94603063) < 1e-7

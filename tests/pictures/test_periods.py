@@ -93,12 +93,11 @@ def test_subcritical_is_hollow_where_it_is_known():
     faces = {name: to_hex(line.get_markerfacecolor()) for name, line in legend_of(figure).items() if "doubling" in name}
     filled = KINDS["PD"].colour.lower()
     assert faces == {
-        "period doubling, supercritical": filled,
-        "period doubling, subcritical": "#ffffff",
         "period doubling": filled,
+        "period doubling, subcritical": "#ffffff",
     }
-    drawn = {line.get_xdata()[0]: to_hex(line.get_markerfacecolor()) for line in lines(figure, "PD")}
-    assert drawn == {X[3]: filled, X[4]: "#ffffff", X[5]: filled}
+    drawn = {tuple(line.get_xdata()): to_hex(line.get_markerfacecolor()) for line in lines(figure, "PD")}
+    assert drawn == {(X[3], X[5]): filled, (X[4],): "#ffffff"}
     data = json.loads(json.dumps(figure_data({"a": curve(1, events=events)}, "omega", "a")))["data"]
     fills = {trace["name"]: trace["marker"]["color"].lower() for trace in data if trace["mode"] == "markers"}
     assert fills == faces

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from suboctave.errors import InputError
-from suboctave.pictures.strokes import strokes
+from suboctave.pictures.strokes import line, repeated, strokes, without_repeats
 from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.arange(5.0)
@@ -77,6 +77,32 @@ def test_a_named_parameter_on_the_axis():
     assert float(dataset["event_parameters"].sel(parameter="j")[0]) == 0.5
     with pytest.raises(InputError, match="did you mean"):
         strokes(dataset, "omga")
+
+
+def test_a_curve_that_comes_back_on_itself_is_dashed_once():
+    """There and back over the same line, with other points: unstable, stable at the far end, unstable."""
+    there, back = np.linspace(0.0, 1.0, 21), np.linspace(1.0, 0.0, 34)
+    x = np.concatenate([there, back])
+    y = np.sin(3.0 * x)
+    data = curve_dataset(x, y, stable=x > 0.7)
+    spread = (1.0, 1.0)
+    kept = without_repeats(strokes(data, "omega"), [], spread)
+    assert [stroke.stable for stroke in kept[:2]] == [False, True]
+    # what is left of the way back is where its points lie further than those of the way there
+    assert sum(np.ptp(stroke.x) for stroke in kept[2:]) < 0.1
+    unstable = curve_dataset(x, y, stable=x > 2.0)
+    (stroke,) = without_repeats(strokes(unstable, "omega"), [], spread)
+    assert stroke.x[0] == 0.0
+    assert stroke.x.max() == 1.0
+    assert stroke.x[-1] > 0.9  # the way back is left out, but for the turn
+    again = repeated(line(unstable, "omega"))
+    assert not again[:20].any()
+    assert again[24:].all()
+    assert not repeated(line(curve_dataset(x, y, stable=x < 2.0), "omega")).any()
+    # a line beside it, two hundredths of the frame away, is another one
+    beside = curve_dataset(x, np.concatenate([np.sin(3.0 * there), np.sin(3.0 * back) + 0.02]), stable=x > 0.7)
+    kept = without_repeats(strokes(beside, "omega"), [], spread)
+    assert [stroke.stable for stroke in kept] == [False, True, False]
 
 
 def test_without_stability_there_is_one_stroke():

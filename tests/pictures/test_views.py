@@ -77,6 +77,12 @@ def test_branch_dataset_and_file_give_the_same_picture(curve, tmp_path):
     assert (tmp_path / "stored.svg").read_bytes() == (tmp_path / "amplitude.svg").read_bytes()
 
 
+def test_the_results_of_a_study_are_drawn_as_its_curves(curve, tmp_path):
+    plot(so.Results({"a": curve, "b": curve}), tmp_path / "results.svg")
+    plot([curve, curve], tmp_path / "curves.svg")
+    assert (tmp_path / "results.svg").read_bytes() == (tmp_path / "curves.svg").read_bytes()
+
+
 @pytest.mark.parametrize("size", [*SIZES, (5.0, 3.0)])
 def test_sizes_are_what_was_asked_for(curve, size):
     figure = plot(curve, size=size)

@@ -194,7 +194,7 @@ ROWS = [
     ("portrait of a missing DOF", None, PHASE + "dof = 4\n", ["out of range"], "dof ="),
     ("portrait of no known size", None, PHASE + 'size = "singlecolumn"\n', ["did you mean"], "size ="),
     ("history of no element", None, HISTORY + 'quantity = "force"\n', ["give element="], "[[outputs"),
-    ("history of a missing element", None, HISTORY + 'quantity = "force"\nelement = 3\n', ["out of range"], "element"),
+    ("history of a missing element", None, HISTORY + 'quantity = "force"\nelement = 3\n', ["range"], "element ="),
     ("spectrum up to nothing", None, PHASE.replace("phase", "spectrum") + "highest = 0.0\n", ["greater"], "highest ="),
     ("results of another form", None, '\n[outputs]\nresults = "a.csv"\n', [".nc"], "results ="),
     ("outputs misspelt", None, '\n[outputs]\nfoldr = "a"\n', ["did you mean 'folder'"], "foldr ="),

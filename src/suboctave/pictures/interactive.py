@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.pictures import style
 from suboctave.pictures.periods import curve_styles, period_of, several_periods
-from suboctave.pictures.strokes import line
+from suboctave.pictures.strokes import line, repeated
 from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
@@ -77,10 +77,11 @@ def _lines(
 ) -> list[dict[str, Any]]:
     whole = line(dataset, horizontal)
     words = _Words(dataset)
+    again = repeated(whole)
     verdicts = [None] if whole.stable is None else [True, False]
     traces = []
     for verdict in verdicts:
-        vertices = _of_verdict(whole.stable, verdict, whole.x.size)
+        vertices = _of_verdict(whole.stable, verdict, whole.x.size, again)
         if not vertices:
             continue
         word = "motions" if verdict is None else "stable" if verdict else "unstable"
@@ -111,12 +112,12 @@ def _lines(
     return traces
 
 
-def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> list[int]:
-    """Vertices of all pieces of one verdict, -1 between two strokes."""
+def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int, again: np.ndarray) -> list[int]:
+    """Vertices of all pieces of one verdict, -1 between two strokes, without those that are there `again`."""
     if stable is None or stable.size == 0:
         return list(range(count)) if not verdict else []
     vertices: list[int] = []
-    for piece in np.flatnonzero(stable == verdict):
+    for piece in np.flatnonzero((stable == verdict) & ~again):
         if not vertices or vertices[-1] != piece:
             vertices += [-1, int(piece)] if vertices else [int(piece)]
         vertices.append(int(piece) + 1)
@@ -126,15 +127,10 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int) -> 
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
     words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
-    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
-    senses = [str(sense) for sense in dataset["event_criticality"].to_numpy()]
-    marks = list(zip(kinds, senses, strict=True))
     smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
     traces = []
-    for kind, sense in dict.fromkeys(marks):
-        mark = style.kind_style(kind)
-        chosen = np.flatnonzero([pair == (kind, sense) for pair in marks])
-        named = html.escape(style.in_words(kind, sense))
+    for _, mark, chosen in style.marks(dataset):
+        named = html.escape(mark.name)
         traces.append(
             {
                 "type": "scatter",
@@ -148,7 +144,7 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
                 "marker": {
                     "symbol": _SYMBOLS[mark.marker],
                     "size": 1.5 * mark.size * smaller,
-                    "color": style.filling(kind, sense),
+                    "color": mark.colour,
                     "line": {"color": edge, "width": 1.8},
                 },
             }

@@ -68,13 +68,14 @@ def _covers(figure: Figure, axes: Axes, legend: Legend) -> bool:
 
 def ordered(entries: dict[str, Line2D]) -> dict[str, Line2D]:
     """Curves first, then stable and unstable, then the kinds in the order of the style table, then a user's own."""
-    lines, kinds = ["stable", "unstable"], [look.name for look in style.KINDS.values()]
+    lines = ["stable", "unstable"]
+    kinds = [name for look in style.KINDS.values() for name in (look.name, f"{look.name}{style.SUBCRITICAL}")]
 
     def rank(name: str) -> tuple[int, int]:
         if name in lines:
             return 1, lines.index(name)
-        if name.split(",")[0] in kinds:
-            return 2, kinds.index(name.split(",")[0])
+        if name in kinds:
+            return 2, kinds.index(name)
         return (0, 0) if entries[name].get_marker() == "None" else (3, 0)
 
     return {name: entries[name] for name in sorted(entries, key=rank)}

@@ -18,7 +18,7 @@ import numpy as np
 from suboctave.errors import InputError, suggest
 from suboctave.pictures import style
 from suboctave.pictures.legend import place_legend
-from suboctave.pictures.periods import period_name, period_of, styles_of_periods
+from suboctave.pictures.periods import curve_styles, period_name, period_of, styles_of_periods
 from suboctave.pictures.saving import SUFFIXES, png_bytes, save_figure
 from suboctave.pictures.view import check_units
 
@@ -41,7 +41,7 @@ __all__ = [
 
 #: what of a displacement may be shown: the order of its derivative by time
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
-_DOTS = ("{x}", r"\dot{{{x}}}", r"\ddot{{{x}}}")
+_DOTS = ("x", r"\dot{x}", r"\ddot{x}")
 _CALLED = ("displacement", "velocity", "acceleration")
 #: most frames in one row
 _COLUMNS = 4
@@ -98,12 +98,12 @@ class MotionView:
     def name(self, dataset: xarray.Dataset, order: int, words: bool = False) -> str:
         """A derivative of x as an axis says it: `dx/dt (mm/s)`."""
         one = int(dataset.attrs["dofs"]) == 1
-        letter = "x" if one else f"x_{{{int(dataset.attrs['dof'])}}}"
+        index = "" if one else f"_{{{int(dataset.attrs['dof'])}}}"
         if self.omega_reference is not None and order:
             power = "" if order == 1 else f"^{order}"
-            said = rf"$d{power}{letter}/d(\omega_0 t){power}$"
+            said = rf"$d{power}x{index}/d(\omega_0 t){power}$"
         else:
-            said = f"${_DOTS[order].format(x=letter)}$"
+            said = f"${_DOTS[order]}{index}$"
         if words:
             said = f"{_CALLED[order]} {said}"
         if self.unit:
@@ -192,7 +192,7 @@ class Frames:
         self.names = told if labels is None else [_plain(label) for label in labels]
         periods = [period_of(dataset) for dataset in datasets]
         # in frames of their own motions of one period need not differ
-        self.looks = styles_of_periods(periods, self.names if overlay else [""] * count)
+        self.looks = curve_styles(datasets, self.names) if overlay else styles_of_periods(periods, [""] * count)
         self.legend: dict[str, dict[str, Any]] = {}
         self.last: dict[str, dict[str, Any]] = {}
         if not self.overlay:

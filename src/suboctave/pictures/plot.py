@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,11 +38,14 @@ def plot(
 ) -> Figure:
     """Draw one or several branches: stable parts solid, unstable ones dashed, bifurcations marked.
 
+    Motions of period T, 2T, 4T, ... (T that of the load) have a colour for each; amplitudes are largest values over
+    one period of the response. Markers of subcritical bifurcations are hollow, where that is known.
+
     Parameters
     ----------
     curves
         A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a bifurcation diagram (all its branches),
-        or a sequence of these.
+        a sequence of these, or the results of a study.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
     quantity
@@ -72,11 +75,19 @@ def plot(
     if quantity is None:
         quantity = "amplitude" if harmonic is None else "harmonic"
     view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
-    given = list(curves) if isinstance(curves, list | tuple) else [curves]
+    given = _several(curves)
     datasets = [dataset for item in given for dataset in _datasets(item, view)]
     if labels is None and len(given) == 1:
         labels = getattr(given[0], "legend", None)
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
+
+
+def _several(curves: Any) -> list[Any]:
+    """The branches and diagrams of what is given."""
+    named = getattr(curves, "branches", None)
+    if isinstance(named, Mapping):  # results of a study
+        return [*named.values(), *getattr(curves, "diagrams", {}).values()]
+    return list(curves) if isinstance(curves, list | tuple) else [curves]
 
 
 def _datasets(item: Any, view: View) -> list[xarray.Dataset]:

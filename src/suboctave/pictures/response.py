@@ -18,7 +18,7 @@ from suboctave.pictures import style
 from suboctave.pictures.legend import ordered, place_legend
 from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
 from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import Stroke, strokes
+from suboctave.pictures.strokes import Stroke, strokes, without_repeats
 from suboctave.pictures.view import View
 from suboctave.store.layout import check_layout, coordinate
 
@@ -133,16 +133,33 @@ def draw_response(
     styles = curve_styles(group, names, periods)
     # sub-harmonic motions over those that they branch off from
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
+    earlier: dict[style.CurveStyle, list[np.ndarray]] = {}
+    spread = _spread(group, horizontal, shown)
     legend: dict[str, Line2D] = {}
     for index in order:
         name = names[index] if labels is not None or several or periods else ""
-        pieces = strokes(group[index], horizontal, shown.variable)
+        pieces = without_repeats(
+            strokes(group[index], horizontal, shown.variable), earlier.setdefault(styles[index], []), spread
+        )
         legend |= _draw_line(axes, pieces, shown.factors(horizontal), styles[index], look, name, periods)
     for index in order:  # markers after all lines: none is crossed out by another curve
         edge = styles[index].colour if several or periods else style.INK
         legend |= _draw_events(axes, group[index], shown.values(group[index], horizontal)[0], edge, look, several)
     _dress(axes, *shown.labels(group[0], horizontal), look)
     return legend
+
+
+def _spread(group: Sequence[xarray.Dataset], horizontal: str, view: View) -> tuple[float, float]:
+    """Width and height of what is drawn, in the units of the datasets."""
+    every = np.concatenate([view.values(dataset, horizontal)[1] for dataset in group])
+    across, upwards = (_extent(column) for column in every.T)
+    factors = view.factors(horizontal)
+    return across / factors[0], upwards / factors[1]
+
+
+def _extent(column: np.ndarray) -> float:
+    known = column[np.isfinite(column)]
+    return (float(np.ptp(known)) if known.size else 0.0) or 1.0
 
 
 def _draw_line(
@@ -190,21 +207,17 @@ def _draw_events(
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
-    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
-    senses = [str(sense) for sense in dataset["event_criticality"].to_numpy()]
-    marks = list(zip(kinds, senses, strict=True))
     smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
-    for kind, sense in dict.fromkeys(marks):
-        mark = style.kind_style(kind)
+    for kind, mark, which in style.marks(dataset):
         drawing: dict[str, Any] = {
             "linestyle": "none",
             "marker": mark.marker,
             "markersize": mark.size * look.marker * smaller,
-            "markerfacecolor": style.filling(kind, sense),
+            "markerfacecolor": mark.colour,
             "markeredgecolor": edge,
             "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
-        chosen = positions[[pair == (kind, sense) for pair in marks]]
+        chosen = positions[which]
         axes.plot(
             chosen[:, 0],
             chosen[:, 1],
@@ -214,7 +227,7 @@ def _draw_events(
             **drawing,
         )
         plain = {"markeredgecolor": style.INK, "markeredgewidth": look.edge, "markersize": mark.size * look.marker}
-        legend[style.in_words(kind, sense)] = Line2D([], [], **{**drawing, **plain})
+        legend[mark.name] = Line2D([], [], **{**drawing, **plain})
     return legend
 
 

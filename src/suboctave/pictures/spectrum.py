@@ -196,7 +196,8 @@ def _axis(frames: Frames, datasets: Sequence[xarray.Dataset], view: MotionView, 
     axes.set_yscale("log")
     if every.max(initial=0.0) > 0.0:
         above = every[every > _NOTHING * every.max()]
-        axes.set_ylim(10.0 ** math.floor(math.log10(above.min())), 10.0 ** math.ceil(math.log10(1.3 * above.max())))
+        top = math.ceil(math.log10(1.3 * above.max()))
+        axes.set_ylim(10.0 ** min(math.floor(math.log10(above.min())), top - 3), 10.0**top)
     unit = max(_unit_of_axis(dataset, view) for dataset in datasets)
     nu = max(period_of(dataset) for dataset in datasets)
     axes.set_xlim(-0.6 * unit / nu, (most + 0.3 / nu) * unit)

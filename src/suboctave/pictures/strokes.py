@@ -6,6 +6,7 @@ an event, not at the computed point nearest to it, so that a dash begins at the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Line", "Stroke", "line", "strokes"]
+__all__ = ["Line", "Stroke", "line", "repeated", "strokes", "without_repeats"]
 
 
 @dataclass(frozen=True)
@@ -110,3 +111,59 @@ def _pieces(
         else:
             verdict[piece] = here[piece] and (is_event[piece + 1] or here[piece + 1])
     return verdict
+
+
+#: in units of the frame: nearer than this two lines are one, and so far along a line a part of it is another part
+_UPON, _ANOTHER = 4e-3, 3e-2
+
+
+def without_repeats(pieces: Sequence[Stroke], earlier: list[np.ndarray], spread: tuple[float, float]) -> list[Stroke]:
+    """The strokes without unstable parts that lie upon earlier ones: dashes upon dashes would look like a solid line.
+
+    A branch that goes through its parent comes back as the same motion, shifted, at the same amplitude. `spread`: width
+    and height of the frame. `earlier`, segments (m, 2, 2) drawn before in units of these, is added to.
+    """
+    kept: list[Stroke] = []
+    for piece in pieces:
+        if piece.stable is not False or piece.x.size < 2:
+            kept.append(piece)
+            continue
+        own, fresh = _fresh(piece.x / spread[0], piece.y / spread[1], np.ones(piece.x.size - 1, dtype=bool), earlier)
+        earlier.append(own)
+        cuts = np.flatnonzero(np.diff(np.concatenate([[False], fresh, [False]])))
+        kept += [Stroke(piece.x[a : b + 1], piece.y[a : b + 1], False) for a, b in cuts.reshape(-1, 2)]
+    return kept
+
+
+def repeated(whole: Line) -> np.ndarray:
+    """(vertices - 1,) whether a piece of the line is unstable and lies upon an earlier one that is."""
+    if whole.stable is None or whole.stable.size == 0:
+        return np.zeros(max(whole.x.size - 1, 0), dtype=bool)
+    x, y = (v / ((np.nanmax(v) - np.nanmin(v)) or 1.0) for v in (whole.x, whole.y))
+    result: np.ndarray = ~whole.stable & ~_fresh(x, y, ~whole.stable, [])[1]
+    return result
+
+
+def _fresh(
+    x: np.ndarray, y: np.ndarray, dashed: np.ndarray, earlier: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The segments (m, 2, 2) of a line, and whether each lies apart from `earlier` ones and its own earlier dashed."""
+    path = np.column_stack([x, y])
+    own = np.stack([path[:-1], path[1:]], axis=1)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    fresh = np.ones(len(own), dtype=bool)
+    for i in np.flatnonzero(dashed):
+        there = np.concatenate([*earlier, own[dashed & (along[1:] < along[i] - _ANOTHER)]])
+        probes = np.array([own[i, 0], own[i].mean(axis=0), own[i, 1]])
+        fresh[i] = not len(there) or _distance(probes, there).max() > _UPON
+    return own, fresh
+
+
+def _distance(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
+    """Distance of each point (p, 2) from the nearest of the segments (m, 2, 2)."""
+    begin, way = segments[:, 0], segments[:, 1] - segments[:, 0]
+    offset = points[:, None] - begin
+    length = np.maximum(np.sum(way**2, axis=1), 1e-300)
+    share = np.clip(np.sum(offset * way, axis=2) / length, 0.0, 1.0)
+    nearest: np.ndarray = np.linalg.norm(offset - share[:, :, None] * way, axis=2).min(axis=1)
+    return nearest

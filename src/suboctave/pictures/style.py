@@ -2,10 +2,10 @@
 
 The colours are those of Okabe and Ito (*Color Universal Design*, 2008). Shape carries the kind on its own, so that
 a black-and-white print loses nothing: circles for limit points and triangles for period doublings, as in Alcorta
-et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Markers of
-subcritical bifurcations are hollow. Grazing contacts, which need not change the response, are crosses beneath the
-others. Several curves in one frame differ in colour, in width and in the dashes of their unstable parts, and each one's
-markers have its colour at the edge.
+et al. (Nonlinear Dynamics 98, 2019, Figs 6 and 7), squares for Neimark-Sacker, diamonds for branch points. Grazing
+contacts, which need not change the response, are crosses beneath the others. Subcritical ones are hollow. Several
+curves in one frame differ in colour, in width and in the dashes of their unstable parts, and each one's markers have
+its colour at the edge.
 
 Widths of "single-column" and "double-column" are 84 mm and 174 mm, which fit the columns of the journals of the field;
 letters are then 7 to 8 points high.
@@ -13,9 +13,15 @@ letters are then 7 to 8 points high.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from suboctave.errors import InputError, suggest
+
+if TYPE_CHECKING:
+    import xarray
 
 __all__ = [
     "CURVE_COLOURS",
@@ -33,10 +39,9 @@ __all__ = [
     "KindStyle",
     "Look",
     "curve_style",
-    "filling",
-    "in_words",
     "kind_style",
     "look_of",
+    "marks",
     "size_in_inches",
 ]
 
@@ -48,8 +53,12 @@ CURVE_COLOURS = ("#0072B2", "#E69F00", INK, "#009E73", "#CC79A7", "#56B4E9")  # 
 STABLE_DASH = "solid"
 UNSTABLE_DASH = (0, (3.2, 1.6))  # in line widths: begins with a dash, so the change shows where it happens
 
+SUBCRITICAL = ", subcritical"  # in a legend, behind the kind
+
 LINE_WIDTH = 1.5
 MARKER_SIZE = 6.5
+#: sub-harmonic motions branch off where their parents have a marker: theirs, on top, lets that one show
+OF_SUBHARMONICS = 0.6
 
 #: inches; the widths are 84 mm and 174 mm
 SIZES = {"single-column": (3.31, 2.4), "double-column": (6.85, 3.6)}
@@ -149,19 +158,18 @@ KINDS = {
 }
 
 
-#: sub-harmonic motions branch off where their parents have a marker: theirs, on top, lets that one show
-OF_SUBHARMONICS = 0.6
-
-
-def in_words(kind: str, criticality: str = "") -> str:
-    """What a legend calls bifurcations of a kind, with "supercritical" or "subcritical" where that is known."""
-    name = kind_style(kind).name
-    return f"{name}, {criticality}" if criticality else name
-
-
-def filling(kind: str, criticality: str = "") -> str:
-    """The colour inside a marker: none (white) at a subcritical bifurcation."""
-    return "#ffffff" if criticality == "subcritical" else kind_style(kind).colour
+def marks(dataset: xarray.Dataset) -> list[tuple[str, KindStyle, np.ndarray]]:
+    """The events of a curve by how they are marked: kind, style, which of them. Subcritical ones are hollow."""
+    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
+    hollow = [str(word) == "subcritical" for word in dataset["event_criticality"].to_numpy()]
+    found = []
+    for kind, empty in dict.fromkeys(zip(kinds, hollow, strict=True)):
+        mark = kind_style(kind)
+        if empty:
+            mark = replace(mark, name=f"{mark.name}{SUBCRITICAL}", colour="#ffffff")
+        chosen = [i for i, pair in enumerate(zip(kinds, hollow, strict=True)) if pair == (kind, empty)]
+        found.append((kind, mark, np.array(chosen, dtype=int)))
+    return found
 
 
 def kind_style(kind: str) -> KindStyle:

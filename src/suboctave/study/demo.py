@@ -74,13 +74,11 @@ def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:
     strong = [curve for curve in curves if curve.case.p >= 1.0]
     files: list[Path] = []
     if weak:
-        titles = [
-            f"({letter}) $p = {c.case.p:g}$, $j = {c.case.j:g}$" for letter, c in zip("abcdef", weak, strict=False)
-        ]
+        titles = [f"({letter}) p = {c.case.p:g}, j = {c.case.j:g}" for letter, c in zip("abcdef", weak, strict=False)]
         files.append(folder / "weak_forcing.png")
         plot_panels([curve.dataset for curve in weak], files[-1], titles=titles)
     if strong:
-        title = ", ".join(f"$p = {c.case.p:g}$, $j = {c.case.j:g}$" for c in strong)
+        title = ", ".join(f"p = {c.case.p:g}, j = {c.case.j:g}" for c in strong)
         files.append(folder / "strong_forcing.png")
         plot_response([curve.dataset for curve in strong], files[-1], title=title)
     return files
