@@ -91,6 +91,8 @@ def diagram_from_datasets(
             nodes[number].failures.append((met[number][event], why))
         for number, event in zip(record["left_of"], record["left"], strict=True):
             nodes[number].left.append(met[number][event])
+    except InputError:  # which is a ValueError
+        raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"this is no diagram of suboctave: {type(error).__name__}: {error}") from None
     diagram = BifurcationDiagram(nodes[0], str(head.attrs.get("stopped", "")))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["BifurcationDiagram", "DiagramBranch"]
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class DiagramBranch:
     """A branch of a diagram with those that leave it.
 
@@ -53,7 +53,7 @@ class DiagramBranch:
     children: list[DiagramBranch] = field(default_factory=list)
     failures: list[tuple[Bifurcation, str]] = field(default_factory=list)
     left: list[Bifurcation] = field(default_factory=list)
-    met: list[Bifurcation] = field(default_factory=list, repr=False)
+    met: list[Bifurcation] = field(default_factory=list)
 
     def __iter__(self) -> Iterator[DiagramBranch]:
         """This one and all below it, in the order in which they were found."""
@@ -80,6 +80,10 @@ class DiagramBranch:
             for j, i in ((branch.departs, 0), (branch.arrives, -1))
         ]
         return f"{text}, {ends[0]} to {ends[1]}"
+
+    def __repr__(self) -> str:
+        count = len(self.children)
+        return f"<branch {self.number}: {self.label}, {len(self.branch)} points, {count} branches leave it>"
 
 
 class BifurcationDiagram:
