@@ -195,7 +195,7 @@ def test_a_file_with_a_branch_missing_or_changed(cascade, tmp_path):
     cascade.save(path, overwrite=True)
     with h5py.File(path, "r+") as file:
         file["branch_2"]["omega"][0] = 1.0
-    with pytest.raises(InputError, match="'branch_2'.*damaged"):
+    with pytest.raises(InputError, match=r"'branch_2'.*damaged"):
         so.load(path)
 
 
