@@ -26,17 +26,13 @@ from suboctave.study.steps.base import (
     check_motion,
     chosen,
     chosen_branch,
+    name_or_table,
 )
 
 __all__ = ["MOTION_FIGURES", "MotionFigure"]
 
 
-def _way(given: Any) -> str | None:
-    """Which way a motion is given, so that a mistake in it is told once, as one in that way."""
-    return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Motion) else None
-
-
-_Motion = Annotated[Annotated[str, Tag("name")] | Annotated[Motion, Tag("table")], Discriminator(_way)]
+_Motion = Annotated[Annotated[str, Tag("name")] | Annotated[Motion, Tag("table")], Discriminator(name_or_table)]
 #: keys of a figure that are no options of what draws it
 _OWN = {"kind", "file", "motions"}
 

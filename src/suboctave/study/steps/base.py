@@ -36,6 +36,7 @@ __all__ = [
     "chosen",
     "chosen_branch",
     "key_of_curve",
+    "name_or_table",
 ]
 
 #: the kinds of steps, by name
@@ -160,12 +161,13 @@ class Motion(Curve):
     nearest: dict[str, float] | None = None
 
 
-def _way(given: Any) -> str | None:
+def name_or_table(given: Any) -> str | None:
+    """Which way a branch or a motion is given, so that a mistake in it is told once, as one in that way."""
     return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Curve) else None
 
 
 #: a branch as a step names it: the name of an analysis alone, or with one of a diagram's branches
-Named = Annotated[Annotated[str, Tag("name")] | Annotated[Curve, Tag("table")], Discriminator(_way)]
+Named = Annotated[Annotated[str, Tag("name")] | Annotated[Curve, Tag("table")], Discriminator(name_or_table)]
 
 
 def as_curve(given: str | Curve) -> Curve:
