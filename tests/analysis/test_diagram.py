@@ -260,3 +260,21 @@ def test_a_figure_of_all_branches_in_the_colours_of_their_periods(cascade, tmp_p
     colours = {line.get_color() for line in axes.lines if line.get_gid() in ("stable", "unstable")}
     assert len(colours) == 3
     assert so.plot([cascade, cascade[0].branch]).axes  # beside other curves, too
+
+
+def test_a_part_of_a_figure_marks_only_what_lies_in_it(cascade):
+    """Grazing contacts are left out unless they are asked for."""
+    (axes,) = cascade.plot(xlim=(2.9, 3.1)).axes
+    assert axes.get_xlim() == (2.9, 3.1)
+    drawn = {line.get_gid(): line.get_xdata() for line in axes.lines if line.get_gid() in ("PD", "LP", "grazing")}
+    inside = [b.omega for b in cascade.bifurcations if b.kind == "PD" and 2.9 <= b.omega <= 3.1]
+    marks = np.concatenate([line.get_xdata() for line in axes.lines if line.get_gid() == "PD"])
+    np.testing.assert_allclose(sorted(marks), sorted(inside))
+    assert "grazing" not in drawn
+    heights = [b.amplitude[(b.omega > 2.9) & (b.omega < 3.1)] for b in cascade.branches]
+    assert axes.get_ylim()[1] == pytest.approx(1.06 * np.concatenate(heights).max(), rel=0.05)
+    (axes,) = cascade.plot(marks=["grazing"]).axes
+    assert {line.get_gid() for line in axes.lines} == {"stable", "unstable", "grazing"}
+    for wrong in ({"xlim": (3.0, 2.0)}, {"ylim": (1.0,)}, {"xlim": 3.0}, {"marks": "PD"}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            cascade.plot(**wrong)

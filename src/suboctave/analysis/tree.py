@@ -169,6 +169,12 @@ class BifurcationDiagram:
             for node in drawn
         ]
 
+    @property
+    def marks(self) -> list[str]:
+        """What a figure marks: everything that its branches meet but contacts, which would hide the rest."""
+        met = (item for branch in self.branches for item in (*branch.bifurcations, *branch.events))
+        return list(dict.fromkeys(item.kind for item in met))
+
     def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
         """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has."""
         return self._joined([node.branch.to_dataframe(readings) for node in self])

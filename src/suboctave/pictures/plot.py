@@ -32,6 +32,9 @@ def plot(
     unit: str | None = None,
     xlabel: str | None = None,
     ylabel: str | None = None,
+    xlim: Sequence[float] | None = None,
+    ylim: Sequence[float] | None = None,
+    marks: Sequence[str] | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: str | tuple[float, float] = (6.4, 4.2),
@@ -64,6 +67,10 @@ def plot(
         Factor on the quantity, and its unit for the label: `scale=1e3, unit="mm"`.
     xlabel, ylabel, labels, title
         Texts of the axes, names of the curves in the legend, title.
+    xlim, ylim
+        Part of the axes that is shown, (from, to).
+    marks
+        Kinds of bifurcations that get markers: ["PD", "LP"]. Default all; of a diagram all but grazing contacts.
     size
         "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
 
@@ -74,11 +81,14 @@ def plot(
     """
     if quantity is None:
         quantity = "amplitude" if harmonic is None else "harmonic"
-    view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
     given = _several(curves)
+    if len(given) == 1:  # a diagram says how it is drawn
+        labels = getattr(given[0], "legend", None) if labels is None else labels
+        marks = getattr(given[0], "marks", None) if marks is None else marks
+    view = View(
+        quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel, xlim, ylim, marks
+    )
     datasets = [dataset for item in given for dataset in _datasets(item, view)]
-    if labels is None and len(given) == 1:
-        labels = getattr(given[0], "legend", None)
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
 
 

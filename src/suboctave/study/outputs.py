@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -15,6 +15,7 @@ from suboctave.analysis import BifurcationDiagram, Branch, Results
 from suboctave.analysis.contacts import check_element, gapped_elements
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.results import Result
+from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_response
@@ -54,6 +55,9 @@ class FigureSection(BaseModel):
     unit: str | None = None
     xlabel: str | None = None
     ylabel: str | None = None
+    xlim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    ylim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    marks: list[str] | None = None
 
     @property
     def view(self) -> View:
@@ -118,6 +122,10 @@ def check_outputs(
             size_in_inches(figure.size)
         except InputError as error:
             yield (*key, "size"), str(error)
+        events = [event.name for step in steps for event in getattr(step, "events", ())]
+        for i, kind in enumerate(figure.marks or ()):
+            if kind not in (*KINDS, *events):
+                yield (*key, "marks", i), f"neither a kind nor an event{suggest(kind, [*KINDS, *events])}"
         try:
             view = figure.view
         except InputError as error:
@@ -244,13 +252,15 @@ def _drawn(figure: FigureSection, results: Results, curves: Mapping[str, list[Br
     if not chosen:
         return False
     labels: list[str] | None = None
+    view = figure.view
+    if len(chosen) == 1 and figure.marks is None and isinstance(diagram := results[chosen[0]], BifurcationDiagram):
+        view = replace(view, marks=diagram.marks)
     if figure.labels is not None:
         every = figure.analyses or [name for name in results if name in curves]
         told = {name: figure.labels[every.index(name)] for name in chosen}
         labels = [label for name in chosen for label in _labels(results[name], curves[name], told[name])]
     elif len(chosen) == 1 and isinstance(diagram := results[chosen[0]], BifurcationDiagram):
         labels = diagram.legend
-    view = figure.view
     readings = [] if view.variable == "amplitude" else [view.variable]
     drawn = [branch.to_xarray(readings=readings) for name in chosen for branch in curves[name]]
     plot_response(drawn, path, x=figure.x, labels=labels, title=figure.title, size=figure.size, view=view)
