@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         switch_branch,
         verify,
     )
-    from suboctave.bifurcation import Bifurcation
+    from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
     from suboctave.errors import ConvergenceError, InputError, SuboctaveError
     from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
@@ -97,6 +97,9 @@ _HOME = {
     "Event": "suboctave.continuation",
     "Bifurcation": "suboctave.bifurcation",
     "BifurcationDiagram": "suboctave.analysis",
+    "BorderedSystem": "suboctave.bifurcation",
+    "ExtendedSystem": "suboctave.bifurcation",
+    "Alcorta2019": "suboctave.bifurcation",
     "Branch": "suboctave.analysis",
     "bifurcation_diagram": "suboctave.analysis",
     "find_subharmonics": "suboctave.analysis",
@@ -125,11 +128,13 @@ _HOME = {
 
 __all__ = [
     "AdaptiveHarmonics",
+    "Alcorta2019",
     "Arbitration",
     "BaseAcceleration",
     "BaseDisplacement",
     "Bifurcation",
     "BifurcationDiagram",
+    "BorderedSystem",
     "Branch",
     "Callable",
     "Clearance",
@@ -140,6 +145,7 @@ __all__ = [
     "Element",
     "Event",
     "Expression",
+    "ExtendedSystem",
     "Freeplay",
     "Gravity",
     "HarmonicBalance",

@@ -68,6 +68,18 @@ def test_the_cascade_of_the_strongly_forced_oscillator(strong, reference):
     assert four.arrives.omega == pytest.approx(two.bifurcations["PD"][1].omega, abs=1e-6)
 
 
+@pytest.mark.slow
+def test_no_event_hides_right_beside_the_parent(strong):
+    """The 8T branch doubles again within 4e-4 of where it begins: seen from either end, the events are the same."""
+    four = so.switch_branch(strong[1].bifurcations["PD"][0])
+    one, other = (so.switch_branch(item) for item in four.bifurcations["PD"])
+    found = [sorted((b.kind, b.omega) for b in branch.bifurcations) for branch in (one, other)]
+    assert [kind for kind, _ in found[0]] == [kind for kind, _ in found[1]] == ["LP", "PD", "PD"]
+    np.testing.assert_allclose([w for _, w in found[0]], [w for _, w in found[1]], atol=1e-5)
+    for item in one.bifurcations:
+        assert so.verify(item).agrees
+
+
 @pytest.mark.parametrize("max_step", [0.03, 0.1, 0.3, pytest.param(0.005, marks=pytest.mark.slow)])
 def test_no_doubling_of_the_2T_branch_is_missed_at_any_step(strong, max_step):
     """AUTO-07p misses the one at 2.448 from steps of 0.01 up."""

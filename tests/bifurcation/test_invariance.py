@@ -47,6 +47,12 @@ def test_units(original, length, time, mass):
     assert omega[:, 1] == pytest.approx(omega[:, 0], rel=TOLERANCE)
     assert np.array(size)[:, 1] == pytest.approx(np.array(size)[:, 0], rel=TOLERANCE)
     assert other.multipliers == pytest.approx(first.multipliers, abs=1e-6)
+    # eps has the unit length * sqrt(mass), omega that of 1 / time
+    for a, b in zip(first.bifurcations, other.bifurcations, strict=True):
+        assert b.criticality == a.criticality
+        if a.normal_form is not None:
+            curvature = b.normal_form["curvature"] * time * length**2 * mass
+            assert curvature == pytest.approx(a.normal_form["curvature"], rel=1e-4)
 
 
 def two_masses(order):
@@ -74,6 +80,7 @@ def test_degrees_of_freedom_exchanged():
         assert b.omega == pytest.approx(a.omega, rel=TOLERANCE)
         assert b.amplitude == pytest.approx(a.amplitude, rel=TOLERANCE)
         assert b.orbit.coefficients[:, ::-1] == pytest.approx(a.orbit.coefficients, abs=TOLERANCE)
+        assert b.criticality == a.criticality
 
 
 def test_absorber_exchanged_and_in_other_units():

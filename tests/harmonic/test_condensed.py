@@ -49,6 +49,23 @@ def test_same_bifurcations(full, condensed_branch):
         np.testing.assert_allclose(one.multipliers[0], other.multipliers[0], atol=1e-5)
 
 
+def test_same_normal_forms(full, condensed_branch):
+    """The null vectors have other lengths: per squared amplitude at the common mass they foretell the same."""
+    compared = 0
+    for one, other in zip(condensed_branch.bifurcations, full.bifurcations, strict=True):
+        assert one.criticality == other.criticality
+        if one.normal_form is None:
+            continue
+        sizes = []
+        for b in (one, other):
+            weight = b.orbit.balance.scales()[1]
+            phi = b.null_vectors.right.reshape(-1, len(weight)) * weight
+            sizes.append(b.normal_form["curvature"] / np.sum(np.abs(phi[:, 0]) ** 2))
+        assert sizes[0] == pytest.approx(sizes[1], rel=1e-7)
+        compared += 1
+    assert compared
+
+
 def test_same_curve(full, condensed_branch):
     """Every point of the condensed curve, expanded to all DOFs, solves the full model; stability is the same there."""
     balance = HarmonicBalance(chain(0), HarmonicBasis(9))
@@ -103,3 +120,19 @@ def test_time_integration_is_refused(condensed):
     system = chain(0)
     with pytest.raises(ConvergenceError, match="full system"):
         so.frequency_response(system, (0.3, 0.4), harmonics=5, linear=condensed(system, [0]), start=[0.1, 0.0])
+
+
+@pytest.mark.parametrize("formulation", ["extended", "alcorta2019"])
+def test_period_doublings_by_other_formulations(condensed, formulation):
+    """Extended systems see the linear part through its contract alone, as the bordered one does."""
+    k = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+    elements = [so.ElasticStop(0, 9.0, 0.0), so.CubicSpring(0, 0.1)]
+    system = so.System(np.eye(3), 0.03 * k, 2.0 * k, elements, [so.HarmonicLoad(0, 0.5)])
+    linear = condensed(system, [0], 2.0)
+    whole = so.frequency_response(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
+    small = so.frequency_response(system, (2.8, 2.2), 9, linear=linear, formulation=formulation).bifurcations["PD"]
+    default = so.frequency_response(system, (2.8, 2.2), 9, linear=linear).bifurcations["PD"]
+    assert len(default) == 2
+    assert [b.omega for b in small] == pytest.approx([b.omega for b in whole], abs=1e-9)
+    exact = formulation == "extended"
+    assert [b.omega for b in small] == pytest.approx([b.omega for b in default], abs=1e-10 if exact else 1e-4)

@@ -10,7 +10,10 @@ import pytest
 
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator, parameter_gradient
+from suboctave.harmonic.perturbation_rate import operator_along
 from suboctave.harmonic.second import Direction, second_derivative
+from suboctave.harmonic.third import Multilinear, third_derivative
+from suboctave.harmonic.waves import Frequencies, Waves
 from suboctave.model import (
     CubicSpring,
     ElasticStop,
@@ -23,6 +26,7 @@ from suboctave.model import (
 )
 
 OMEGA, KAPPA, STEP = 1.7, 0.37, 1e-6
+INPUTS = {"x": 0, "y": (0, 1)}
 NAMES = ("zeta", "alpha", "Kc", "j", "p", "k")
 
 
@@ -45,7 +49,7 @@ def own_nodes():
     ]
 
 
-@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes"])
+@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes", "rough"])
 def elements(request, damper):
     cubic = CubicSpring(0, "alpha")
     return {
@@ -53,6 +57,11 @@ def elements(request, damper):
         "regularised": [cubic, *contacts(30.0)],
         # in one direction with the cubic spring, and in one of its own
         "own nodes": own_nodes(),
+        # powers of a half and a corner at one place, the latter moving in time
+        "rough": [
+            cubic,
+            Expression(0, "Kc*max(x - j, 0)**1.5*(1 + zeta*x') + p*abs(x - j)*(1 + y)*(1 + 0.3*cos(omega*t))", INPUTS),
+        ],
         "damper": [cubic, damper(0, ["zeta*k", "j**2"]), damper((0, 1), ["alpha", "zeta+Kc*j"])],
     }[request.param]
 
@@ -144,6 +153,62 @@ def test_second_derivative(case, first, second):
     assert np.abs(swapped - exact).max() <= 1e-11 * np.abs(exact).max()
 
 
+def test_third_derivative(case):
+    a, b, c = case.vector(), case.vector(), case.vector()
+    exact = third_derivative(case.state, a, b, c)
+    assert_close_fourth(exact, lambda h: second_derivative(case.at(h, c), Direction(a), Direction(b)))
+    swapped = third_derivative(case.state, c, b, a)
+    assert np.abs(swapped - exact).max() <= 1e-10 * np.abs(exact).max()
+
+
+def assert_close_fourth(exact, function, step=1e-5):
+    """By differences of fourth order: second derivatives are steep beside a crossing that is nearly tangent."""
+    rough = (8.0 * (function(step) - function(-step)) - (function(2 * step) - function(-2 * step))) / (12.0 * step)
+    assert np.abs(rough - exact).max() <= 1e-6 * np.abs(exact).max()
+
+
+def test_derivatives_along_waves_are_those_of_a_longer_basis(case):
+    """Half-odd perturbations and their products live in the basis of twice the period."""
+    basis = case.basis
+    doubled = HarmonicBasis(2 * basis.harmonics + 1, 2 * basis.nu)
+    balance = case.balance.with_basis(doubled).settle(basis.resized(case.x, doubled), OMEGA)
+    state = balance.at(basis.resized(case.x, doubled), OMEGA)
+    half, longer = case.random.normal(size=(2, 2 * basis.harmonics + 2, 2)), []
+    for one in half:
+        full = np.zeros((doubled.size, 2))
+        full[1::4], full[2::4] = one[::2], one[1::2]
+        longer.append(full)
+    forms, (a, b) = Multilinear(case.state), (Waves.of(case.state, Kind.HALF, one) for one in half)
+    second = forms.second(a, b, Frequencies.of(case.state, Kind.INTEGER)).vector(Kind.INTEGER)
+    expected = second_derivative(state, Direction(longer[0]), Direction(longer[1])).reshape(-1, 2)
+    whole = np.concatenate(([0], np.arange(3, doubled.size, 4), np.arange(4, doubled.size, 4)))
+    found = basis.resized(second.reshape(-1, 2), doubled)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found[whole], expected[whole], rtol=0, atol=1e-6 * size)
+    assert np.abs(np.delete(expected, whole, axis=0)).max() <= 1e-6 * size
+    third = forms.third(a, b, b, Frequencies.of(case.state, Kind.HALF)).vector(Kind.HALF).reshape(-1, 2)
+    expected = third_derivative(state, longer[0], longer[1], longer[1]).reshape(-1, 2)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(third[::2], expected[1::4], rtol=0, atol=1e-6 * size)
+    np.testing.assert_allclose(third[1::2], expected[2::4], rtol=0, atol=1e-6 * size)
+
+
+def test_derivatives_along_waves_of_any_shift(case):
+    """For a real direction a, R''[a, b] is the change of J_kappa b, and the third derivative that of R''."""
+    n = case.balance.dimension
+    da, dc = case.vector(), case.vector()
+    b = case.random.normal(size=n) + 1j * case.random.normal(size=n)
+    at = Frequencies.of(case.state, Kind.FREE, KAPPA)
+    a, c = (Waves.of(case.state, Kind.INTEGER, one) for one in (da, dc))
+
+    def second(state):
+        return Multilinear(state).second(a, Waves.of(state, Kind.FREE, b, KAPPA), at).vector(Kind.FREE)
+
+    assert_close(second(case.state), lambda h: operator(case.at(h, da), Kind.FREE, KAPPA) @ b)
+    third = Multilinear(case.state).third(a, Waves.of(case.state, Kind.FREE, b, KAPPA), c, at).vector(Kind.FREE)
+    assert_close_fourth(third, lambda h: second(case.at(h, dc)))
+
+
 @pytest.mark.parametrize("kind", Kind)
 def test_gradient_of_a_bilinear_form_of_the_operator(case, kind):
     n = operator(case.state, kind, KAPPA).shape[0]
@@ -194,3 +259,28 @@ def test_the_flexibility_form_has_the_same_motions(elements, condensed):
     flexible = np.einsum("kij,kj->ki", other.state.compliance, c)
     s = other.state.residual.reshape(plain.x.shape)
     np.testing.assert_allclose(np.vstack((s[:1], s[1::2] - 1j * s[2::2])), flexible, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_operator_along_directions(case, kind):
+    """`(J_kappa v)'` along several directions at once; for J_0 it is R'' as well, for all the adjoint gradient."""
+    state = case.state
+    matrix = operator(state, kind, KAPPA)
+    right = case.random.normal(size=len(matrix)).astype(matrix.dtype)
+    if kind is Kind.FREE:
+        right = right + 1j * case.random.normal(size=len(matrix))
+    rates = [{"omega": 0.7}, {"omega": -0.2, **dict.fromkeys(NAMES, 0.3)}]
+    shifts = [0.4, -0.9]
+    directions = [Direction(case.vector(), change) for change in rates]
+    found = operator_along(state, kind, right, directions, KAPPA, shifts)
+    for column, a, shift in zip(found.T, directions, shifts, strict=True):
+        assert_close(column, lambda h: operator(case.at(h, a.x, **a.rates), kind, KAPPA + h * shift) @ right)  # noqa: B023
+    left = case.random.normal(size=len(matrix))
+    adjoint = bilinear_gradient(state, kind, left, right, ("omega", *NAMES), KAPPA)
+    for column, a, shift in zip(found.T, directions, shifts, strict=True):
+        expected = (adjoint.x * a.x).sum() + sum(adjoint.rates[name] * rate for name, rate in a.rates.items())
+        expected += adjoint.kappa * shift if kind is Kind.FREE else 0.0
+        assert left @ column == pytest.approx(expected, rel=1e-9)
+    if kind is Kind.INTEGER:
+        along = Direction(right.reshape(case.basis.size, 2))
+        np.testing.assert_allclose(found[:, 1], second_derivative(state, directions[1], along), rtol=1e-9, atol=1e-9)

@@ -20,6 +20,8 @@ CASES = [
     ("e*cos(omega*t)**2*x*v", None, PolynomialSampling),
     ("k*max(x - j, 0)*(1 + c*v)", None, CornerSampling),
     ("k*max(x - j, 0)**3.5", None, CornerSampling),
+    ("k*max(x - j, 0)**1.5*(1 + c*v)", None, CornerSampling),
+    ("k*max(x - j, 0)**(1 + p)", None, CornerSampling),
     ("c*v*abs(v) + k*(x - j)*heaviside(x - j)", None, CornerSampling),
     ("k*min(x, 2*x)", None, CornerSampling),
     (

@@ -155,6 +155,7 @@ def test_parameters_may_differ_for_one_analysis(study_file, by_script):
 def test_every_option_of_a_verb_reaches_it(study_file):
     options = (
         'max_step = 0.3\nharmonics = { minimum = 7, tolerance = 1e-6 }\nstability = "hill"\n'
+        'formulation = { name = "alcorta2019", test = "determinant" }\n'
         "newton = { iterations = 9 }\nstepping = { deviation = 0.02 }\nobserve = 0\nstart = [0.05, 0.0]\n"
     )
     text = DUFFING.split('[[analyses]]\nname = "up"')[0].replace("max_step = 0.2\n", options)
@@ -168,6 +169,7 @@ def test_every_option_of_a_verb_reaches_it(study_file):
         max_step=0.3,
         newton=so.NewtonOptions(iterations=9),
         stability="hill",
+        formulation=so.Alcorta2019("determinant"),
         stepping=so.SteppingOptions(deviation=0.02),
         observe=0,
     )

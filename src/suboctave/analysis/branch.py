@@ -174,6 +174,14 @@ class Branch(BranchReadings):
         """Highest multiple of the base frequency used at each point, shape (len,), int."""
         return np.array([p.orbit.basis.harmonics for p in self.points])
 
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """How many of the harmonics from 1 up to the highest are unknowns at each point, shape (len,), int.
+
+        Of sub-harmonic motions some may be left out (`HarmonicBasis.kept`).
+        """
+        return np.array([p.orbit.basis.count // 2 for p in self.points])
+
     def to_xarray(self, readings: Iterable[str] | bool = False) -> xarray.Dataset:
         """The branch as a labelled dataset: points, events, and what produced them.
 
@@ -242,6 +250,7 @@ class Branch(BranchReadings):
                     "amplitude": item.amplitude,
                     "multiplier_real": mu.real,
                     "multiplier_imag": mu.imag,
+                    "criticality": item.criticality or "",
                     "residual": item.residual,
                     "uncertainty": item.uncertainty,
                     "arclength": item.arclength,
@@ -249,7 +258,7 @@ class Branch(BranchReadings):
                 }
             )
         names = ["kind", "omega", *self.system.parameters, "amplitude", "multiplier_real", "multiplier_imag"]
-        names += ["residual", "uncertainty", "arclength", "remark"]
+        names += ["criticality", "residual", "uncertainty", "arclength", "remark"]
         return pd.DataFrame(rows, columns=list(dict.fromkeys(names)))  # a parameter may bear one of these names
 
     def plot(self, path: Any = None, **options: Any) -> Any:

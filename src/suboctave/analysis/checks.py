@@ -11,6 +11,7 @@ import numpy as np
 
 from suboctave.analysis.trace import Settings
 from suboctave.bifurcation import KINDS
+from suboctave.bifurcation.formulation import Formulation, formulation_of
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import InputError, suggest
 from suboctave.model.coupled import CoupledElement
@@ -29,6 +30,7 @@ def make_settings(
     newton: NewtonOptions | None,
     stepping: SteppingOptions | None,
     stability: StabilityMethod | str | None,
+    formulation: Formulation | str | None = None,
 ) -> Settings:
     """The options of a verb, checked; raises InputError."""
     events = tuple(events) if isinstance(events, Iterable) and not isinstance(events, Event) else (events,)
@@ -53,7 +55,8 @@ def make_settings(
     dof = system.observed_dof if observe is None else observe
     if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
         raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
-    return Settings(newton or NewtonOptions(), stepping, method_of(stability), events, int(dof))
+    solving = formulation_of(formulation)
+    return Settings(newton or NewtonOptions(), stepping, method_of(stability), events, int(dof), solving)
 
 
 def check_system(system: System, omega: tuple[float, ...] = ()) -> None:

@@ -13,32 +13,34 @@ class CountCheck:
 
     def __init__(self) -> None:
         self._last: Sample | None = None
-        self._since: list[Bifurcation] = []
+        self._since: list[str] = []
 
     def noted(self, item: Bifurcation) -> None:
         """A bifurcation that belongs to no step."""
-        self._since.append(item)
+        self._since.append(item.kind)
 
-    def complaint(self, sample: Sample, found: list[Bifurcation]) -> tuple[Sample, Sample, str] | None:
+    def complaint(
+        self, sample: Sample, found: list[Bifurcation], unseen: bool = False
+    ) -> tuple[Sample, Sample, str] | None:
         """From where to where, and a sentence, if the count has changed by what the bifurcations since the last clear
-        sample do not explain.
+        sample do not explain; `unseen`: a period doubling, too, which is accounted for elsewhere.
         """
-        self._since += found
+        self._since += [item.kind for item in found] + ["PD"] * unseen
         if not sample.floquet.decided or sample.floquet.clearance < _NEAR_CIRCLE:
             return None
-        last, items = self._last, self._since
+        last, kinds = self._last, self._since
         self._last, self._since = sample, []
         if last is None:
             return None
-        odd = sum(item.kind in ("LP", "PD", "BP") for item in items)
-        pairs = sum(item.kind == "NS" for item in items)
+        odd = sum(kind in ("LP", "PD", "BP") for kind in kinds)
+        pairs = kinds.count("NS")
         before, now = last.floquet.unstable, sample.floquet.unstable
         change = abs(now - before)
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
-        branching = any(item.kind == "BP" for item in items)
+        branching = "BP" in kinds
         if change <= odd + 2 * pairs and (branching or (change - odd) % 2 == 0):
             return None
-        names = ", ".join(item.kind for item in items) or "none"
+        names = ", ".join(kinds) or "none"
         return (
             last,
             sample,

@@ -20,6 +20,7 @@ from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.tree import BifurcationDiagram, DiagramBranch
 from suboctave.analysis.verbs import frequency_response
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.formulation import Formulation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.system import System
@@ -65,6 +66,7 @@ def bifurcation_diagram(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
     keeper: Keeper | None = None,
 ) -> BifurcationDiagram:
     """The response over a range of frequencies with all branches that bifurcate from it, each once.
@@ -108,6 +110,7 @@ def bifurcation_diagram(
             "newton": newton,
             "stepping": stepping,
             "stability": stability,
+            "formulation": formulation,
             "progress": told.of(0, 1, "T") if report is not None else None,
         }
         first = None if keeper is None else keeper.known(-1, -1)

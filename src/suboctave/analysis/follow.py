@@ -9,16 +9,17 @@ import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.count import CountCheck
+from suboctave.analysis.doublings import DoublingWatch
 from suboctave.analysis.guard import Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
-from suboctave.analysis.junction import Meeting, meeting
+from suboctave.analysis.junction import UNSEEN, Meeting, meeting
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.analysis.trace import Settings, Trace
 from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings, touches
-from suboctave.bifurcation.kinds import BRANCH_POINT, PERIOD_DOUBLING, changes
+from suboctave.bifurcation.kinds import BRANCH_POINT, PERIOD_DOUBLING, changes, solved_by
 from suboctave.bifurcation.layer import behind_their_grazings
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.events import locate_zero
@@ -58,6 +59,11 @@ class _Follower:
         self._turned: Bifurcation | None = None
         self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
         self._done = 0.0
+        self._kinds = solved_by(settings.formulation)
+        #: looks for period doublings in place of det J_half, where the formulation has tests of its own
+        self._watch: DoublingWatch | None = None
+        if settings.formulation.doubling_test is not None:
+            self._watch = DoublingWatch(settings.formulation.doubling_test, self._kinds["PD"], self._located)
         #: somebody who keeps what has been found (`progress.reporting`)
         self._found: Callable[[Trace], None] | None = getattr(settings.report, "found", None)
 
@@ -74,6 +80,7 @@ class _Follower:
             where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
             trace.ended = f"interrupted at {where}; what was computed is kept"
+        self._say_missed(everything=True)
         trace.audit = self._guard.audit
         if self._turned is not None and self.settings.half:
             trace.end_at(self._turned)
@@ -115,6 +122,8 @@ class _Follower:
         met, arclength = self._meeting[2], self.trace.points[-1].arclength
         if self.march.ended != met.arrival.reason:
             return None
+        if met.doubt:
+            self.trace.warnings.append(f"{met.doubt}: {UNSEEN}")
         return solved_bifurcation(
             PERIOD_DOUBLING, met.solution, met.parent, self.settings.observe, self.trace.warnings, arclength
         )
@@ -151,6 +160,8 @@ class _Follower:
             if _at_rest(self.previous) or _at_rest(sample):
                 self._guard.forget()
                 self._hidden.forget()
+                if self._watch is not None:
+                    self._watch.forget()
             else:
                 again = self._solved_again(self.previous, sample)
                 if again is not self.previous:
@@ -182,11 +193,10 @@ class _Follower:
     def _look_behind(self, passage: Passage) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
         for stretch in self._hidden.passed(passage.inside):
-            found = pair_in(stretch, self.settings.newton, self._sample)
+            found = [] if self._watch else pair_in(stretch, self.settings.newton, self._sample)
             for located, a, b in found:
                 item = self._bifurcation(located, a, b)
-                if not any(same_event(item, known) for known in self.trace.bifurcations[-4:]):
-                    insort(self.trace.bifurcations, item, key=lambda known: known.arclength)
+                if self._insert(item):
                     self._count.noted(item)
             if len(found) < 2:
                 self._guard.doubt(stretch.before, stretch.behind, REASON)
@@ -198,7 +208,9 @@ class _Follower:
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""
-        kinds = [*changes(old, again), *touches(old, again)[0]]
+        kinds = [*self._changes(old, again), *touches(old, again)[0]]
+        if self._watch is not None:
+            self._watch.moved(old, again)
         if not kinds:
             return
         points = self.trace.points
@@ -218,7 +230,7 @@ class _Follower:
         branch_point: Located | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
         resting = _at_rest(a) or _at_rest(b)
-        for kind in () if resting else changes(a, b):
+        for kind in () if resting else self._changes(a, b):
             located = self._located(kind, a, b)
             if kind is BRANCH_POINT:
                 branch_point = located
@@ -234,17 +246,39 @@ class _Follower:
                     self._guard.doubt(a, b, _NOT_FOUND[kind.name])
                 continue
             found.append((located.fraction, self._bifurcation(located, a, b)))
-        complaint = self._count.complaint(b, [item for _, item in found])
+        known = [item for _, item in found]
+        complaint = self._count.complaint(b, known, unseen=self._watch is not None and PERIOD_DOUBLING.changed(a, b))
         if not resting and self._guard.grazes(a, b):
             for touched in locate_grazings(a, b, self.settings.newton, self._sample, guess_at):
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self._guard.doubt(*complaint)
         self.trace.bifurcations += behind_their_grazings(found)
+        if self._watch is not None and not resting:
+            for located, p, q in self._watch.passed(a, b):
+                self._insert(self._bifurcation(located, p, q))
+            self._say_missed()
         for event in self.settings.events:
             crossed = self._event(event, a, b)
             if crossed is not None:
                 self.trace.events.append(crossed)
+
+    def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
+        """The kinds to look for between two samples, as they are to be solved for."""
+        found = [self._kinds[kind.name] for kind in changes(a, b)]
+        return found if self._watch is None else [kind for kind in found if kind.name != "PD"]
+
+    def _insert(self, item: Bifurcation) -> bool:
+        """Put a bifurcation into its place on the branch unless it is there already."""
+        known = any(same_event(item, other) for other in self.trace.bifurcations[-4:])
+        if not known:
+            insort(self.trace.bifurcations, item, key=lambda other: other.arclength)
+        return not known
+
+    def _say_missed(self, everything: bool = False) -> None:
+        """What the published test function of period doublings has passed without notice."""
+        for p, q, reason in self._watch.missed(everything) if self._watch is not None else ():
+            self._guard.doubt(p, q, reason)
 
     def _located(self, kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
         """A bifurcation between two neighbours; a branch point only if its system was solved."""

@@ -7,7 +7,7 @@ would grow again with the opposite sign, the same motions shifted by the parent'
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,13 +21,20 @@ from suboctave.continuation.march import Arrival, CurvePoint, between, make_poin
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.basis import ComplexArray, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind
+from suboctave.stability import FloquetResult, floquet_multipliers
 
-__all__ = ["Junction", "Meeting", "beside", "meeting"]
+__all__ = ["UNSEEN", "Beside", "Junction", "Meeting", "beside", "doubled", "emanating", "meeting", "period_name"]
 
-#: distance from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
-BESIDE = 3e-3
+#: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
+_DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6)
+#: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
+_CLOSE = 0.02
+#: way in the scaled parameter that rounding may account for
+_STILL = 1e-12
+#: what a branch says where it could not look closer
+UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
 
 
 @dataclass(frozen=True)
@@ -71,11 +78,15 @@ def period_name(nu: int) -> str:
 
 @dataclass(frozen=True)
 class Meeting:
-    """A branch that meets its parent: the parent's period doubling, its curve, and how the march ends."""
+    """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
+
+    `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere.
+    """
 
     solution: Singular
     parent: ResponseCurve
     arrival: Arrival
+    doubt: str = ""
 
 
 def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | None:
@@ -103,8 +114,8 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     if place is None or not -1e-6 <= place <= 1.0 + 1e-6 or found.vectors is None:
         return None
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
-    last = _last_before(a, b, there, found, parent, newton)
-    return Meeting(found, parent.with_balance(state.balance), Arrival(last, reason))
+    last, doubt = _last_before(a, b, there, found, newton)
+    return Meeting(found, parent.with_balance(state.balance), Arrival(last, reason), doubt)
 
 
 def _turned(a: CurvePoint, b: CurvePoint, curve: ResponseCurve) -> bool:
@@ -114,7 +125,7 @@ def _turned(a: CurvePoint, b: CurvePoint, curve: ResponseCurve) -> bool:
 
 def _odd(u: Array, curve: ResponseCurve, weights: Array) -> Array:
     """The weighted coefficients of odd order."""
-    shaped = (weights * u)[:-1].reshape(curve.balance.basis.size, -1)
+    shaped = curve.balance.spread((weights * u)[:-1])
     return np.concatenate((shaped[1::4].ravel(), shaped[2::4].ravel()))
 
 
@@ -133,36 +144,28 @@ def _even_rows(parent: HarmonicBasis) -> Array:
 
 
 def _last_before(
-    a: CurvePoint, b: CurvePoint, there: Array, found: Singular, parent: ResponseCurve, newton: NewtonOptions
-) -> CurvePoint | None:
-    """The curve's point right before it meets its parent, None if a neighbour is that."""
+    a: CurvePoint, b: CurvePoint, there: Array, found: Singular, newton: NewtonOptions
+) -> tuple[CurvePoint | None, str]:
+    """The curve's point right before it meets its parent, None if a neighbour is that; and what remains in doubt."""
     curve = b.curve
     assert isinstance(curve, ResponseCurve)
+    expected = doubled(found.floquet)
     before = curve.transfer(a.u, a.curve)
-    way = length(b.weights * (there - before))
-    if way <= 2.0 * BESIDE:
-        return None
+    if length(b.weights * (there - before)) <= 2.0 * _DISTANCES[0] and _near(
+        a, a.curve.transfer(there, curve), expected
+    ):
+        return None, ""
     direction = emanating(found, curve, b.weights)
     if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
         direction = -direction
-    point = beside(curve, there, direction, b.weights, BESIDE, newton)
-    if point is None:
-        return None
+    close = beside(curve, there, direction, b.weights, expected, newton)
+    if close is None:
+        return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
+    point = close.point
     arclength = a.arclength + length(b.weights * (point.u - before))
-    if (b.weights * point.tangent) @ (b.weights * (there - point.u)) < 0.0:
-        return CurvePoint(
-            curve,
-            point.u,
-            -point.tangent,
-            point.weights,
-            point.evaluation,
-            -point.orientation,
-            arclength,
-            point.iterations,
-        )
-    return CurvePoint(
-        curve, point.u, point.tangent, point.weights, point.evaluation, point.orientation, arclength, point.iterations
-    )
+    turn = -1.0 if (b.weights * point.tangent) @ (b.weights * (there - point.u)) < 0.0 else 1.0
+    last = replace(point, tangent=turn * point.tangent, orientation=turn * point.orientation, arclength=arclength)
+    return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
 
 
 def emanating(found: Singular, curve: ResponseCurve, weights: Array) -> Array:
@@ -175,20 +178,66 @@ def emanating(found: Singular, curve: ResponseCurve, weights: Array) -> Array:
     return direction / length(weights * direction)
 
 
-def beside(
-    curve: ResponseCurve, u: Array, direction: Array, weights: Array, distance: float, newton: NewtonOptions
-) -> CurvePoint | None:
-    """The curve's point at a distance from a bifurcation in a direction, with its tangent pointing away from it.
+@dataclass(frozen=True)
+class Beside:
+    """A point right beside a bifurcation; `smooth`: whether nothing else happens to the motion on the way there."""
 
-    The closer, the less regular the equations: larger distances are tried where the first one does not converge.
+    point: CurvePoint
+    smooth: bool
+
+
+def beside(
+    curve: ResponseCurve,
+    u: Array,
+    direction: Array,
+    weights: Array,
+    multipliers: ComplexArray,
+    newton: NewtonOptions,
+) -> Beside | None:
+    """The curve's point close to a bifurcation in a direction, with its tangent pointing away; None if there is none.
+
+    On the way the critical multiplier leaves +1 and the parameter its value, both with the square of the distance.
+    Where the point's multipliers are not those of the bifurcation, or the curve turns, something else happens in
+    between: then one closer to it is taken.
+
+    Parameters
+    ----------
+    u, direction
+        The bifurcation, and where the curve leaves it, of unit length in `weights`.
+    multipliers
+        Of the motion at u, over the period of the curve's motions.
     """
     row = weights * direction
     row = row / length(row)
-    for factor in (1.0, 0.3, 3.0, 0.1, 10.0):
+    closest: CurvePoint | None = None
+    for distance in _DISTANCES:
         try:
-            solved = correct(curve, u + factor * distance * direction, row, weights, newton)
+            solved = correct(curve, u + distance * direction, row, weights, newton)
+            if not 0.5 <= length(weights * (solved.u - u)) / distance <= 2.0:
+                continue
+            point = make_point(solved, curve, solved.u - u, 0.0)
         except ConvergenceError:
             continue
-        if 0.5 <= length(weights * (solved.u - u)) / (factor * distance) <= 2.0:
-            return make_point(solved, curve, solved.u - u, 0.0)
-    return None
+        closest = point
+        if _near(point, u, multipliers):
+            return Beside(point, True)
+    return None if closest is None else Beside(closest, False)
+
+
+def _near(point: CurvePoint, u: Array, multipliers: ComplexArray) -> bool:
+    """Whether a point has the multipliers of a bifurcation close by, and lies before any turn of its curve."""
+    curve, index = point.curve, point.curve.parameter
+    assert isinstance(curve, ResponseCurve)
+    x, omega, values = curve.split(point.u)
+    found = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
+    expected = np.sort_complex(multipliers)
+    apart = np.abs(found - expected) / np.maximum(1.0, np.abs(expected))
+    moved = (point.u[index] - u[index]) * point.weights[index]
+    turned = moved * point.tangent[index] < 0.0 and abs(moved) > _STILL
+    return float(apart.max()) <= _CLOSE and not turned
+
+
+def doubled(result: FloquetResult) -> ComplexArray:
+    """Multipliers over twice the period."""
+    squared: ComplexArray = result.multipliers**2
+    return squared

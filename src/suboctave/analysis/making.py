@@ -12,6 +12,7 @@ from suboctave.analysis.junction import Junction
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.trace import Settings, Trace
 from suboctave.analysis.verdicts import with_verdicts
+from suboctave.bifurcation.formulation import written
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
@@ -65,6 +66,7 @@ def options_of(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
         "stability": _written(settings.stability),
+        "formulation": written(settings.formulation),
         "observe": settings.observe,
     }
 

@@ -46,6 +46,9 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         solution = behind_grazing(located.kind, guess) or _with_more_harmonics(located, a, b)
     if solution is None:
         orbit = orbit_of(located.sample)
+        if orbit.basis.kept is not None:
+            state = _filled(located.sample.state, curve)
+            orbit = as_orbit(state, _residual(state), truncation(state), curve)
         beside = grazing_beside(guess)
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
         width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
@@ -92,7 +95,7 @@ def solved_bifurcation(
     guess = _guess_from(solution, curve, size)
     state = solution.state
     layer = layer_of(kind, solution, guess)
-    orbit = as_orbit(state, solution.residual, truncation(state), curve)
+    orbit = as_orbit(state, solution.balance_residual, truncation(state), curve)
     return Bifurcation(
         kind.name,
         orbit,
@@ -136,7 +139,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     state, size = sample.state, b.point.arclength - a.point.arclength
     while curve.adaptive is not None:
         basis = next_harmonics(state, curve.adaptive)
-        if basis.harmonics <= state.basis.harmonics:
+        if basis.count <= state.basis.count:
             break
         x = state.basis.resized(state.x, basis)
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
@@ -165,13 +168,13 @@ def _refined(
     for _ in range(8):
         state = solution.state
         basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
-        if basis.harmonics <= state.basis.harmonics:
+        if basis.count <= state.basis.count:
             # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
             critical = kind.critical(solution)
             if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
                 break
             basis = next_harmonics(state, adaptive)
-        if basis.harmonics <= state.basis.harmonics:
+        if basis.count <= state.basis.count:
             break
         x = state.completed.basis.resized(state.completed.x, basis)
         # more harmonics need more samples of a law that tells nothing of itself
@@ -194,7 +197,21 @@ def _refined(
             break
         coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
         solution = better
+    if solution.state.basis.kept is not None:
+        state = _filled(solution.state, curve)
+        solution = replace(solution, state=state, residual=max(solution.residual, _residual(state)))
     return solution, coarser
+
+
+def _filled(state: BalanceState, curve: ResponseCurve) -> BalanceState:
+    """A motion in the equations of all harmonics up to its highest: what is quoted leaves none out."""
+    if state.basis.kept is None:
+        return state
+    return curve.with_basis(state.basis.filled).balance.at(state.x, state.omega, state.values)
+
+
+def _residual(state: BalanceState) -> float:
+    return state.residual_size() / max(state.force_scale(), float(np.finfo(float).tiny))
 
 
 def orbit_of(sample: Sample) -> PeriodicOrbit:

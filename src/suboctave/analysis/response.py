@@ -101,7 +101,7 @@ class ResponseCurve:
         self.adaptive = adaptive
         self.reference = reference
         self._cache = {balance.basis: balance} if cache is None else cache
-        self._weight = np.tile(balance.scales()[0], balance.basis.size)
+        self._weight = balance.per_unknown(balance.scales()[0])
 
     @property
     def parameter(self) -> int:
@@ -110,15 +110,15 @@ class ResponseCurve:
 
     def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
-        x = u[:-1].reshape(self.balance.basis.size, self.balance.size)
+        x = self.balance.spread(u[:-1])
         if self.name == "omega":
             return x, float(u[-1]), self.balance.values
         return x, self.omega, {**self.balance.values, self.name: float(u[-1])}
 
     def join(self, x: Array, value: float) -> Array:
-        """The vector u of coefficients and a value of the free parameter."""
-        u = np.empty(x.size + 1)
-        u[:-1] = x.ravel()
+        """The vector u of coefficients (2 H + 1, size) and a value of the free parameter."""
+        u = np.empty(self.balance.dimension + 1)
+        u[:-1] = self.balance.packed(x)
         u[-1] = value
         return u
 
@@ -138,7 +138,10 @@ class ResponseCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
-        return self.join(self._weight / size, 1.0 / self.span)
+        weights = np.empty(len(u))
+        weights[:-1] = self._weight / size
+        weights[-1] = 1.0 / self.span
+        return weights
 
     def unit(self, weights: Array) -> float:
         """Size of a motion that counts as one in `weights`."""
@@ -149,7 +152,7 @@ class ResponseCurve:
         assert isinstance(evaluation, ResponseEvaluation)
         basis = self.balance.basis
         if self.adaptive is not None:
-            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance)
+            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance, dropping=True)
         balance = self._in_basis(basis)
         x, omega, values = self.split(u)
         if balance is not self.balance:
@@ -176,7 +179,7 @@ class ResponseCurve:
         assert isinstance(origin, ResponseCurve)
         if origin.balance is self.balance or origin.balance.basis == self.balance.basis:
             return u
-        x = u[:-1].reshape(origin.balance.basis.size, -1)
+        x = origin.balance.spread(u[:-1])
         return self.join(origin.balance.basis.resized(x, self.balance.basis), u[-1])
 
     def images(self, u: Array) -> list[Array]:
@@ -184,7 +187,7 @@ class ResponseCurve:
         basis = self.balance.basis
         if basis.nu == 1:
             return [u]
-        x = u[:-1].reshape(basis.size, -1)
+        x = self.balance.spread(u[:-1])
         shifted = []
         for shift in range(basis.nu):
             angle = 2.0 * np.pi * shift * np.arange(1, basis.harmonics + 1)[:, None] / basis.nu

@@ -20,6 +20,7 @@ from suboctave.analysis.junction import Junction
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.normal_form import NormalForm
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
 
 __all__ = ["branch_from_dataset", "branch_to_dataset"]
 
-_CLASSES = {c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult)}
+_CLASSES = {
+    c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
+}
 _MEANINGS = {
     "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
     "event_coefficients": "the same of the motions at events",
@@ -171,6 +174,7 @@ class _Discretisation:
     samples: tuple[int | None, ...]
     values: tuple[float, ...]
     linear: str
+    kept: tuple[int, ...] | None = None
 
 
 class _Writer:
@@ -212,6 +216,7 @@ class _Writer:
                 tuple(None if s is None else int(s) for s in balance.samples),
                 tuple(float(balance.values[name]) for name in balance.system.parameters),
                 "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
+                balance.basis.kept,
             )
             self._balances[id(balance)] = (balance, self._shared.setdefault(shared, len(self._shared)))
         return self._balances[id(balance)][1]
@@ -240,6 +245,7 @@ class _Writer:
             "truncation": orbit.truncation,
             "orbit": self._orbit(orbit, event.floquet),
             "null": None,
+            "normal_form": event.normal_form,
             "context": None,
         }
         if event.null_vectors is not None:
@@ -289,7 +295,7 @@ class _Reader:
             )
         values = dict(zip(system.parameters, d.values, strict=True))
         given = linear if d.linear else None
-        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu), values, given, d.samples)
+        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu, d.kept), values, given, d.samples)
 
     def array(self, name: str) -> np.ndarray:
         if name in self.dataset:
@@ -351,9 +357,10 @@ class _Reader:
             if said["context"] is not None:
                 context = dict(self.tables["contexts"][said["context"]])
                 context["system"] = self.systems[context["system"]]
-            events.append(
-                Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **said["fields"])
-            )
+            # older files hold no normal forms: they are computed when asked for
+            fields = {name: value for name, value in said["fields"].items() if name != "criticality"}
+            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            events.append(event.with_normal_form(said["normal_form"]) if "normal_form" in said else event)
         return events
 
 

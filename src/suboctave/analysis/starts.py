@@ -204,7 +204,7 @@ class _HomotopyEvaluation:
         force = self.state.force
         if self.state.compliance is not None:
             force = apply_blocks(self.state.compliance, force)
-        return force.ravel()
+        return self.state.balance.packed(force)
 
     @cached_property
     def jacobian(self) -> Array:
@@ -217,7 +217,7 @@ class _HomotopyEvaluation:
         """Residual in units of the forces that balance."""
         state = self.state
         weight = state.balance.scales()[1]
-        size = float(np.linalg.norm(self.residual.reshape(state.x.shape) * weight))
+        size = float(np.linalg.norm(self.residual.reshape(-1, state.balance.size) * weight))
         return size / max(state.force_scale(), np.finfo(float).tiny)
 
 

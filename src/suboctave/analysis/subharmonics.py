@@ -27,6 +27,7 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.trace import Settings, Trace
 from suboctave.analysis.ways import both_ways
+from suboctave.bifurcation.formulation import Formulation
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
@@ -93,6 +94,7 @@ def find_subharmonics(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
     linear: LinearPart | None = None,
 ) -> list[Branch]:
     """Branches of motions of `subharmonic` load periods in a range of frequencies, each once; empty if none is found.
@@ -114,7 +116,7 @@ def find_subharmonics(
     check_system(system, (first, last))
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
-    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
     low, high = min(first, last), max(first, last)
     curve = make_curve(system, "omega", first, high - low, harmonics, order, linear)
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
@@ -235,7 +237,7 @@ def _motions(
             if not _lasts(curve, solved.u) or any(_same(curve, solved.u, u) for u in met):
                 continue
             met.append(solved.u)
-            x = solved.u[:-1].reshape(curve.balance.basis.size, -1)
+            x = curve.split(solved.u)[0]
             start = PeriodicOrbit(curve.balance, x, float(value), curve.balance.values, 0.0, 0.0, curve.adaptive)
             try:
                 point = start_point(curve, float(value), start, settings.newton)
@@ -250,7 +252,7 @@ def _motions(
 def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array]:
     """Free vibrations at a fraction of omega on top of the linear response."""
     balance = curve.balance
-    basis, nu = balance.basis, balance.basis.nu
+    nu = balance.basis.nu
     base = linear_response(curve, value)
     for k in range(1, nu):
         if gcd(k, nu) > 1:
@@ -258,7 +260,7 @@ def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array
         for shape in _modes(balance)[: seeds.modes]:
             for amplitude in _resonant(curve, value, value * k / nu, shape):
                 for phase in 2.0 * np.pi * k / nu * np.arange(seeds.phases) / seeds.phases:
-                    x = base[:-1].reshape(basis.size, -1).copy()
+                    x = curve.split(base)[0].copy()
                     x[2 * k - 1] += amplitude * np.cos(phase) * shape
                     x[2 * k] += amplitude * np.sin(phase) * shape
                     yield curve.join(x, value)
@@ -299,7 +301,7 @@ def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array
 def _lasts(curve: ResponseCurve, u: Array) -> bool:
     """Whether a motion has the period of its basis: for every prime factor something that a shorter one lacks."""
     basis = curve.balance.basis
-    x = u[:-1].reshape(basis.size, -1) * curve.balance.scales()[0]
+    x = curve.split(u)[0] * curve.balance.scales()[0]
     whole = length(x)
     k = np.arange(1, basis.harmonics + 1)
     for factor in _primes(basis.nu):

@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_bounds, make_settings
 from suboctave.analysis.follow import follow, same_event
-from suboctave.analysis.junction import BESIDE, beside, emanating, period_name
+from suboctave.analysis.junction import UNSEEN, beside, doubled, emanating, period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
@@ -24,6 +24,7 @@ from suboctave.analysis.trace import Settings, Trace
 from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation
+from suboctave.bifurcation.formulation import FORMULATIONS, Formulation
 from suboctave.bifurcation.solve import Singular
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
@@ -63,6 +64,7 @@ def switch_branch(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
 ) -> Branch:
     """The branch that leaves another one at a period doubling or a branch point, with stability and bifurcations.
 
@@ -119,6 +121,7 @@ def switch_branch(
         known.newton if newton is None else newton,
         known.stepping if stepping is None else stepping,
         known.stability if stability is None else stability,
+        known.formulation if formulation is None else formulation,
     )
     settings = replace(settings, half=kind == "BP" and side is not None)
     nu = orbit.basis.nu * (2 if kind == "PD" else 1)
@@ -180,6 +183,12 @@ class Inherited:
         known = self.options.get("stability")
         return known if known in METHODS else None
 
+    @property
+    def formulation(self) -> str | None:
+        """The name of the formulation; one with options of its own has to be given again."""
+        known = self.options.get("formulation")
+        return known if known in FORMULATIONS else None
+
 
 def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
     """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
@@ -202,7 +211,9 @@ def _doubled(
     _scale_from_rest(curve, u, direction)
     weights = curve.weights(u, 0.0)
     direction *= sign / length(weights * direction)
-    trace = follow(_away(item, curve, u, direction, weights, settings), 0.0, bounds, settings)
+    notes: list[str] = []
+    trace = follow(_away(item, curve, u, direction, weights, settings, notes), 0.0, bounds, settings)
+    trace.warnings[:0] = notes
     trace.departs = replace(item, arclength=0.0)
     return trace
 
@@ -229,7 +240,9 @@ def _other(
     if side is None:
         return leave_along(item, curve, direction, ahead, bounds, settings)
     weights = curve.weights(u, 0.0)
-    trace = follow(_away(item, curve, u, side * direction, weights, settings), 0.0, bounds, settings)
+    notes: list[str] = []
+    trace = follow(_away(item, curve, u, side * direction, weights, settings, notes), 0.0, bounds, settings)
+    trace.warnings[:0] = notes
     trace.departs = replace(item, arclength=0.0)
     return trace
 
@@ -246,9 +259,11 @@ def leave_along(
     if direction[-1] * ahead < 0.0:
         direction = -direction
     curve, u, weights = _at(item, curve)
-    one, other = (_away(item, curve, u, sign * direction, weights, settings) for sign in (1.0, -1.0))
+    notes: list[str] = []
+    one, other = (_away(item, curve, u, sign * direction, weights, settings, notes) for sign in (1.0, -1.0))
     here = replace(item, tangent=tuple(direction.tolist()))
     forward = follow(one, 0.0, bounds, settings)
+    forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
         met = [b for b in forward.bifurcations if not same_event(b, here)]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
@@ -269,11 +284,12 @@ def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
     x, omega, values = curve.split(u)
     balance = curve.balance.settle(x, omega, values)
     rest, phi = balance.at(x, omega, values), direction[:-1]
-    slope = rest.force_jacobian @ phi
+    change = balance.spread(phi)
+    slope = rest.force_jacobian @ change.ravel()
     linear = length(rest.linear_jacobian @ phi) + length(slope)
-    unit = curve.size(curve.join(phi.reshape(x.shape), 0.0))
+    unit = curve.size(curve.join(change, 0.0))
     for size in np.geomspace(1e-12, 1e12, 145):
-        bent = balance.at(x + size * phi.reshape(x.shape), omega, values).force - rest.force
+        bent = balance.at(x + size * change, omega, values).force - rest.force
         if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > _NOTICED * linear:
             break
     curve.reference = 100.0 * float(size) * unit
@@ -300,22 +316,35 @@ def _oriented(direction: Array, weights: Array) -> Array:
 
 
 def _away(
-    item: Bifurcation, curve: ResponseCurve, u: Array, direction: Array, weights: Array, settings: Settings
+    item: Bifurcation,
+    curve: ResponseCurve,
+    u: Array,
+    direction: Array,
+    weights: Array,
+    settings: Settings,
+    notes: list[str],
 ) -> CurvePoint:
     """The first point of a branch that leaves a bifurcation, in the harmonics that it needs."""
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
-    point = beside(curve, u, direction / length(weights * direction), weights, BESIDE, settings.newton)
-    if point is None:
+    expected = doubled(item.floquet) if item.kind == "PD" else item.floquet.multipliers
+    close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton)
+    if close is None:
         raise ConvergenceError(
             f"no point of the other branch was found beside the {KINDS[item.kind]} at {curve.where(u)}: its direction "
             "may be too close to that of the first branch, or too few harmonics are kept"
         )
+    point = close.point
     adapted = curve.adapted(point.u, point.evaluation)
-    if adapted is curve:
-        return point
-    assert isinstance(adapted, ResponseCurve)
-    u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
-    weights = adapted.weights(u, 0.0)
-    again = beside(adapted, u, direction / length(weights * direction), weights, BESIDE, settings.newton)
-    return point if again is None else again
+    if adapted is not curve:
+        assert isinstance(adapted, ResponseCurve)
+        u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
+        weights = adapted.weights(u, 0.0)
+        direction = direction / length(weights * direction)
+        again = beside(adapted, u, direction, weights, expected, settings.newton)
+        if again is not None and (again.smooth or not close.smooth):
+            close = again
+    if not close.smooth:
+        own = close.point.curve
+        notes.append(f"between {curve.where(u)} and {own.where(close.point.u)}: {UNSEEN}")
+    return close.point

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from suboctave.analysis.audit import Audit
 from suboctave.analysis.branch import BranchPoint
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.stability import StabilityMethod
 
@@ -23,6 +24,7 @@ class Settings:
     stability: StabilityMethod
     events: Sequence[Event] = ()
     observe: int = 0
+    formulation: Formulation = BORDERED
     report: Callable[[float, str], None] | None = None
     #: end at a branch point at which the branch turns back: where it meets the one that it bifurcates from
     half: bool = False

@@ -18,6 +18,7 @@ from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.analysis.switching import leave_along, own_linear_part
 from suboctave.analysis.ways import both_ways
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.formulation import Formulation
 from suboctave.compiled import computation_begins
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
@@ -43,6 +44,7 @@ def frequency_response(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
     linear: LinearPart | None = None,
 ) -> Branch:
     """The periodic response over a range of frequencies, with stability and located bifurcations.
@@ -76,6 +78,11 @@ def frequency_response(
         names "monodromy", "hill", "koopman-hill". Default: the monodromy matrix, and where a verdict is open the others
         as witnesses (`Arbitration()`). Where the method is not applicable the monodromy matrix stands in, and the
         branch says so.
+    formulation
+        By which system bifurcations are located: "bordered" (default), "extended", or "alcorta2019", the published
+        formulation of period doublings with its own test functions; or `BorderedSystem()`, `ExtendedSystem()`,
+        `Alcorta2019(test="multiplier")`, where test may be "determinant". All find the same bifurcations, the last
+        only those that its test shows: what it misses is in the branch's warnings.
     linear
         Another linear part with this system's elements and loads, for example one condensed onto the DOFs that
         elements touch.
@@ -89,7 +96,7 @@ def frequency_response(
     """
     first, last = check_range("omega", omega, positive=True)
     check_system(system, (first, last))
-    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
@@ -132,6 +139,7 @@ def continue_branch(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
 ) -> Branch:
     """A curve of periodic motions along any one parameter: amplitude sweeps, S-curves, or omega from a given motion.
 
@@ -154,9 +162,8 @@ def continue_branch(
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     if isinstance(start, System):
-        return _from_system(
-            start, parameter, bounds, omega, harmonics, max_step, observe, events, progress, newton, stepping, stability
-        )
+        options = (harmonics, max_step, observe, events, progress, newton, stepping, stability, formulation)
+        return _from_system(start, parameter, bounds, omega, *options)
     if not isinstance(start, PeriodicOrbit):
         raise InputError(
             "continue_branch starts from a PeriodicOrbit, a point of a branch, a Bifurcation or a System, "
@@ -173,7 +180,7 @@ def continue_branch(
         raise InputError(f"the motion has {parameter}={value:.6g}, outside the bounds ({low:g}, {high:g})")
     if omega is not None and not (is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
         raise InputError(f"omega={omega!r} differs from the motion's {orbit.omega:g}: leave it out")
-    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
     basis = orbit.basis
     wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     curve = make_curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, own_linear_part(orbit))
@@ -203,6 +210,7 @@ def _from_system(
     newton: NewtonOptions | None,
     stepping: SteppingOptions | None,
     stability: StabilityMethod | str | None,
+    formulation: Formulation | str | None,
 ) -> Branch:
     wanted: Harmonics = "adaptive" if harmonics is None else harmonics
     if parameter == "omega":
@@ -219,13 +227,14 @@ def _from_system(
             newton=newton,
             stepping=stepping,
             stability=stability,
+            formulation=formulation,
         )
     check_system(system)
     check_parameter(system, parameter)
     first, last = check_bounds(system, parameter, bounds)
     if omega is None or not (is_number(omega) and omega > 0.0):
         raise InputError(f"continue_branch from a system along {parameter!r} needs a positive omega=, got {omega!r}")
-    settings = make_settings(system, max_step, observe, events, newton, stepping, stability)
+    settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
     curve = make_curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
     # a size of the motion to scale with, should the branch begin at rest
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))

@@ -10,9 +10,11 @@ from typing import Any, overload
 import numpy as np
 
 from suboctave.bifurcation.contact import GrazingContact
-from suboctave.errors import InputError, suggest
+from suboctave.bifurcation.normal_form import FORMS, NormalForm, normal_form
+from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.lazy import lazy
 from suboctave.stability import FloquetResult
 
 #: what the kinds mean
@@ -57,8 +59,6 @@ class Bifurcation:
     contact
         The contact that grazes: at a grazing its own; at another bifurcation the one whose beginning or end brings it
         about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.
-    criticality
-        "supercritical", "subcritical" or None where it has not been computed.
     tangent
         At a branch point: the direction (dX, d parameter) of the branch that it was found on; else None.
     arclength
@@ -74,7 +74,6 @@ class Bifurcation:
     null_vectors: Any = None
     kappa: float = 0.0
     uncertainty: float = 0.0
-    criticality: str | None = None
     arclength: float = 0.0
     contact: GrazingContact | None = None
     tangent: tuple[float, ...] | None = field(default=None, repr=False)
@@ -101,9 +100,36 @@ class Bifurcation:
         """How far behind its grazing it lies in the free parameter."""
         return self.parameter(self.parameter_name) - contact.parameter
 
+    @lazy
+    def normal_form(self) -> NormalForm | None:
+        """The coefficients of its normal form (`suboctave.bifurcation.normal_form`), computed when first asked for.
+
+        None for contacts and events, for a bifurcation that could only be bracketed, and for one in the layer behind a
+        grazing, where the equations are not smooth.
+        """
+        if self.kind not in FORMS or self.null_vectors is None or self.contact is not None:
+            return None
+        try:
+            return normal_form(self.kind, self.orbit.state(), self.null_vectors, self.parameter_name, self.kappa)
+        except (ConvergenceError, np.linalg.LinAlgError):
+            return None
+
+    @property
+    def criticality(self) -> str | None:
+        """Whether it is "supercritical" or "subcritical"; None at limit points and where that is not certain."""
+        return None if self.normal_form is None else self.normal_form.criticality
+
+    def with_normal_form(self, form: NormalForm | None) -> Bifurcation:
+        """The same with a normal form that is known: it is not computed again."""
+        other = replace(self)
+        other.__dict__["normal_form"] = form
+        return other
+
     def seen_backwards(self, arclength: float) -> Bifurcation:
         """The same on the curve followed the other way."""
-        return replace(self, arclength=arclength, contact=None if self.contact is None else self.contact.backwards())
+        contact = None if self.contact is None else self.contact.backwards()
+        other = replace(self, arclength=arclength, contact=contact)
+        return other.with_normal_form(self.normal_form) if "normal_form" in self.__dict__ else other
 
     @property
     def omega(self) -> float:
@@ -160,6 +186,8 @@ class Bifurcation:
         elif self.contact is not None:
             nature = "discontinuous, at" if self.discontinuous else f"{self._behind(self.contact):+.1e} from"
             words.append(f"{nature} the grazing of {self.contact.label}")
+        if self.normal_form is not None and self.normal_form.remark:
+            words.append(self.normal_form.remark)
         return "; ".join(words)
 
     def __repr__(self) -> str:
@@ -210,7 +238,7 @@ class BifurcationList:
         head = (
             f"{'kind':<{width}}{'omega':>13}"
             + (f"{free:>14}" if free else "")
-            + f"{'amplitude':>14}{'multiplier':>24}{'residual':>11}"
+            + f"{'amplitude':>14}{'multiplier':>24}{'criticality':>15}{'residual':>11}"
         )
         rows = [head]
         for b in self.met:
@@ -218,8 +246,9 @@ class BifurcationList:
             text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
             extra = f"{b.parameter(free):>14.8g}" if free else ""
             remark = b.remark()
+            label = b.criticality or ("" if b.normal_form is None else b.normal_form.shape)
             rows.append(
-                f"{b.kind:<{width}}{b.omega:>13.9g}{extra}{b.amplitude:>14.7g}{text:>24}{b.residual:>11.1e}"
+                f"{b.kind:<{width}}{b.omega:>13.9g}{extra}{b.amplitude:>14.7g}{text:>24}{label:>15}{b.residual:>11.1e}"
                 + (f"  {remark}" if remark else "")
             )
         return "\n".join(rows)

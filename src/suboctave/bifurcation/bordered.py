@@ -31,7 +31,7 @@ from suboctave.harmonic.state import BalanceState
 @dataclass(frozen=True)
 class NullVectors:
     """Null vectors of a (nearly) singular operator with its mass weights: right `v`, left `u`, unit length in
-    weighted form.
+    weighted form; with zeros at harmonics that the motion's basis leaves out.
     """
 
     right: np.ndarray
@@ -70,15 +70,15 @@ class Bordered:
     scale: np.ndarray
 
     def gradient(self, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
-        """Derivatives of g by the coefficients (dimension,), by names, by kappa."""
+        """Derivatives of g by the unknown coefficients (dimension,), by names, by kappa."""
         slope = bilinear_gradient(self.state, self.kind, self.left, self.right, names, self.kappa)
-        return -slope.x.ravel(), {k: -r for k, r in slope.rates.items()}, -slope.kappa
+        return -self.state.balance.packed(slope.x), {k: -r for k, r in slope.rates.items()}, -slope.kappa
 
     @property
     def vectors(self) -> NullVectors:
         """Bordering vectors for the next iteration: the present null vectors, weighted and of unit length."""
         v, u = self.right / self.scale, self.left / self.scale
-        return NullVectors(v / np.linalg.norm(v), u / np.linalg.norm(u))
+        return _complete(self.state, self.kind, v / np.linalg.norm(v), u / np.linalg.norm(u))
 
     @property
     def relative(self) -> float:
@@ -98,7 +98,7 @@ def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations
     matrix, _ = weighted_operator(state, kind, kappa)
     factor = Factor.of(matrix)
     if factor.singular:
-        return _by_svd(matrix)
+        return _complete(state, kind, *_by_svd(matrix))
     # a start with a component along everything, the same in every run
     n = matrix.shape[0]
     left = (np.cos(np.arange(n) * 1.7 + 0.3) / (1.0 + np.arange(n) / 8.0)).astype(matrix.dtype)
@@ -107,13 +107,27 @@ def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations
         right = factor.solve(left / np.linalg.norm(left))
         left = factor.solve(right / np.linalg.norm(right), adjoint=True)
     if not (np.isfinite(left).all() and np.isfinite(right).all()):
-        return _by_svd(matrix)
-    return NullVectors(right / np.linalg.norm(right), left / np.linalg.norm(left))
+        return _complete(state, kind, *_by_svd(matrix))
+    return _complete(state, kind, right / np.linalg.norm(right), left / np.linalg.norm(left))
 
 
-def _by_svd(matrix: np.ndarray) -> NullVectors:
+def _by_svd(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u, _, vh = np.linalg.svd(matrix)
-    return NullVectors(vh[-1].conj(), u[:, -1])
+    return vh[-1].conj(), u[:, -1]
+
+
+def _complete(state: BalanceState, kind: Kind, right: np.ndarray, left: np.ndarray) -> NullVectors:
+    """Vectors of the operator's size with all harmonics up to the highest."""
+    if kind is Kind.INTEGER and state.basis.kept is not None:
+        right, left = (state.balance.spread(v).ravel() for v in (right, left))
+    return NullVectors(right, left)
+
+
+def of_equations(state: BalanceState, kind: Kind, vector: np.ndarray) -> np.ndarray:
+    """A null vector with all harmonics as one of the operator's size."""
+    if kind is Kind.INTEGER and state.basis.kept is not None:
+        return state.balance.packed(vector.reshape(state.x.shape))
+    return vector
 
 
 def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:
@@ -122,8 +136,8 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
     n = matrix.shape[0]
     extended = np.zeros((n + 1, n + 1), dtype=matrix.dtype, order="F")
     extended[:n, :n] = matrix
-    extended[:n, n] = borders.left
-    extended[n, :n] = borders.right.conj()
+    extended[:n, n] = of_equations(state, kind, borders.left)
+    extended[n, :n] = of_equations(state, kind, borders.right).conj()
     # the operator's own size balances the bordering rows
     size = state.omega**2
     extended[:n, n] *= size
@@ -146,4 +160,4 @@ def at_values(values: Mapping[str, float], name: str, value: float, omega: float
 
 def residual_scale(state: BalanceState) -> Array:
     """Weights of residual entries, shape (dimension,): 1/sqrt(mass) per DOF."""
-    return np.tile(state.balance.scales()[1], state.basis.size)
+    return state.balance.per_unknown(state.balance.scales()[1])

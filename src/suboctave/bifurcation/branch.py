@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import Bordered, bordered, null_vectors
+from suboctave.bifurcation.bordered import Bordered, bordered, null_vectors, of_equations
 from suboctave.bifurcation.solve import NOTHING, Extra, Guess, Singular, newton
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
@@ -33,7 +33,7 @@ def locate_branch_point(guess: Guess) -> Singular:
     """
     borders = null_vectors(guess.state(), Kind.INTEGER)
     start = guess.state()
-    rows = 1.0 / np.tile(start.balance.scales()[1], start.basis.size)
+    rows = 1.0 / start.balance.per_unknown(start.balance.scales()[1])
     # at rest nothing balances, yet a motion may branch off (parametric excitation)
     force = max(start.force_scale(), guess.size * guess.omega**2, NOTHING)
     last: list[Bordered] = []
@@ -41,7 +41,7 @@ def locate_branch_point(guess: Guess) -> Singular:
     def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
         nonlocal borders
         b = bordered(state, Kind.INTEGER, borders)
-        column = force * borders.left * rows
+        column = force * of_equations(state, Kind.INTEGER, borders.left) * rows
         borders = b.vectors
         last[:] = [b]
         gx, rates, _ = b.gradient((guess.name,))
@@ -56,7 +56,7 @@ def locate_branch_point(guess: Guess) -> Singular:
         value = float(b.left @ slope)
         size = force / guess.span
         by = float((first.rates[guess.name] - second.rates[guess.name]).real)
-        extras.append(Extra.of(value, (first.x - second.x).real.ravel(), by, (0.0,), size))
+        extras.append(Extra.of(value, state.balance.packed((first.x - second.x).real), by, (0.0,), size))
         return extras, extra[0] * column, [column]
 
     state, extra, residual, iterations = newton(guess, np.zeros(1), np.ones(1), augmentation)

@@ -80,12 +80,12 @@ def branching_equation(
     """
     borders = null_vectors(state, Kind.INTEGER) if vectors is None else vectors
     border = bordered(state, Kind.INTEGER, borders)
-    scale, shape = border.scale, state.x.shape
-    phi = border.vectors.right * scale * (motion_size(state) or 1.0)
+    scale, spread = border.scale, state.balance.spread
+    phi = border.right / length(border.right / scale) * (motion_size(state) or 1.0)
     psi = border.left
     slope = state.residual_by(name)
     v = -border.factor.solve(np.append(slope * scale, 0.0))[:-1] * scale * span
-    along, across = Direction(v.reshape(shape), {name: span}), Direction(phi.reshape(shape))
+    along, across = Direction(spread(v), {name: span}), Direction(spread(phi))
     a, b, c = (
         float(psi @ second_derivative(state, *pair)) for pair in ((along, along), (along, across), (across, across))
     )

@@ -144,7 +144,7 @@ def locate_near(
 
 def _unknowns(found: Singular, guess: Guess) -> Array:
     value = found.state.omega if guess.name == "omega" else found.state.values[guess.name]
-    return np.append(found.state.x.ravel(), value)
+    return np.append(found.state.unknowns, value)
 
 
 def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:

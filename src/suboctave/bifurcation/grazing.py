@@ -125,7 +125,7 @@ class Touch(BifurcationKind):
             level = levels(state.local(self.element))[self.index]
             rate = level_rate(state, self.element, self.index, guess.name)
             size = float(np.linalg.norm(u))
-            gradients = [np.multiply.outer(row, direction).ravel() for row in rows[:2]]
+            gradients = [state.balance.packed(np.multiply.outer(row, direction)) for row in rows[:2]]
             return (
                 [
                     Extra.of(value - level, gradients[0], -rate, (slope,), size),
@@ -143,7 +143,8 @@ class Touch(BifurcationKind):
         state = found.state
         value = _rows(state.basis.harmonics, found.tau)[0]
         direction = _direction(state, self.element)
-        return np.append(np.multiply.outer(value, direction), -level_rate(state, self.element, self.index, name))
+        by_x = state.balance.packed(np.multiply.outer(value, direction))
+        return np.append(by_x, -level_rate(state, self.element, self.index, name))
 
     def _nearest(self, state: BalanceState) -> float:
         """The instant of the extremum of the right kind nearest to tau."""
@@ -256,7 +257,7 @@ def _solved(
     except ConvergenceError:
         return None
     value = found.state.omega if guess.name == "omega" else found.state.values[guess.name]
-    fraction = position(a.point, b.point, np.append(found.state.x.ravel(), value))
+    fraction = position(a.point, b.point, np.append(found.state.unknowns, value))
     return None if fraction is None or not -0.05 <= fraction <= 1.05 else (found, fraction)
 
 

@@ -21,8 +21,9 @@ import numpy as np
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.branch import locate_branch_point
 from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
-from suboctave.bifurcation.solve import Guess, Singular, locate_singular
+from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
@@ -72,10 +73,14 @@ class Sample:
 
 
 class BifurcationKind(ABC):
-    """One kind of bifurcation of periodic motions."""
+    """One kind of bifurcation of periodic motions, and the formulation by which it is solved for."""
 
     name: str
     operator: Kind
+    formulation: Formulation = BORDERED
+
+    def __init__(self, formulation: Formulation = BORDERED) -> None:
+        self.formulation = formulation
 
     @abstractmethod
     def changed(self, a: Sample, b: Sample) -> bool:
@@ -91,7 +96,7 @@ class BifurcationKind(ABC):
 
     def solve(self, guess: Guess) -> Singular:
         """Solve the bifurcation's system from a guess."""
-        return locate_singular(guess, self.operator)
+        return self.formulation.locate(guess, self.operator)
 
     def genuine(self, found: Singular, guess: Guess) -> bool:
         """Whether a solution of the system really is of this kind."""
@@ -216,6 +221,14 @@ BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER = (
 )
 #: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork
 ALL_KINDS: tuple[BifurcationKind, ...] = (BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER)
+
+
+def solved_by(formulation: Formulation) -> dict[str, BifurcationKind]:
+    """The kinds by name, to be solved for by a formulation; a branch point is always solved for in the same way."""
+    if formulation == BORDERED:
+        return {kind.name: kind for kind in ALL_KINDS}
+    kinds = (BRANCH_POINT, LimitPoint(formulation), PeriodDoubling(formulation), NeimarkSacker(formulation))
+    return {kind.name: kind for kind in kinds}
 
 
 def changes(a: Sample, b: Sample) -> list[BifurcationKind]:

@@ -177,7 +177,7 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     for way in _STARTS:
         u = _vector(state, guess) + way * tangent / weights
         omega, values = at_values(state.values, guess.name, float(u[-1]), state.omega)
-        yield replace(guess, balance=state.balance, x=u[:-1].reshape(state.x.shape), omega=omega, values=values)
+        yield replace(guess, balance=state.balance, x=state.balance.spread(u[:-1]), omega=omega, values=values)
 
 
 def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
@@ -212,12 +212,12 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
 
 def _weights(state: BalanceState, guess: Guess) -> Array:
     """Scaled arclength: coefficients in units of the motion, the free parameter in units of its range."""
-    weight = np.tile(state.balance.scales()[0], state.basis.size)
+    weight = state.balance.per_unknown(state.balance.scales()[0])
     return np.append(weight / max(motion_size(state), np.finfo(float).tiny), 1.0 / guess.span)
 
 
 def _vector(state: BalanceState, guess: Guess) -> Array:
-    return np.append(state.x.ravel(), state.omega if guess.name == "omega" else state.values[guess.name])
+    return np.append(state.unknowns, state.omega if guess.name == "omega" else state.values[guess.name])
 
 
 def _chord(a: BalanceState, b: BalanceState, guess: Guess) -> Array:
@@ -242,7 +242,7 @@ def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: G
 
     state = found.state
     omega, values = at_values(state.values, guess.name, float(start[-1]), state.omega)
-    begin = replace(guess, balance=state.balance, x=start[:-1].reshape(state.x.shape), omega=omega, values=values)
+    begin = replace(guess, balance=state.balance, x=state.balance.spread(start[:-1]), omega=omega, values=values)
     try:
         quarter, *_ = newton(begin, np.zeros(0), np.zeros(0), augmentation)
     except ConvergenceError:

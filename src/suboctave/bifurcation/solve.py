@@ -74,6 +74,11 @@ class Singular:
     residual: float
     iterations: int
 
+    @property
+    def balance_residual(self) -> float:
+        """Residual of the equations of motion alone, in units of the forces that balance."""
+        return min(self.residual, self.state.residual_size() / max(self.state.force_scale(), NOTHING))
+
     @lazy
     def floquet(self) -> FloquetResult:
         """Its multipliers."""
@@ -132,8 +137,8 @@ def newton(
         a residual that rounding of its unknowns explains has converged.
     """
     balance, n = guess.balance, guess.balance.dimension
-    x, parameter, extra = guess.x.ravel().copy(), guess.parameter, unknowns.astype(float).copy()
-    weight = np.tile(balance.scales()[0], balance.basis.size)
+    x, parameter, extra = balance.packed(guess.x).copy(), guess.parameter, unknowns.astype(float).copy()
+    weight = balance.per_unknown(balance.scales()[0])
     state = guess.state() if start is None else start
     rows = residual_scale(state)
     # a motion that shrinks to rest keeps the scales of its neighbourhood

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
@@ -51,7 +52,8 @@ class HarmonicBalance:
 
     Notes
     -----
-    X has shape (2 H + 1, size), or flattened; `size` is the number of unknown DOFs of the linear part.
+    X has shape (2 H + 1, size), or flattened; `size` is the number of unknown DOFs of the linear part. Where the basis
+    leaves harmonics out, X is zero there, and the `dimension` equations are those of the harmonics that are kept.
     """
 
     def __init__(
@@ -67,7 +69,7 @@ class HarmonicBalance:
         self.values = dict(system.parameters if values is None else values)
         self.linear: LinearPart = StructuralMatrices(system, self.values) if linear is None else linear
         self.size = self.linear.size
-        self.dimension = self.size * basis.size
+        self.dimension = self.size * basis.count
         self.samples = samples if samples is not None else (None,) * len(system.elements)
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
@@ -136,7 +138,31 @@ class HarmonicBalance:
         linear = self.linear
         if used is not self.values and any(used[n] != self.values[n] for n in self._matrix_names):
             linear = self.linear.rebuilt(used)
-        return BalanceState(self, linear, np.asarray(x, float).reshape(self.basis.size, self.size), float(omega), used)
+        return BalanceState(self, linear, self.spread(np.asarray(x, float)), float(omega), used)
+
+    def packed(self, x: Array) -> Array:
+        """Coefficients or their equations (2 H + 1, size) as those of the kept harmonics, shape (dimension,)."""
+        rows = self.basis.rows
+        return x.ravel() if rows is None else x[rows].ravel()
+
+    def spread(self, vector: Array) -> Array:
+        """The reverse of `packed`, shape (2 H + 1, size); what has that many entries already stays as it is."""
+        rows = self.basis.rows
+        if rows is None or vector.size != self.dimension:
+            return vector.reshape(self.basis.size, self.size)
+        out = np.zeros((self.basis.size, self.size), dtype=vector.dtype)
+        out[rows] = vector.reshape(-1, self.size)
+        return out
+
+    def per_unknown(self, scale: Array) -> Array:
+        """A factor per DOF, (size,), for every unknown, shape (dimension,)."""
+        return np.tile(scale, self.basis.count)
+
+    @lazy
+    def entries(self) -> NDArray[np.intp] | None:
+        """Which of the `size (2 H + 1)` coefficients are unknowns; None for all."""
+        rows = self.basis.rows
+        return None if rows is None else (rows[:, None] * self.size + np.arange(self.size)).ravel()
 
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
         """These equations with sample counts chosen for a motion and frozen from here on."""

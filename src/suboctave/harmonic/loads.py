@@ -28,6 +28,8 @@ class LoadSpectrum:
                     f"a load at {component.harmonic} omega needs harmonics={component.harmonic} or more, "
                     f"the basis ends at {basis.harmonics / basis.nu:g} omega"
                 )
+            if component.harmonic * basis.nu in basis.left_out:
+                raise InputError(f"the basis leaves out the load's harmonic at {component.harmonic} omega")
 
     def value(self, values: Mapping[str, float], size: int, names: tuple[str, ...] = ()) -> Array:
         """Coefficients (2 H + 1, size), differentiated by each of `names` (at most two; "omega" is one of them)."""

@@ -43,11 +43,11 @@ _NOTHING = np.zeros(0, dtype=complex)
 _NO_INSTANTS = np.zeros(0)
 #: Gauss-Legendre nodes on every panel between corners
 _ORDER = 16
-_GAUSS = np.polynomial.legendre.leggauss(_ORDER)
+GAUSS = np.polynomial.legendre.leggauss(_ORDER)
 #: most nodes of laws that do not tell how many they need, and the relative change at which these have settled
 _MOST, _SETTLED = 1 << 15, 1e-11
 #: how far on either side of a corner its jump is looked at, in units of the motion
-_BESIDE = 1e-9
+BESIDE = 1e-9
 
 
 class OwnElement:
@@ -148,7 +148,7 @@ class NodalForce:
         return _between(corners, 2.0 * math.pi * _ORDER / fewest, count // fewest)
 
     @lazy
-    def _corner_rows(self) -> list[tuple[int, float, Array]]:
+    def corner_rows(self) -> list[tuple[int, float, Array]]:
         """Row of q, place, instants at which the motion reaches it, for every corner of the law."""
         kind = self.kind
         if not isinstance(kind, CornerSampling):
@@ -169,7 +169,7 @@ class NodalForce:
     @property
     def corners(self) -> Array:
         """Instants at which the motion reaches corners of the law, ascending."""
-        return np.unique(np.concatenate([_NO_INSTANTS] + [at for _, _, at in self._corner_rows]))
+        return np.unique(np.concatenate([_NO_INSTANTS] + [at for _, _, at in self.corner_rows]))
 
     @lazy
     def path(self) -> tuple[Array, Array]:
@@ -237,7 +237,7 @@ class NodalForce:
     @lazy
     def _corner_rates(self) -> Array:
         """Derivatives of the corners' places by the coefficients, (corners, nc); differences, exact for linear ones."""
-        rates = np.zeros((len(self._corner_rows), len(self.c)))
+        rates = np.zeros((len(self.corner_rows), len(self.c)))
         for i, value in enumerate(self.c):
             h = 1e-3 * (abs(float(value)) or 1.0)
             places = []
@@ -255,7 +255,7 @@ class NodalForce:
     def _combs(self) -> list[Comb]:
         """The jumps of the force's slope at every corner, as Dirac functions along the motion."""
         found = []
-        for number, (row, level, at) in enumerate(self._corner_rows):
+        for number, (row, level, at) in enumerate(self.corner_rows):
             if not len(at):
                 continue
             zr, zi = np.cos(at), np.sin(at)
@@ -264,15 +264,30 @@ class NodalForce:
             if row:
                 motion = 1j * self.rate * np.arange(len(motion)) * motion
             rates = kernels.motion(motion, zr, zi)[1]
-            scale = float(np.abs(self.path[0][row]).max()) or 1.0
-            sides = []
-            for sign in (1.0, -1.0):
-                there[row] = level + sign * _BESIDE * scale
-                sides.append(self.own.law.tangent(there, phase, self.c)[1][row])
             # the rate is kept from zero where the motion only touches the corner
-            weights = (sides[0] - sides[1]) / np.maximum(np.abs(rates), 1e-12 * scale)
+            weights = self.jump(row, level, there, phase) / np.maximum(np.abs(rates), 1e-12 * self.size(row))
             found.append(Comb(number, row, zr, zi, weights))
         return found
+
+    def size(self, row: int) -> float:
+        """Largest value that a row of q takes along the motion."""
+        return float(np.abs(self.path[0][row]).max()) or 1.0
+
+    def jump(self, row: int, level: float, q: Array, theta: Array) -> Array:
+        """Jump of `f_r` where row r of q passes a corner; q (Q, N), theta (N,) at the instants of passing."""
+
+        def across(distance: float) -> Array:
+            sides = []
+            for sign in (1.0, -1.0):
+                there = q.copy()
+                there[row] = level + sign * distance * self.size(row)
+                sides.append(self.own.law.tangent(there, theta, self.c)[1][row])
+            jump: Array = sides[0] - sides[1]
+            return jump
+
+        near = across(BESIDE)
+        # half powers that begin at the corner are no jump
+        return 2.0 * near - across(4.0 * BESIDE) if getattr(self.kind, "rough", False) else near
 
     @lazy
     def bend(self) -> Bend:
@@ -324,7 +339,7 @@ def _between(corners: Array, longest: float, parts: int) -> Nodes:
     whole = np.repeat(gaps / pieces, pieces)
     number = np.arange(len(whole)) - np.repeat(first, pieces)
     low = np.repeat(corners, pieces) + number * whole
-    y, share = 0.5 + 0.5 * _GAUSS[0], 0.5 * _GAUSS[1]
+    y, share = 0.5 + 0.5 * GAUSS[0], 0.5 * GAUSS[1]
     low, whole = low[:, None], whole[:, None]
     at, weights = np.tile(y, (len(whole), 1)), whole * share
     last = first + pieces - 1

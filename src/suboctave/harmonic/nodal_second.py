@@ -171,6 +171,45 @@ def form_gradient(
     return gx, rates, kappa, response
 
 
+def operator_applied(force: NodalForce, right: ComplexArray, frequency: Array, apply: Apply) -> ComplexArray:
+    """What the element makes of a perturbation of waves (F, size), along d_out, (F,)."""
+    response = np.zeros(len(right), dtype=complex)
+    for i, d in enumerate(force.own.ins):
+        ve = right @ d
+        response = response + apply(force.stiffness(i), ve)
+        if force.own.moving:
+            response = response + apply(force.damping(i), 1j * frequency * ve)
+    return response
+
+
+def operator_along(
+    force: NodalForce,
+    right: ComplexArray,
+    frequency: Array,
+    turn: Array,
+    values: Mapping[str, float],
+    a: _Direction,
+    apply: Apply,
+) -> ComplexArray:
+    """How that changes along a direction with the perturbation kept, (F,); `turn`: changes of the frequencies."""
+    own, bend = force.own, force.bend
+    along = [right @ d for d in own.ins]
+    rows = np.array(along + ([1j * frequency * ve for ve in along] if own.moving else []))
+    waves = kernels.polynomial(rows, bend.zr, bend.zi)
+    total = np.einsum("rsn,rn,sn->n", bend.weights, _changed(force, a, bend.zr, bend.zi), waves)
+    parts = kernels.spectra(np.stack((total.real, total.imag)), bend.zr, bend.zi, len(right) - 1)
+    result: ComplexArray = parts[0] + 1j * parts[1]
+    if own.moving:
+        for i, ve in enumerate(along):
+            result = result + apply(force.damping(i), 1j * turn * ve)
+    change = coefficient_rates(own.element, values, a.parameters)
+    if change.any():
+        f_qc = np.einsum("c,cqk->qk", change, force.by_coefficients[1])
+        for r, row in enumerate(rows):
+            result = result + apply(f_qc[r], row)
+    return result
+
+
 def parameter_form_gradient(
     force: NodalForce,
     left: Array,

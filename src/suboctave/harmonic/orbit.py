@@ -150,7 +150,9 @@ class PeriodicOrbit:
 
     def __repr__(self) -> str:
         period = "" if self.basis.nu == 1 else f", {self.basis.nu}T"
+        kept = self.basis.kept
+        harmonics = str(self.basis.harmonics) if kept is None else f"{len(kept) - 1} of {self.basis.harmonics}"
         return (
-            f"PeriodicOrbit(omega={self.omega:.8g}, harmonics={self.basis.harmonics}{period}, "
+            f"PeriodicOrbit(omega={self.omega:.8g}, harmonics={harmonics}{period}, "
             f"residual={self.residual:.1e}, truncation={self.truncation:.1e})"
         )

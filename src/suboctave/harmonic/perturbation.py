@@ -49,6 +49,9 @@ class Gradient:
 def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
     """J_kappa: real of size n (2 H + 1) or n (2 H + 2), complex of size n (2 H + 1) for Kind.FREE (kappa in rad per
     time).
+
+    Where the basis leaves harmonics out, they are missing from the first alone, which is R_X: the other two have all
+    frequencies up to the motion's highest.
     """
     if kind is Kind.INTEGER:
         return state.jacobian
@@ -116,6 +119,8 @@ def bilinear_gradient(
         "omega" and parameters to differentiate by. For Kind.HALF the shift follows omega; for Kind.FREE kappa is kept.
     """
     size, basis = state.balance.size, state.basis
+    if kind is Kind.INTEGER:
+        left, right = state.balance.spread(left), state.balance.spread(right)
     u, f = _as_waves(left, kind, size, left=True)
     v, _ = _as_waves(right, kind, size, left=False)
     frequency = f * state.rate + (kappa if kind is Kind.FREE else 0.0)
@@ -258,9 +263,9 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
     """Derivative of `left . R_name` by the coefficients and by names ("omega" or parameters); `left` of the
     residual's size.
     """
-    linear, basis, size = state.linear, state.basis, state.balance.size
+    linear, basis = state.linear, state.basis
     freq, m = state.frequencies, basis.multiples[:, None, None]
-    shaped = left.reshape(basis.size, size)
+    shaped = state.balance.spread(left)
     # A_name and B_name per harmonic, transposed in the sense of the real basis: conjugate transpose of the complex
     # blocks
     if name == "omega":

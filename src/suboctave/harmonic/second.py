@@ -183,7 +183,7 @@ def second_derivative(state: BalanceState, a: Direction, b: Direction) -> Array:
             result += apply_blocks(block, vector)
     s_ab = unbalanced_second(state, a, b)
     if state.compliance is None:
-        return (result + s_ab).ravel()
+        return state.balance.packed(result + s_ab)
     result += apply_blocks(state.compliance, s_ab)
     second = _linear_second(state, a, b, True)
     if second is not None:
@@ -192,4 +192,4 @@ def second_derivative(state: BalanceState, a: Direction, b: Direction) -> Array:
         block = _linear_change(state, one, True)
         if block is not None:
             result += apply_blocks(block, unbalanced_along(state, other))
-    return result.ravel()
+    return state.balance.packed(result)

@@ -4,6 +4,22 @@ The element forces of a truncated motion have harmonics beyond the basis. To fir
 is `x_k = -A(k w0)^-1 B(k w0) f_k`; its size relative to the motion is the truncation estimate stated on every orbit.
 It is the criterion of Ferri & Leamy (AIAA 2009-2667) carried from forces to displacements, so that it is
 dimensionless and weighs what matters.
+
+The harmonics k of a motion of nu load periods fall into classes by gcd(k, nu): those of the load, those that came with
+the first doubling, with the second, and so on. In a cascade each class is smaller than the one before, and a share of
+it
+will do; `choose_harmonics` may give every class an end of its own. What must not be lost with the harmonics that are
+left out:
+
+- the place at which the motion was born. At a period doubling of its parent the youngest class vanishes, and the
+  equations within it are those of the parent's J_half. The errors of both cancel in part if they end at the same
+  frequency; one class that is shorter moves the birth, and the whole branch with it, by ten times as much as fewer
+  harmonics of all classes do. So nothing is left out while a class is small beside one that it doubles, and later only
+  what a class itself does not miss;
+- symmetries that may break. The even harmonics of a symmetric motion are empty, but J_0 sees the branch point at which
+  they appear only if they are among its unknowns. So an empty class is a young one, the load's included (2T motions of
+  parametric excitation have odd multiples only), and motions of the load's period keep all harmonics;
+- what leaves the branch by a further doubling: J_half always has all frequencies.
 """
 
 from __future__ import annotations
@@ -11,15 +27,28 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels
-from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
+from suboctave.lazy import lazy
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
 _MOST_UNKNOWNS = 4000
 #: numbers of harmonics (of omega) that adaptive selection chooses from
 _LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
+#: ratio of neighbouring highest harmonics for sub-harmonic motions, whose steps need not be whole multiples of omega
+_FINER = 1.05
+#: what a class of sub-harmonics may lack in units of itself
+_OF_ITSELF = 3e-4
+#: size of a class in units of the one that it doubles, below which it is young and all harmonics are kept
+_YOUNG = 0.05
+#: share of the tolerance that a new choice for sub-harmonic motions aims at
+_AIM = 0.6
+#: least end of a class in units of the highest harmonic
+_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -57,8 +86,16 @@ def motion_size(state: BalanceState) -> float:
 
 def truncation(state: BalanceState) -> float:
     """Estimated size of the neglected harmonics relative to the motion."""
-    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
-    return float(tail[state.basis.harmonics]) if size > 0.0 else 0.0
+    weight = state.balance.scales()[0]
+    tail, size = group_kernels.tails(state.x, state.neglected, weight)
+    if size == 0.0:
+        return 0.0
+    beyond = float(tail[state.basis.harmonics])
+    return beyond if state.basis.kept is None else math.hypot(beyond, _modulus(state.left_out * weight) / size)
+
+
+def _modulus(amplitudes: ComplexArray) -> float:
+    return float(np.linalg.norm(amplitudes))
 
 
 def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
@@ -70,10 +107,12 @@ def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
 
 
 def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
-    """A basis with half as many harmonics again, where the options allow it, else the present one."""
+    """A basis with half as many harmonics again, where the options allow it, else the present ones;
+    none of them left out.
+    """
     nu, high = state.basis.nu, state.basis.harmonics
     wanted = next((h for h in _ladder(options, state) if h * nu >= 1.5 * high), None)
-    return state.basis if wanted is None else HarmonicBasis(wanted * nu, nu)
+    return state.basis.filled if wanted is None else HarmonicBasis(wanted * nu, nu)
 
 
 def _expected(tail: Array, high: int, bound: float) -> float:
@@ -92,9 +131,17 @@ def _expected(tail: Array, high: int, bound: float) -> float:
     return float(high * (rest / bound**2) ** (1.0 / slope))
 
 
-def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
-    """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
+def choose_harmonics(
+    state: BalanceState, options: AdaptiveHarmonics, tolerance: float, dropping: bool = False
+) -> HarmonicBasis:
+    """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis.
+
+    dropping
+        Whether harmonics of sub-harmonic motions may be left out below the highest.
+    """
     basis = state.basis
+    if basis.nu > 1:
+        return _Classes(state, options).chosen(tolerance, dropping)
     nu, high = basis.nu, basis.harmonics
     tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
     if size == 0.0:
@@ -113,3 +160,104 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
         return basis if wanted * nu <= high else HarmonicBasis(wanted * nu, nu)
     wanted = sufficient(0.2 * tolerance)
     return HarmonicBasis(wanted * nu, nu) if wanted * nu < high else basis
+
+
+class _Classes:
+    """The harmonics of a sub-harmonic motion by gcd(k, nu), with what is left of each class beyond every harmonic."""
+
+    def __init__(self, state: BalanceState, options: AdaptiveHarmonics) -> None:
+        self.basis = basis = state.basis
+        nu, high = basis.nu, basis.harmonics
+        weighted = state.completed.x * state.balance.scales()[0]
+        squares = np.sum(weighted * weighted, axis=1)
+        squares = np.append(squares[0], squares[1::2] + squares[2::2])
+        #: gcd(k, nu), k = 0 .. 2 H + 1: nu for the mean and the harmonics of the load
+        self.divisor = np.gcd(np.arange(len(squares)), nu)
+        self.divisors = [d for d in range(1, nu + 1) if nu % d == 0]
+        self.size = math.sqrt(float(squares[: high + 1].sum()))
+        shares = squares / self.size**2 if self.size > 0.0 else squares
+        #: size of each class, and of what it has beyond k, relative to the motion
+        self.whole = np.array([math.sqrt(float(shares[self.divisor == d].sum())) for d in self.divisors])
+        self.beyond = np.array([_beyond(np.where(self.divisor == d, shares, 0.0)) for d in self.divisors])
+        lowest = max(options.minimum, state.balance.highest_load)
+        most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
+        rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
+        self.rungs = [r for r in rungs if lowest * nu <= r <= most * nu] or [max(lowest * nu, high)]
+        #: where each class ends now: before the first of its harmonics that is missing
+        missing = np.arange(len(squares)) > high
+        missing[basis.left_out] = True
+        self.ends = [int(np.flatnonzero(missing & (self.divisor == d))[0]) - 1 for d in self.divisors]
+
+    def chosen(self, tolerance: float, dropping: bool) -> HarmonicBasis:
+        """See `choose_harmonics`."""
+        if self.size == 0.0:
+            return self.basis
+        filling = self.basis.kept is not None and not dropping
+        if filling or self._lack(tolerance):
+            wanted = self._needed(_AIM * tolerance)
+            return self._with([max(pair) for pair in zip(wanted, self.ends, strict=True)], dropping)
+        fewer = self._with(self._needed(_AIM * tolerance), dropping)
+        return fewer if fewer.count < 0.9 * self.basis.count else self.basis
+
+    def _lack(self, tolerance: float) -> bool:
+        """Whether the present harmonics are too few, in all or in a class that is cut short."""
+        lacking = np.array([b[end] for b, end in zip(self.beyond, self.ends, strict=True)])
+        if np.linalg.norm(lacking) > tolerance:
+            return True
+        if self.basis.kept is None:
+            return False
+        cut = np.isin(self.divisors, self.divisor[self.basis.left_out])
+        return self._youngest < _YOUNG or bool(np.any(cut & (lacking > 2.0 * _OF_ITSELF * self.whole)))
+
+    def _needed(self, bound: float) -> list[int]:
+        """Where each class has to end for less than `bound` to be neglected in all."""
+        double, share = 2 * self.basis.harmonics, bound
+        while True:
+            least = [min(double, self._rung(int(np.argmax(b <= share)))) for b in self.beyond]
+            left = np.linalg.norm([b[end] for b, end in zip(self.beyond, least, strict=True)])
+            if left <= bound or share < bound / math.sqrt(len(self.divisors)):
+                break
+            share *= 0.9
+        high = max(least)
+        if high >= double:
+            total = np.sqrt(np.sum(self.beyond**2, axis=0))
+            high = round(max(double, min(_expected(total, self.basis.harmonics, bound), 1.25 * double)))
+        high = self._rung(high)
+        # some way from where they would have to be filled again
+        if self._youngest < 1.5 * _YOUNG:
+            return [high] * len(least)
+        found = []
+        for end, b, whole in zip(least, self.beyond, self.whole, strict=True):
+            end = max(end, int(np.argmax(b <= _OF_ITSELF * whole)), round(_SHARE * high))
+            found.append(min(high, self._rung(end)))
+        return found
+
+    @lazy
+    def _youngest(self) -> float:
+        """The least size of a class in units of one whose period it multiplies, or of the load's in units of any."""
+        sizes = dict(zip(self.divisors, self.whole, strict=True))
+        pairs = [(d, m) for d in self.divisors for m in self.divisors if m % d == 0 and _is_prime(m // d)]
+        ages = [sizes[d] / sizes[m] for d, m in pairs if sizes[m] > 0.0]
+        return float(min(ages + [sizes[self.basis.nu] / max(sizes.values())]))
+
+    def _rung(self, end: int) -> int:
+        return next((r for r in self.rungs if r >= end), self.rungs[-1])
+
+    def _with(self, ends: list[int], dropping: bool) -> HarmonicBasis:
+        """The basis whose classes end there, those of the load not before the highest one that is loaded."""
+        high, nu = max(ends), self.basis.nu
+        if not dropping:
+            return HarmonicBasis(high, nu)
+        end = dict(zip(self.divisors, ends, strict=True))
+        end[nu] = max(end[nu], self.rungs[0])
+        kept = [k for k in range(high + 1) if k <= end[math.gcd(k, nu)]]
+        return HarmonicBasis(kept[-1], nu, tuple(kept))
+
+
+def _beyond(shares: Array) -> Array:
+    """What is left of squares beyond every index, as a size."""
+    return np.sqrt(np.append(np.cumsum(shares[:0:-1])[::-1], 0.0))
+
+
+def _is_prime(number: int) -> bool:
+    return number > 1 and all(number % k for k in range(2, math.isqrt(number) + 1))

@@ -154,7 +154,8 @@ class BalanceState:
             *balance.directions,
             balance.scales()[1],
         )
-        return self._with_nodal(*parts) if self.nodal else parts
+        parts = self._with_nodal(*parts) if self.nodal else parts
+        return parts if self.basis.kept is None else self._kept_only(*parts)
 
     def _with_nodal(self, parts: Array, sizes: Array) -> tuple[Array, Array]:
         """The same with the elements that have nodes of their own."""
@@ -164,6 +165,19 @@ class BalanceState:
         weight = self.balance.scales()[1]
         sizes[0], sizes[2] = length(parts[2] * weight), length(parts[1] * weight)
         return parts, sizes
+
+    def _kept_only(self, parts: Array, sizes: Array) -> tuple[Array, Array]:
+        """The same without the equations of harmonics that are left out: nothing balances the force there."""
+        out = self.basis.left_out
+        parts[2][2 * out - 1] = 0.0
+        parts[2][2 * out] = 0.0
+        sizes[0] = length(parts[2] * self.balance.scales()[1])
+        return parts, sizes
+
+    @property
+    def unknowns(self) -> Array:
+        """Coefficients of the harmonics that are kept, shape (dimension,)."""
+        return self.balance.packed(self.x)
 
     @property
     def force(self) -> Array:
@@ -179,12 +193,12 @@ class BalanceState:
     def residual(self) -> Array:
         """R, shape (dimension,)."""
         if self.compliance is None:
-            return self._parts[0][2].ravel()
-        return (self._parts[0][0] + apply_blocks(self.compliance, self.unbalanced)).ravel()
+            return self.balance.packed(self._parts[0][2])
+        return self.balance.packed(self._parts[0][0] + apply_blocks(self.compliance, self.unbalanced))
 
     @lazy
     def force_jacobian(self) -> Array:
-        """dF/dX, shape (dimension, dimension)."""
+        """dF/dX for all harmonics up to H, square, with size (2 H + 1) rows."""
         return self._tangent_matrix(mean=True)
 
     def _tangent_matrix(self, mean: bool, columns: int = 0) -> Array:
@@ -203,11 +217,18 @@ class BalanceState:
     @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
-        return self._with_linear(self._tangent_matrix(mean=True), self.blocks, self.compliance, mean=True)
+        return self._restricted(
+            self._with_linear(self._tangent_matrix(mean=True), self.blocks, self.compliance, mean=True)
+        )
+
+    def _restricted(self, matrix: Array) -> Array:
+        """Rows and columns of the harmonics that are kept."""
+        entries = self.balance.entries
+        return matrix if entries is None else matrix[np.ix_(entries, entries)]
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
-        if self.compliance is None:
+        if self.compliance is None and self.basis.kept is None:
             out = self._tangent_matrix(mean=True, columns=1)
             kernels.add_linear(out, self.blocks, True)
         else:
@@ -229,7 +250,7 @@ class BalanceState:
     @property
     def linear_jacobian(self) -> Array:
         """The part of R_X that stays without elements: A on the block diagonal."""
-        return self._with_linear(np.zeros((self.balance.dimension,) * 2), self.blocks, None, mean=True)
+        return self._restricted(self._with_linear(np.zeros((self.x.size,) * 2), self.blocks, None, mean=True))
 
     @staticmethod
     def _with_linear(tangent: Array, blocks: ComplexArray, compliance: ComplexArray | None, mean: bool) -> Array:
@@ -260,7 +281,7 @@ class BalanceState:
         change = self.unbalanced_by(name)
         if change is not None:
             result += change if self.compliance is None else apply_blocks(self.compliance, change)
-        return result.ravel()
+        return self.balance.packed(result)
 
     def unbalanced_by(self, name: str) -> Array | None:
         """S differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
@@ -309,14 +330,22 @@ class BalanceState:
 
         To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
         """
-        basis, size = self.basis, self.balance.size
-        high = basis.harmonics
-        force = np.zeros((high + 1, size), dtype=complex)
+        return self._excited(np.arange(self.basis.harmonics + 1, self.balance.top + 1))
+
+    @lazy
+    def left_out(self) -> ComplexArray:
+        """The same of the harmonics below H that the basis leaves out, shape (len(basis.left_out), size)."""
+        return self._excited(self.basis.left_out)
+
+    def _excited(self, k: np.ndarray) -> ComplexArray:
+        """First-order answer at harmonics k > 0 that are no unknowns, shape (len(k), size)."""
+        size = self.balance.size
+        force = np.zeros((len(k), size), dtype=complex)
         for group, spectrum, _, _ in self.spectra:
-            force += np.multiply.outer(2.0 * spectrum[high + 1 : 2 * high + 2], group.direction)
+            force += np.multiply.outer(2.0 * spectrum[k], group.direction)
         for nodal in self.nodal:
-            force += np.multiply.outer(2.0 * nodal.force[high + 1 : 2 * high + 2], nodal.own.out)
-        frequency = basis.beyond * self.omega
+            force += np.multiply.outer(2.0 * nodal.force[k], nodal.own.out)
+        frequency = k / self.basis.nu * self.omega
         compliance = self.linear.compliance(frequency)
         if compliance is not None:
             force = np.einsum("kij,kj->ki", compliance, force)
@@ -334,6 +363,9 @@ class BalanceState:
         x = self.basis.resized(self.x, balance.basis)
         x[2 * high + 1 :: 2] = self.neglected.real
         x[2 * high + 2 :: 2] = -self.neglected.imag
+        if self.basis.kept is not None:
+            out = self.basis.left_out
+            x[2 * out - 1], x[2 * out] = self.left_out.real, -self.left_out.imag
         return BalanceState(balance, self.linear, x, self.omega, self.values)
 
     def force_scale(self) -> float:
@@ -351,7 +383,7 @@ class BalanceState:
         """Size of R with residual weights."""
         if self.compliance is None:
             return float(self._parts[1][0])
-        return length(self.residual.reshape(self.x.shape) * self.balance.scales()[1])
+        return length(self.residual.reshape(-1, self.balance.size) * self.balance.scales()[1])
 
 
 def length(vector: Array) -> float:

@@ -104,6 +104,12 @@ class _OneInput:
         f_uu, f_uv, f_vv = self.element.curvature(*self._state(q), c)
         return np.array([[f_uu, f_uv], [f_uv, f_vv]]) if self._moving else np.array([[f_uu]])
 
+    def third(self, q: Array, theta: Array, c: Array) -> Array:
+        f_uuu, f_uuv, f_uvv, f_vvv = self.element.third(*self._state(q), c)
+        if not self._moving:
+            return np.array([[[f_uuu]]])
+        return np.array([[[f_uuu, f_uuv], [f_uuv, f_uvv]], [[f_uuv, f_uvv], [f_uvv, f_vvv]]])
+
     def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         f_c, *rest = self.element.coefficient_tangent(*self._state(q), c)
         return f_c, np.stack([np.asarray(part) for part in rest[: 1 + self._moving]], axis=1)

@@ -100,9 +100,11 @@ def _states(element: CoupledElement, c: Array, u: ArrayLike | None, v: ArrayLike
         raise InputError("u and v must be finite, with one row of equal length per input")
     q: Array = np.array(rows, dtype=float)
     keep = np.full(q.shape[1], True)
+    # half powers that begin at a corner are too steep beside it for differences
+    margin = 100.0 if corners.rough else 4.0
     for row, levels in ((0, corners.points), (m, corners.velocities)):
         for level in levels:
-            keep &= np.abs(q[row] - level) > 4.0 * _STEP * float(np.max(np.abs(q[row])))
+            keep &= np.abs(q[row] - level) > margin * _STEP * float(np.max(np.abs(q[row])))
     q = q[:, keep].copy()
     theta: Array = 0.37 + 0.9 * np.arange(q.shape[1], dtype=float)
     return q, theta

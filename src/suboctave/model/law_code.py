@@ -188,6 +188,7 @@ class Law:
 
         names = {state.name: f"q{i}" for i, state in enumerate(self.q)}
         names |= {one.name: f"c{i}" for i, one in enumerate(self.c)} | {_THETA: "theta"}
+        parts = [_off_corners(part) for part in parts]
         fresh = sympy.numbered_symbols("(common)")
         common, reduced = sympy.cse(parts, symbols=fresh)
         lines = ["def law(q, theta, c):"]
@@ -252,6 +253,22 @@ _NUMPY = (
     "empty", "sqrt", "exp", "log", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh",
     "absolute", "sign", "maximum", "heaviside",
 )  # fmt: skip
+
+
+def _off_corners(expression: Any) -> Any:
+    """Derivatives of powers of ramps divide by them, and multiply by steps that are zero where the ramps are.
+
+    Those by an exponent have their logarithms.
+    """
+    import sympy
+
+    corner = corner_functions()
+    swaps = {}
+    for found in expression.atoms(sympy.Pow, sympy.log):
+        base = found.args[0]
+        if isinstance(base, corner.Ramp) and not (found.is_Pow and found.exp.is_nonnegative):
+            swaps[found] = found.func(corner.PositiveRamp(*base.args), *found.args[1:])
+    return expression.xreplace(swaps)
 
 
 def _functions(expression: Any) -> list[Any]:

@@ -53,7 +53,10 @@ def corner_functions() -> SimpleNamespace:
         def fdiff(self, argindex: int = 1) -> Any:
             return Sign(self.args[0])
 
-    return SimpleNamespace(Step=Step, Sign=Sign, Ramp=Ramp, Modulus=Modulus)
+    class PositiveRamp(sympy.Function):
+        """A ramp that stays above zero: where a power of one is divided by, off its corner, zero times it is zero."""
+
+    return SimpleNamespace(Step=Step, Sign=Sign, Ramp=Ramp, Modulus=Modulus, PositiveRamp=PositiveRamp)
 
 
 @functools.cache

@@ -14,7 +14,7 @@ __all__ = ["as_code", "as_text"]
 _PLAIN = {"Ramp": "max({}, 0)", "Step": "heaviside({})", "Modulus": "abs({})", "Sign": "sign({})"}
 _ARRAYS = {
     "Ramp": "maximum({}, 0.0)", "Step": "heaviside({}, 0.0)", "Modulus": "absolute({})", "Sign": "sign({})",
-    "asin": "arcsin({})", "acos": "arccos({})", "atan": "arctan({})",
+    "PositiveRamp": "maximum({}, 1e-60)", "asin": "arcsin({})", "acos": "arccos({})", "atan": "arctan({})",
 }  # fmt: skip
 #: powers up to this one are products
 _PRODUCTS = 4

@@ -69,6 +69,10 @@ class Linearisation:
         self.varying = degree > 0
         motions = state.motions + own.motions
         forces = np.concatenate((state.spectra_table[0], own.forces)) if own.forces else state.spectra_table[0]
+        if state.basis.kept is not None:
+            # the force at harmonics that are left out is unbalanced, like that beyond the highest
+            forces = forces.copy()
+            forces[:, state.basis.left_out] = 0.0
         high = state.basis.harmonics
         grid = search_grid(high)
         c = motions[0][None] if len(motions) == 1 else np.array(motions, dtype=complex).reshape(-1, high + 1)

@@ -130,14 +130,19 @@ def refined(state: BalanceState) -> tuple[BalanceState, BalanceState | None]:
     """
     completed = state.completed
     kept = state.x.shape[0]
-    residual = completed.residual.reshape(completed.x.shape)[:kept]
+    balance = state.balance
+    residual = balance.packed(completed.residual.reshape(completed.x.shape)[:kept])
     weight = state.balance.scales()[0]
-    size, gap = (float(np.linalg.norm(x * weight)) for x in (state.x, completed.x[kept:]))
+    lacking = completed.x[kept:]
+    if state.basis.kept is not None:
+        lacking = completed.x.copy()
+        lacking[state.basis.rows] = 0.0
+    size, gap = (float(np.linalg.norm(x * weight)) for x in (state.x, lacking))
     try:
-        answer = np.asarray(np.linalg.solve(state.jacobian, -residual.ravel()), dtype=float)
+        answer = np.asarray(np.linalg.solve(state.jacobian, -residual), dtype=float)
     except np.linalg.LinAlgError:
-        answer = np.asarray(np.linalg.lstsq(state.jacobian, -residual.ravel())[0], dtype=float)
-    answer = answer.reshape(state.x.shape)
+        answer = np.asarray(np.linalg.lstsq(state.jacobian, -residual)[0], dtype=float)
+    answer = balance.spread(answer)
     length = float(np.linalg.norm(answer * weight))
     if length <= _ANSWER * size:
         return _moved(completed, answer), None

@@ -173,7 +173,10 @@ def motion_dataset(
         "time": ("sample", time, {"long_name": "time, from the load's phase zero"}),
         "section_time": ("section", time[sections]),
         "multiple": ("component", multiples, {"long_name": "frequency in units of omega"}),
-        "multiple_neglected": ("neglected", orbit.basis.beyond),
+        "multiple_neglected": (
+            "neglected",
+            (len(multiples) + np.arange(len(multiples))) / orbit.basis.nu,
+        ),
         "element": ("element", np.array(wanted, dtype=int)),
         "element_label": ("element", np.array([system.elements[index].label for index in wanted], dtype=object)),
         "parameter": ("parameter", np.array(list(system.parameters), dtype=object)),

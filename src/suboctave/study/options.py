@@ -1,4 +1,4 @@
-"""Options of the verbs as tables of a study file: [newton], [stepping], [harmonics], [stability]."""
+"""Options of the verbs as tables of a study file: [newton], [stepping], [harmonics], [stability], [formulation]."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from suboctave.bifurcation import Alcorta2019, BorderedSystem, ExtendedSystem, Formulation, formulation_of
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.stability import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
 
-__all__ = ["as_harmonics", "as_newton", "as_stability", "as_stepping"]
+__all__ = ["as_formulation", "as_harmonics", "as_newton", "as_stability", "as_stepping"]
 
 _METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}
+_FORMULATIONS: dict[str, Any] = {one.name: one for one in (BorderedSystem, ExtendedSystem, Alcorta2019)}
 
 
 def as_newton(table: Mapping[str, Any] | None) -> NewtonOptions | None:
@@ -51,6 +53,22 @@ def as_stability(given: Any) -> StabilityMethod | None:
     if not isinstance(given, str):
         raise InputError(f"give the name of a method, or a table with method = ..., not {given!r}")
     return method_of(given)
+
+
+def as_formulation(given: Any) -> Formulation | None:
+    """A formulation by name, or `{name = name, option = value}`; None stays None."""
+    if given is None:
+        return None
+    if isinstance(given, Mapping):
+        table = dict(given)
+        name = table.pop("name", None)
+        if name not in _FORMULATIONS:
+            raise InputError(f"unknown formulation {name!r}{suggest(str(name), _FORMULATIONS)}")
+        made: Formulation = _options(_FORMULATIONS[name], table, name)
+        return made
+    if not isinstance(given, str):
+        raise InputError(f"give the name of a formulation, or a table with name = ..., not {given!r}")
+    return formulation_of(given)
 
 
 def _options(kind: Any, table: Mapping[str, Any], what: str) -> Any:

@@ -69,12 +69,17 @@ def bar(name: str) -> Iterator[Callable[[float, str], None]]:
         yield report
 
 
-def print_events(out: Console, lines: Sequence[Sequence[str]], free: str = "omega") -> None:
-    """Located bifurcations as a table, one line each."""
+def print_events(
+    out: Console, lines: Sequence[Sequence[str]], free: str = "omega", criticality: Sequence[str] = ()
+) -> None:
+    """Located bifurcations as a table, one line each; whether super- or subcritical where that is known of any."""
     if not lines:
         out.print("no bifurcation")
         return
     names = ("kind", "omega", "max |x|", "multiplier", "residual") + ((free,) if free != "omega" else ())
+    if any(criticality):
+        names += ("criticality",)
+        lines = [[*line, word] for line, word in zip(lines, criticality, strict=True)]
     print_texts(out, names, lines, left=("kind",))
 
 
@@ -109,13 +114,14 @@ def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> Non
     ends = (min(values), max(values)) if branch.closed else (values[0], values[-1])
     span = f"{'closed, ' if branch.closed else ''}along {branch.name}, {ends[0]:.6g} to {ends[1]:.6g}"
     out.print(f": {span}", markup=False)
-    lines = [list(line) for line in event_lines(branch_dataset(branch))]
+    dataset = branch_dataset(branch)
+    lines = [list(line) for line in event_lines(dataset)]
     if branch.name != "omega":
         met = sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda b: b.arclength)
         for line, event in zip(lines, met, strict=True):
             line[1] = f"{event.omega:.6g}"
             line.append(f"{event.parameter(branch.name):.8g}")
-    print_events(out, lines, branch.name)
+    print_events(out, lines, branch.name, [str(word) for word in dataset["event_criticality"].to_numpy()])
     unstable = int(np.count_nonzero(~branch.stable)) if len(branch) else 0
     out.print(f"{len(branch)} points, {unstable} unstable{note}; {branch.ended}.", markup=False)
     for warning in branch.warnings:

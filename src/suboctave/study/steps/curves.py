@@ -11,7 +11,7 @@ from suboctave.analysis.checks import make_settings
 from suboctave.continuation import Event
 from suboctave.errors import InputError
 from suboctave.model.description import from_plain
-from suboctave.study.options import as_harmonics, as_newton, as_stability, as_stepping
+from suboctave.study.options import as_formulation, as_harmonics, as_newton, as_stability, as_stepping
 from suboctave.study.steps.base import (
     Complaint,
     Context,
@@ -66,8 +66,9 @@ class CurveStep(Step):
     newton: dict[str, Any] | None = None
     stepping: dict[str, Any] | None = None
     stability: Any = None
+    formulation: Any = None
 
-    @field_validator("newton", "stepping", "harmonics", "stability")
+    @field_validator("newton", "stepping", "harmonics", "stability", "formulation")
     @classmethod
     def _read(cls, given: Any, info: ValidationInfo) -> Any:
         _READ[str(info.field_name)](given)
@@ -113,6 +114,7 @@ class CurveStep(Step):
             "newton": as_newton(self.newton),
             "stepping": as_stepping(self.stepping),
             "stability": as_stability(self.stability),
+            "formulation": as_formulation(self.formulation),
         }
         yield from tried("", lambda: make_settings(around.system, **given))
 
@@ -128,6 +130,7 @@ class CurveStep(Step):
             "newton": as_newton(self.newton),
             "stepping": as_stepping(self.stepping),
             "stability": as_stability(self.stability),
+            "formulation": as_formulation(self.formulation),
             "events": self._events(context.allow_code) or None,
             "progress": context.progress,
         }
@@ -170,6 +173,7 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "stepping": as_stepping,
     "harmonics": as_harmonics,
     "stability": as_stability,
+    "formulation": as_formulation,
 }
 _MOST = 8000  # unknowns of a dense problem, as the verbs have it
 
@@ -177,5 +181,6 @@ _MOST = 8000  # unknowns of a dense problem, as the verbs have it
 def _by_name(complaints: Iterator[Complaint]) -> Iterator[Complaint]:
     """A complaint of a whole call, at the key that its message begins with."""
     for _, text in complaints:
-        named = next((key for key in ("max_step", "observe", "newton", "stepping", "stability") if key in text), None)
+        keys = ("max_step", "observe", "newton", "stepping", "stability", "formulation")
+        named = next((key for key in keys if key in text), None)
         yield ((named,) if named else ()), text
