@@ -24,6 +24,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
+from suboctave.compiled import compile_at_once
 
 #: what a look is booked on: the first line whose file is anywhere on the stack
 PLACES = (
@@ -98,6 +99,7 @@ def case(title: str, system: so.System, seconds: float) -> None:
 
 
 def main(seconds: float) -> None:
+    compile_at_once()
     for title, law in (("exact law", {}), ("arctan law, s = 3000", {"regularization": 3000.0})):
         case(title, so.library.reference_oscillator(p=0.55, j=0.0, **law), seconds)
 

@@ -59,25 +59,47 @@ def test_a_cheap_kernel_is_not_compiled_in_the_first_computation(made):
     assert not total.signatures
 
 
-def test_from_the_second_computation_on_all_are(made):
+def test_from_the_second_computation_on_less_patience_is_needed(made):
     total = made()
+    many = np.ones(30000)
     compiled.computation_begins()
-    total(VALUES)
+    total(many)
+    assert not total.signatures
     compiled.computation_begins()
+    total._spent = 2.0 * compiled.LESS
     assert total(VALUES) == 30.0
     assert len(total.signatures) == 1
-    assert type(total) is CPUDispatcher
+    assert isinstance(total, CPUDispatcher)
+    assert not isinstance(total, compiled._Patient)
 
 
-def test_a_quick_one_is_compiled_as_long_as_the_budget_lasts(made):
+def test_a_quick_one_is_compiled_as_long_as_there_is_credit(made):
     assert made("patience=-1.0")(VALUES) == 30.0
-    spent = made("patience=-1.0", budget=0.0)
+    assert compiled._ledger.credit < compiled.CREDIT
+    spent = made("patience=-1.0", credit=-100.0)
     assert spent(np.arange(5)) == 30.0
     assert not spent.signatures
 
 
+def test_credit_comes_back_with_time_and_is_limited(made):
+    made(credit=-0.1, since=time.thread_time())
+    assert not compiled._ledger.allows()
+    compiled._ledger.since -= 1.0
+    assert compiled._ledger.allows()
+    compiled._ledger.since -= 1e3
+    compiled._ledger.allows()
+    assert compiled._ledger.credit == compiled.CREDIT
+
+
+def test_at_once_if_that_is_asked_for(made):
+    total = made(credit=-100.0)
+    compiled.compile_at_once()
+    assert total(VALUES) == 30.0
+    assert len(total.signatures) == 1
+
+
 def test_what_was_compiled_before_is_used_at_once(made):
-    made(runs=2)(VALUES)
+    made(eager=True)(VALUES)
     total = made()
     assert total(VALUES) == 30.0
     assert len(total.signatures) == 1

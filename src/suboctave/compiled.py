@@ -3,24 +3,29 @@
 Compiling a kernel takes some tenths of a second, the first curve of a fresh installation calls a hundred of them, and
 most cost less there than their compilation would. So a kernel first runs as the Python function that it is:
 
-- kernels marked `QUICK` are compiled almost at once, all others when they have cost `PATIENCE` seconds;
-- within the first computation of a process, compiling may take `BUDGET` seconds in all;
-- from the second computation on everything is compiled when it is called.
+- kernels marked `QUICK` are compiled almost at once, all others when they have cost `PATIENCE` seconds, but `LESS` from
+  the second computation of a process on and where an earlier process has compiled others;
+- compilation has an allowance, `CREDIT` seconds at first, that grows by `SHARE` of the time in which nothing is
+  compiled: however much there is to compile, nobody waits for it all at one go.
 
 What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Small
 kernels whose arithmetic would differ (sums that the compiler may reorder, complex roots, sines and cosines of the
 same angle) are compiled at once, so that both forms agree bit by bit; but where a kernel is compiled into a larger
 one the last bit may still change, for rounded laws and several degrees of freedom, until everything is compiled.
+
+All seconds are processor time of the thread: a busy machine changes nothing.
 """
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
+from numba import config, njit
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -28,10 +33,14 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 #: seconds that a kernel may cost before it is compiled: in general, where others have been compiled before, and if it
 #: is called by the hundred for every motion
 PATIENCE, LESS, QUICK = 1.0, 0.03, 0.02
-#: seconds of compilation in the first computation of a process, but for kernels that have cost `PATIENCE`
-BUDGET = 4.0
+#: seconds of compilation that may follow each other, and what every second of other work adds to what is left of them
+CREDIT, SHARE = 2.5, 0.7
 #: entries of a kernel's arguments beyond which it is compiled at once: a single call could take long
 LARGE = 40000
+
+#: LLVM's level of optimisation and whether it makes vectors of loops: with `fastmath`, and without
+_THOROUGH = (config.OPT, config.LOOP_VECTORIZE)
+_SWIFT = (type(config.OPT)(min(int(config.OPT), 1)), 0)
 
 
 class _Ledger:
@@ -39,22 +48,83 @@ class _Ledger:
 
     def __init__(self) -> None:
         self.runs = 0
-        self.budget = BUDGET
+        #: seconds of compilation allowed, and when that was true
+        self.credit, self.since = CREDIT, time.thread_time()
+        #: whether everything is compiled when it is called
+        self.eager = False
         #: whether nothing has been found in the cache
         self.fresh = True
         #: seconds spent in kernels called by the one that runs
         self.nested = 0.0
+        #: kernels that are being compiled, each because of the one before
+        self.depth = 0
+
+    def allows(self) -> bool:
+        """Whether something may be compiled now."""
+        self._worked()
+        return self.eager or self.credit > 0.0
+
+    def begins(self) -> None:
+        """The compilation of a kernel begins."""
+        if self.depth == 0:
+            self._worked()
+        self.depth += 1
+
+    def ends(self) -> None:
+        """The compilation of a kernel ends."""
+        self.depth -= 1
+        if self.depth == 0:
+            now = time.thread_time()
+            self.credit -= now - self.since
+            self.since = now
+
+    def _worked(self) -> None:
+        now = time.thread_time()
+        self.credit = min(CREDIT, self.credit + SHARE * max(0.0, now - self.since))
+        self.since = now
 
 
 _ledger = _Ledger()
 
 
 def computation_begins() -> None:
-    """Tell that a user's computation begins: from the second on, kernels are compiled when they are called."""
+    """Tell that a user's computation begins: from the second on, kernels are compiled sooner."""
     _ledger.runs += 1
 
 
-class _Patient(CPUDispatcher):
+def compile_at_once() -> None:
+    """From now on every kernel is compiled when it is called: for measurements of what comes after."""
+    _ledger.eager = True
+
+
+class _Kernel(CPUDispatcher):
+    """A kernel that is compiled with no more effort than its kind repays.
+
+    Loops are put into vector registers in kernels with `fastmath` only: elsewhere that gains nothing measurable, and
+    half of LLVM's time would go into it. What a kernel calls has been optimised already.
+    """
+
+    def compile(self, sig: Any) -> Any:
+        if self.overloads.get(tuple(sig)) is not None:
+            return super().compile(sig)
+        with global_compiler_lock:
+            before = config.OPT, config.LOOP_VECTORIZE
+            collecting = gc.isenabled()
+            fast = bool(self.targetoptions.get("fastmath"))
+            config.OPT, config.LOOP_VECTORIZE = _THOROUGH if fast else _SWIFT
+            _ledger.begins()
+            # Numba makes millions of small objects, and looking through them takes a tenth of the time
+            gc.disable()
+            try:
+                return super().compile(sig)
+            finally:
+                _ledger.ends()
+                config.OPT, config.LOOP_VECTORIZE = before
+                if collecting:
+                    gc.enable()
+
+
+class _Patient(_Kernel):
     """A kernel that has not been compiled yet."""
 
     patience = PATIENCE
@@ -68,31 +138,29 @@ class _Patient(CPUDispatcher):
                 return compiled(self)(*args)
             spent = 0.0
         if self._due(spent) or sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE:
-            start = time.perf_counter()
             self.compile(tuple(self.typeof_pyval(a) for a in args))
-            _ledger.budget -= time.perf_counter() - start
             return compiled(self)(*args)
         before, _ledger.nested = _ledger.nested, 0.0
-        start = time.perf_counter()
+        start = time.thread_time()
         try:
             with np.errstate(all="ignore"):
                 return self.py_func(*args)
         finally:
-            took = time.perf_counter() - start
+            took = time.thread_time() - start
             self._spent = spent + took - _ledger.nested
             _ledger.nested = before + took
 
     def _due(self, spent: float) -> bool:
-        if _ledger.runs > 1 or spent > PATIENCE:
+        if _ledger.eager:
             return True
-        patience = self.patience if _ledger.fresh else min(self.patience, LESS)
-        return spent > patience and _ledger.budget > 0.0
+        patience = self.patience if _ledger.fresh and _ledger.runs < 2 else min(self.patience, LESS)
+        return spent > patience and _ledger.allows()
 
 
 def compiled(kernel: _Function) -> _Function:
     """The same kernel, compiled (or loaded) at its next call if it is not yet."""
     if isinstance(kernel, _Patient):
-        kernel.__class__ = CPUDispatcher
+        kernel.__class__ = _Kernel
     return kernel
 
 
@@ -104,9 +172,12 @@ def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) ->
 
     def decorate(function: _Function) -> _Function:
         result = njit(cache=True, **options)(function)
-        if isinstance(result, CPUDispatcher) and not (at_once or options.get("fastmath")):
-            result.__class__ = _Patient
-            result.patience = patience
+        if isinstance(result, CPUDispatcher):
+            if at_once or options.get("fastmath"):
+                result.__class__ = _Kernel
+            else:
+                result.__class__ = _Patient
+                result.patience = patience
         return result
 
     return decorate

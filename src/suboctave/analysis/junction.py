@@ -28,11 +28,11 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 __all__ = ["UNSEEN", "Beside", "Junction", "Meeting", "beside", "doubled", "emanating", "meeting", "period_name"]
 
 #: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
-_DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6)
+_DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 #: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
 _CLOSE = 0.02
 #: way in the scaled parameter that rounding may account for
-_STILL = 1e-12
+_STILL = 1e-10
 #: what a branch says where it could not look closer
 UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
 
@@ -149,22 +149,17 @@ def _last_before(
     """The curve's point right before it meets its parent, None if a neighbour is that; and what remains in doubt."""
     curve = b.curve
     assert isinstance(curve, ResponseCurve)
-    expected = doubled(found.floquet)
     before = curve.transfer(a.u, a.curve)
-    if length(b.weights * (there - before)) <= 2.0 * _DISTANCES[0] and _near(
-        a, a.curve.transfer(there, curve), expected
-    ):
-        return None, ""
+    way = length(b.weights * (there - before))
     direction = emanating(found, curve, b.weights)
     if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
         direction = -direction
-    close = beside(curve, there, direction, b.weights, expected, newton)
+    close = beside(curve, there, direction, b.weights, doubled(found.floquet), newton, 0.7 * way)
     if close is None:
         return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
     point = close.point
     arclength = a.arclength + length(b.weights * (point.u - before))
-    turn = -1.0 if (b.weights * point.tangent) @ (b.weights * (there - point.u)) < 0.0 else 1.0
-    last = replace(point, tangent=turn * point.tangent, orientation=turn * point.orientation, arclength=arclength)
+    last = replace(point, tangent=-point.tangent, orientation=-point.orientation, arclength=arclength)
     return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
 
 
@@ -193,12 +188,13 @@ def beside(
     weights: Array,
     multipliers: ComplexArray,
     newton: NewtonOptions,
+    reach: float = np.inf,
 ) -> Beside | None:
     """The curve's point close to a bifurcation in a direction, with its tangent pointing away; None if there is none.
 
-    On the way the critical multiplier leaves +1 and the parameter its value, both with the square of the distance.
-    Where the point's multipliers are not those of the bifurcation, or the curve turns, something else happens in
-    between: then one closer to it is taken.
+    On the way the critical multiplier leaves +1, and the parameter its value, with the square of the distance. Where
+    the point's multipliers are not those of the bifurcation, or the parameter goes another way, something else happens
+    in between: then one closer to it is taken.
 
     Parameters
     ----------
@@ -206,35 +202,51 @@ def beside(
         The bifurcation, and where the curve leaves it, of unit length in `weights`.
     multipliers
         Of the motion at u, over the period of the curve's motions.
+    reach
+        Distance that the point must not exceed.
     """
-    row = weights * direction
-    row = row / length(row)
-    closest: CurvePoint | None = None
+    points: list[tuple[float, CurvePoint]] = []
     for distance in _DISTANCES:
+        if distance > reach:
+            continue
         try:
-            solved = correct(curve, u + distance * direction, row, weights, newton)
-            if not 0.5 <= length(weights * (solved.u - u)) / distance <= 2.0:
-                continue
-            point = make_point(solved, curve, solved.u - u, 0.0)
+            point = _solved_beside(curve, u, distance * direction, weights, newton)
         except ConvergenceError:
             continue
-        closest = point
-        if _near(point, u, multipliers):
-            return Beside(point, True)
-    return None if closest is None else Beside(closest, False)
+        points.append((distance, point))
+        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1]):
+            return Beside(points[-2][1], True)
+    return Beside(points[-1][1], False) if points else None
 
 
-def _near(point: CurvePoint, u: Array, multipliers: ComplexArray) -> bool:
-    """Whether a point has the multipliers of a bifurcation close by, and lies before any turn of its curve."""
-    curve, index = point.curve, point.curve.parameter
+def _solved_beside(curve: ResponseCurve, u: Array, way: Array, weights: Array, newton: NewtonOptions) -> CurvePoint:
+    row = weights * way
+    solved = correct(curve, u + way, row / length(row), weights, newton)
+    if not 0.5 <= length(weights * (solved.u - u)) / length(row) <= 2.0:
+        raise ConvergenceError("what was found lies elsewhere")
+    return make_point(solved, curve, way, 0.0)
+
+
+def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
+    """Whether a point has multipliers close to given ones."""
+    curve = point.curve
     assert isinstance(curve, ResponseCurve)
     x, omega, values = curve.split(point.u)
     found = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
     expected = np.sort_complex(multipliers)
-    apart = np.abs(found - expected) / np.maximum(1.0, np.abs(expected))
-    moved = (point.u[index] - u[index]) * point.weights[index]
-    turned = moved * point.tangent[index] < 0.0 and abs(moved) > _STILL
-    return float(apart.max()) <= _CLOSE and not turned
+    return float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
+
+
+def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint]) -> bool:
+    """Whether the parameter goes one way between two points beside a bifurcation, and goes on so at both.
+
+    The bifurcation's own place is not asked: cut off at a harmonic, the two curves meet a little elsewhere.
+    """
+    index = far[1].curve.parameter
+    way = far[1].u[index] - close[1].u[index]
+    slopes = [point.tangent[index] for _, point in (far, close)]
+    moved = abs(way) * far[1].weights[index]
+    return moved <= _STILL or all(slope * way > 0.0 for slope in slopes)
 
 
 def doubled(result: FloquetResult) -> ComplexArray:

@@ -267,6 +267,7 @@ def leave_along(
     if forward.closed or forward.interrupted:
         met = [b for b in forward.bifurcations if not same_event(b, here)]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
+        forward.settle_end(2.0 * _distance(one, u, curve))
         return forward
     back = follow(other, 0.0, bounds, settings)
     gap = _distance(one, u, curve) + _distance(other, u, curve)

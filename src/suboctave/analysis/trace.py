@@ -79,6 +79,13 @@ class Trace:
             other.arrives,
         )
 
+    def settle_end(self, reach: float) -> None:
+        """Take back what is in doubt within a distance of the end, where a known bifurcation explains it."""
+        whole = self.points[-1].arclength
+        explained = [u for u in self.audit.unsettled if u.arclength[0] >= whole - reach]
+        self.warnings = [w for w in self.warnings if not any(w.startswith(str(u)) for u in explained)]
+        self.audit = replace(self.audit, unsettled=tuple(u for u in self.audit.unsettled if u not in explained))
+
     def end_at(self, item: Bifurcation) -> None:
         """Drop what lies behind a bifurcation, which the trace arrives at."""
         self.points = [p for p in self.points if p.arclength < item.arclength] or self.points[:1]

@@ -76,16 +76,33 @@ def _jets(c, zr, zi):
     return out
 
 
-@kernel(at_once=True)
+@kernel(patience=QUICK)
 def _roots(x, d, s, point, width):
-    """Both complex offsets at which the parabola (x, d, s) equals point + i width."""
-    target = complex(x - point, -width)
-    root = np.sqrt(d * d - 2.0 * s * target)
-    q = -(d + root) if (root.real * d >= 0.0) else -(d - root)
-    if abs(q) == 0.0:
-        return complex(np.inf, 0.0), complex(np.inf, 0.0)
-    far = q / s if s != 0.0 else complex(np.inf, 0.0)
-    return 2.0 * target / q, far
+    """Both complex offsets at which the parabola (x, d, s) equals point + i width: real and imaginary parts.
+
+    In real numbers, which are compiled in a third of the time of complex ones.
+    """
+    # the square root a + i b of the discriminant, a >= 0
+    re = d * d - 2.0 * s * (x - point)
+    im = 2.0 * s * width
+    a = math.sqrt(0.5 * (math.sqrt(re * re + im * im) + abs(re)))
+    b = 0.5 * im / a if a > 0.0 else 0.0
+    if re < 0.0:
+        a, b = abs(b), (a if im >= 0.0 else -a)
+    # the half without cancellation
+    sign = 1.0 if d >= 0.0 else -1.0
+    qr = -(d + sign * a)
+    qi = -sign * b
+    size = qr * qr + qi * qi
+    if size == 0.0:
+        return np.inf, 0.0, np.inf, 0.0
+    tr = 2.0 * (x - point) / size
+    ti = -2.0 * width / size
+    near_r = tr * qr + ti * qi
+    near_i = ti * qr - tr * qi
+    if s == 0.0:
+        return near_r, near_i, np.inf, 0.0
+    return near_r, near_i, qr / s, qi / s
 
 
 @kernel(patience=QUICK)
@@ -105,25 +122,25 @@ def singular_instants(c, points, widths, reach, zr, zi):
         for m in range(points.shape[0]):
             if abs(x - points[m]) > most + abs(d) * cell + widths[m]:
                 continue
-            first, second = _roots(x, d, s, points[m], widths[m])
+            near_r, near_i, far_r, far_i = _roots(x, d, s, points[m], widths[m])
             for r in range(2):
-                root = first if r == 0 else second
-                if not (abs(root.real) <= 0.8 * cell and abs(root.imag) <= 1.5 * reach):
+                offset = near_r if r == 0 else far_r
+                distance = abs(near_i if r == 0 else far_i)
+                if not (abs(offset) <= 0.8 * cell and distance <= 1.5 * reach):
                     continue
                 at = j * cell
                 # the parabola around the singularity's own real part: twice is as good as exact
-                offset, distance = root.real, abs(root.imag)
                 for _ in range(3):
                     at += offset
                     vx, vd, vs = _jet(c, math.cos(at), math.sin(at))
-                    one, two = _roots(vx, vd, vs, points[m], widths[m])
+                    new_r, new_i, two_r, two_i = _roots(vx, vd, vs, points[m], widths[m])
+                    new_i, two_i = abs(new_i), abs(two_i)
                     # of the two roots the one that continues the present
-                    near_one = abs(complex(abs(one.real), abs(one.imag) - distance))
-                    near_two = abs(complex(abs(two.real), abs(two.imag) - distance))
-                    new = one if near_one <= near_two else two
-                    if not (abs(new.real) <= cell):
+                    if two_r * two_r + (two_i - distance) ** 2 < new_r * new_r + (new_i - distance) ** 2:
+                        new_r, new_i = two_r, two_i
+                    if not (abs(new_r) <= cell):
                         break
-                    offset, distance = new.real, abs(new.imag)
+                    offset, distance = new_r, new_i
                     if abs(offset) < 0.05 * distance:
                         break
                 at += offset
@@ -246,7 +263,8 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
     capacity = ORDERS * (8 + 3 * intervals + math.ceil(2.0 * math.pi / panel))
     out_r, out_i, w = np.empty(capacity), np.empty(capacity), np.empty(capacity)
     offset = np.empty(ORDERS)
-    count = 0
+    # not a literal, for which `_fill` would be compiled twice
+    count = np.int64(0)
     for k in range(intervals):
         # the way from a singularity to the middle before the next, forwards or backwards in time
         centre, distance, length, sign = 0.0, 1.0, 2.0 * math.pi, 1.0

@@ -14,8 +14,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.compiled import QUICK, kernel
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.stability.passages import depths, events_along, grown
 
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
@@ -115,7 +117,7 @@ def _panels(events, longest):
         if start[i] >= count > 0:
             # an event without a panel of its own at the period's end
             start[i] -= count
-    return out, count, start
+    return out[:count], start
 
 
 @kernel(patience=QUICK, fastmath={"reassoc", "contract", "nsz"})
@@ -169,8 +171,22 @@ def longest_panel(c, degree):
     return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
 
 
-@kernel()
-def lay_out(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, passed, longest, zr, zi, nodes):
+def lay_out(
+    c: ComplexArray,
+    f: ComplexArray,
+    rate: float,
+    pieces: Array,
+    owner: NDArray[np.int64],
+    polynomial: Array,
+    steps: Array,
+    step_owner: NDArray[np.int64],
+    line: Array,
+    passed: Array,
+    longest: float,
+    zr: Array,
+    zi: Array,
+    nodes: Array,
+) -> tuple[Array, Array, Array, Array, Array, NDArray[np.int64]]:
     """Panels along a motion, the motion at their nodes, and the laws that are known in closed form.
 
     Parameters
@@ -209,9 +225,17 @@ def lay_out(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, pass
     events, start
         See `passages.events_along`; the panel that begins at each.
     """
-    groups = c.shape[0]
     events = events_along(c, pieces, owner, passed, zr, zi)
-    panels, count, start = _panels(events, longest)
+    panels, start = _panels(events, longest)
+    stretch, path, law, base = _filled(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, panels, nodes)
+    return stretch, path, law, base, events, start
+
+
+@kernel()
+def _filled(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, panels, nodes):
+    """The results of `lay_out` at the nodes of its panels."""
+    groups = c.shape[0]
+    count = panels.shape[0]
     m = nodes.shape[0]
     total = count * (m - 1) + 1
     tau = np.empty(total)
@@ -266,7 +290,7 @@ def lay_out(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, pass
         for j in range(total):
             if (u[j] > gap) == right:
                 law[g, 0, j] += k * (u[j] - gap)
-    return stretch, path, law, base, events, start
+    return stretch, path, law, base
 
 
 @kernel()

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from suboctave.compiled import kernel
 from suboctave.stability.nodes import ORDER
 
@@ -46,125 +44,97 @@ def norm(a):
     return size
 
 
-@kernel(fastmath=FAST)
-def series(state, matrix, damping, left, right, local, span, active, moving, graded, enough, y, w, ry, rw):
+@kernel(inline="always", fastmath=FAST)
+def series(state, matrix, damping, left, right, local, span, moving, graded, enough, terms, room):
     """Sum the series of one step into `state` (2 n, cols); returns how many terms it took.
 
     local (1 + 3 G, ORDER): coefficients of dt/dx, and of k, c, r along every direction (times dt/dx if graded), x in
     [0, 1]; span: dt/dx if not graded. Beyond the 2 n homogeneous solutions, a single column feels r; G ORDER columns
-    feel one power of x along one direction each. Terms of y and y' go to y, w (., n cols),
-    those of `right_g^T y` and `right_g^T y'` to ry, rw (., G cols), after `PAST` rows of zeros. They
-    are taken until those of the velocities stay below the share `enough`.
+    feel one power of x along one direction each. Terms of y, y', `right_g^T y` and `right_g^T y'` go to `terms`
+    (., 2 n + 2 G, cols), after `PAST` zeros. They are taken until those of the velocities stay below the share
+    `enough`. room (G + 2 n, cols): for work.
     """
     groups, n = left.shape
+    size = 2 * n
     cols = state.shape[1]
-    small = 0
-    force = np.zeros(groups * cols)
-    ty = np.empty(n * cols)
-    tw = np.empty(n * cols)
-    for i in range(n):
+    small = used = 0
+    for i in range(size):
         for j in range(cols):
-            y[PAST, i * cols + j] = state[i, j]
-            w[PAST, i * cols + j] = state[n + i, j]
+            terms[PAST, i, j] = state[i, j]
     for order in range(TERMS - 1):
         o = order + PAST
         for g in range(groups):
-            b = g * cols
-            for j in range(b, b + cols):
-                ry[o, j] = 0.0
-                rw[o, j] = 0.0
-            for i in range(n):
-                f = right[g, i]
-                if f != 0.0:
-                    a = i * cols
-                    for j in range(cols):
-                        ry[o, b + j] += f * y[o, a + j]
-                        rw[o, b + j] += f * w[o, a + j]
-            if active[g]:
-                # products of polynomials and series
-                q = 1 + 3 * g
-                f0, f1, f2, f3 = local[q, 0], local[q, 1], local[q, 2], local[q, 3]
-                f4, f5, f6 = local[q, 4], local[q, 5], local[q, 6]
-                for j in range(b, b + cols):
-                    force[j] = (
-                        f0 * ry[o, j]
-                        + f1 * ry[o - 1, j]
-                        + f2 * ry[o - 2, j]
-                        + f3 * ry[o - 3, j]
-                        + f4 * ry[o - 4, j]
-                        + f5 * ry[o - 5, j]
-                        + f6 * ry[o - 6, j]
-                    )
-                if moving:
-                    for r in range(ORDER):
-                        f = local[q + 1, r]
-                        for j in range(b, b + cols):
-                            force[j] += f * rw[o - r, j]
-            else:
-                for j in range(b, b + cols):
-                    force[j] = 0.0
+            for j in range(cols):
+                room[g, j] = 0.0
+            for part in range(2):
+                row = size + part * groups + g
+                for j in range(cols):
+                    terms[o, row, j] = 0.0
+                for i in range(n):
+                    f = right[g, i]
+                    if f != 0.0:
+                        for j in range(cols):
+                            terms[o, row, j] += f * terms[o, part * n + i, j]
+                if part == 0 or moving:
+                    # products of polynomials and series
+                    for q in range(ORDER):
+                        f = local[1 + 3 * g + part, q]
+                        if f != 0.0:
+                            for j in range(cols):
+                                room[g, j] += f * terms[o - q, row, j]
             if order < ORDER:
-                if cols == 2 * n + 1:
-                    force[b + cols - 1] += local[3 + 3 * g, order]
-                elif cols > 2 * n:
-                    force[b + 2 * n + g * ORDER + order] += 1.0
+                if cols == size + 1:
+                    room[g, size] += local[3 + 3 * g, order]
+                elif cols > size:
+                    room[g, size + g * ORDER + order] += 1.0
         share = 1.0 / (order + 1)
-        if graded:
-            for j in range(n * cols):
-                ty[j] = 0.0
-                tw[j] = 0.0
-            for r in range(ORDER):
-                f = local[0, r]
-                for j in range(n * cols):
-                    ty[j] += f * y[o - r, j]
-                    tw[j] += f * w[o - r, j]
-        else:
+        if not graded:
             share *= span
-            for j in range(n * cols):
-                ty[j] = y[o, j]
-                tw[j] = w[o, j]
+        for i in range(size):
+            for j in range(cols):
+                room[groups + i, j] = 0.0 if graded else terms[o, i, j]
+            if graded:
+                for q in range(ORDER):
+                    f = local[0, q]
+                    for j in range(cols):
+                        room[groups + i, j] += f * terms[o - q, i, j]
+        most = last = 0.0
         for i in range(n):
-            a = i * cols
-            for j in range(a, a + cols):
-                y[o + 1, j] = share * tw[j]
-                w[o + 1, j] = 0.0
+            for j in range(cols):
+                terms[o + 1, i, j] = share * room[groups + n + i, j]
+                terms[o + 1, n + i, j] = 0.0
             for k in range(n):
                 p = share * matrix[i, k]
                 q = share * damping[i, k]
                 if p != 0.0 or q != 0.0:
-                    b = k * cols
                     for j in range(cols):
-                        w[o + 1, a + j] -= p * ty[b + j] + q * tw[b + j]
+                        terms[o + 1, n + i, j] -= p * room[groups + k, j] + q * room[groups + n + k, j]
             for g in range(groups):
                 f = share * left[g, i]
                 if f != 0.0:
-                    b = g * cols
                     for j in range(cols):
-                        w[o + 1, a + j] -= f * force[b + j]
+                        terms[o + 1, n + i, j] -= f * room[g, j]
             for j in range(cols):
-                state[i, j] += y[o + 1, a + j]
-                state[n + i, j] += w[o + 1, a + j]
+                state[i, j] += terms[o + 1, i, j]
+                state[n + i, j] += terms[o + 1, n + i, j]
+                most = max(most, abs(state[n + i, j]))
+                last = max(last, abs(terms[o + 1, n + i, j]))
+        used = order
         if order + 1 >= ORDER:
-            most = last = 0.0
-            for i in range(n):
-                for j in range(cols):
-                    most = max(most, abs(state[n + i, j]))
-                    last = max(last, abs(w[o + 1, i * cols + j]))
             small = small + 1 if last <= enough * most else 0
             if small == 2:
-                return order
-    return TERMS - 2
+                break
+    return used
 
 
-@kernel(fastmath=FAST)
-def evaluate(terms, used, g, cols, x, out):
-    """The series of direction g at x into out (cols,)."""
-    b = g * cols
-    for j in range(cols):
-        out[j] = terms[PAST + used, b + j]
+@kernel(inline="always", fastmath=FAST)
+def evaluate(terms, used, row, x, out):
+    """The series of a row of `terms` at x into out (cols,)."""
+    for j in range(out.shape[0]):
+        out[j] = terms[PAST + used, row, j]
     for order in range(PAST + used - 1, PAST - 1, -1):
-        for j in range(cols):
-            out[j] = out[j] * x + terms[order, b + j]
+        for j in range(out.shape[0]):
+            out[j] = out[j] * x + terms[order, row, j]
 
 
 @kernel(fastmath=FAST)

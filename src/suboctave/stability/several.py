@@ -6,6 +6,8 @@ with y in DOFs weighted by the square roots of their masses, so that norms have 
 r_g are polynomials, and the solution is summed as a power series in s, whose coefficients follow from each other; the
 elements enter as products of rank one, so that a term costs hardly more than with constant matrices. Series converge
 for any length; panels are taken in steps short enough for rounding not to grow.
+
+A function and two kernels, `plan` and `march`: one kernel for all took too long to compile at the first use.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.harmonic.basis import Array
 from suboctave.stability.nodes import NODES, ORDER
 from suboctave.stability.series import FAST, PAST, TERMS, evaluate, growth, norm, series, shifted, through
 
@@ -29,9 +32,22 @@ _REACH, _MOST = 4.0, 10000
 _EXACT, _CLOSE = 1e-15, 1e-11
 
 
-@kernel()
-def propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force, kick, powers, nodes):
-    """Monodromy matrix and, where there is a force, what `_respond` needs.
+def propagate(
+    stretch: Array,
+    scale: float,
+    stiffness: Array,
+    damping: Array,
+    left: Array,
+    right: Array,
+    base: Array,
+    k: Array,
+    c: Array,
+    force: Array,
+    kick: Array,
+    powers: Array,
+    nodes: Array,
+) -> tuple[Array, Array, Array]:
+    """Monodromy matrix and, where there is a force, what `respond` needs.
 
     stretch: dtau/ds (P, m); scale: dt/dtau; stiffness, damping: K_0, C_0 (n, n); left, right (G, n); base (G, P): parts
     of k_g that are constant on every panel; k (G, N) or (G, 0): the others at the nodes; c (G, N) or (G, 0): c_g; force
@@ -41,38 +57,37 @@ def propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force
     - the same for every panel alone (P, 2 n, cols),
     - right_g^T y, right_g^T y' at the nodes of every panel for these columns (G, 2, P, m, cols).
     """
-    count = stretch.shape[0]
+    count = len(stretch)
     groups, n = left.shape
-    forced = force.shape[1] > 0
-    moving = c.shape[1] > 0
-    varying = k.shape[1] > 0
     size = 2 * n
+    forced = force.shape[1] > 0
     cols = size + 1 if forced else size
-    total = np.zeros((size, cols))
-    for i in range(size):
-        total[i, i] = 1.0
+    many = size + groups * ORDER if forced else size
+    poly = np.zeros((count, 1 + 3 * groups, ORDER))
+    matrices = np.empty((count, n, n))
+    steps = np.empty(count, dtype=np.int64)
+    plan(stretch, scale, stiffness, damping, left, right, base, k, c, force, powers, poly, matrices, steps)
+    total = np.eye(size, cols)
     alone = np.empty((count, size, cols))
     rows = np.zeros((groups, 2, count, ORDER, cols) if forced else (0, 2, 1, ORDER, cols))
     # terms of the series, and those where all is constant
-    y = np.zeros((PAST + TERMS, n * cols))
-    w = np.zeros((PAST + TERMS, n * cols))
-    ry = np.zeros((PAST + TERMS, groups * cols))
-    rw = np.zeros((PAST + TERMS, groups * cols))
-    many = size + groups * ORDER if forced else size
-    hy = np.zeros((PAST + TERMS, groups * many))
-    hw = np.zeros((PAST + TERMS, groups * many))
-    hall = np.zeros((2, PAST + TERMS, n * many))
-    step_matrix = np.empty((size, many))
-    at_nodes = np.empty((ORDER, groups, 2, many))
-    product = np.empty((size, cols))
-    known = known_steps = 0
-    matrix = np.empty((n, n))
-    current = np.zeros(groups)
-    poly = np.zeros((1 + 3 * groups, ORDER))
+    terms, plain = (np.zeros((PAST + TERMS, size + 2 * groups, columns)) for columns in (cols, many))
+    march(
+        stretch, scale, damping, left, right, base, kick, nodes, poly, matrices, steps, c.shape[1] > 0, forced,
+        total, alone, rows, terms, plain,
+    )  # fmt: skip
+    return total, alone, rows
+
+
+@kernel()
+def plan(stretch, scale, stiffness, damping, left, right, base, k, c, force, powers, poly, matrices, steps):
+    """What `march` needs of every panel.
+
+    poly (P, 1 + 3 G, ORDER), zeros before: coefficients of powers of s in dt/ds, if the panel is graded, and in k_g,
+    c_g, r_g, times dt/ds then; matrices (P, n, n): K_0 with the constant parts of k_g; steps (P,).
+    """
+    groups, n = left.shape
     local = np.zeros((1 + 3 * groups, ORDER))
-    active = np.zeros(groups, dtype=np.bool_)
-    size_c = norm(damping)
-    size_k = known_span = -1.0
     shares = np.empty(groups)
     for g in range(groups):
         top = whole = 0.0
@@ -80,116 +95,135 @@ def propagate(stretch, scale, stiffness, damping, left, right, base, k, c, force
             top = max(top, abs(left[g, i]))
             whole += abs(right[g, i])
         shares[g] = top * whole
-    for p in range(count):
-        at = p * (ORDER - 1)
-        changed = size_k < 0.0
-        for g in range(groups):
-            changed = changed or base[g, p] != current[g]
-        if changed:
-            known_span = -1.0
-            for i in range(n):
-                for j in range(n):
-                    matrix[i, j] = stiffness[i, j]
-            for g in range(groups):
-                current[g] = base[g, p]
-                for i in range(n):
-                    for j in range(n):
-                        matrix[i, j] += base[g, p] * left[g, i] * right[g, j]
-            size_k = norm(matrix)
+    size_c = norm(damping)
+    for p in range(stretch.shape[0]):
+        for i in range(n):
+            for j in range(n):
+                a = stiffness[i, j]
+                for g in range(groups):
+                    a += base[g, p] * left[g, i] * right[g, j]
+                matrices[p, i, j] = a
+        size_k = norm(matrices[p])
         graded = stretch[p, 0] != stretch[p, ORDER - 1]
+        constant = not graded
+        length = 0.0
+        for j in range(ORDER):
+            at = p * (ORDER - 1) + j
+            factor = scale * stretch[p, j]
+            length = max(length, factor)
+            if graded:
+                add(poly[p, 0], powers, j, factor)
+            else:
+                factor = 1.0
+            for g in range(groups):
+                if k.shape[1] > 0 and k[g, at] != 0.0:
+                    constant = False
+                    add(poly[p, 1 + 3 * g], powers, j, factor * k[g, at])
+                if c.shape[1] > 0 and c[g, at] != 0.0:
+                    constant = False
+                    add(poly[p, 2 + 3 * g], powers, j, factor * c[g, at])
+                if force.shape[1] > 0:
+                    add(poly[p, 3 + 3 * g], powers, j, factor * force[g, at])
+        # the series converges anyhow, but on the way to the last digits its terms should not become large
+        most = _REACH if constant else 2.0 * _REACH
+        number = max(1, math.ceil((math.sqrt(size_k) + size_c) * 2.0 * length / most))
+        while (
+            not constant
+            and number < _MOST
+            and growth(poly[p], local, 2.0 / number, number, length, graded, size_k, size_c, shares) > most
+        ):
+            number += 1 + number // 8
+        steps[p] = number
+
+
+@kernel()
+def add(out, powers, j, value):
+    """Add to the coefficients `out` what the value at node j contributes."""
+    for i in range(ORDER):
+        out[i] += powers[i, j] * value
+
+
+@kernel(at_once=True)
+def march(
+    stretch, scale, damping, left, right, base, kick, nodes, poly, matrices, steps, moving, forced,
+    total, alone, rows, terms, plain,
+):  # fmt: skip
+    """Take the identity `total` over all panels; fill `alone` and `rows` (see `propagate`).
+
+    terms, plain (PAST + TERMS, 2 n + 2 G, .): room for the series, and for those where all is constant.
+    """
+    groups, n = left.shape
+    size = 2 * n
+    cols = total.shape[1]
+    many = plain.shape[2]
+    local = np.zeros((1 + 3 * groups, ORDER))
+    # a step's propagator, followed by the rows that lead to its nodes
+    known = np.empty((size + 2 * groups * ORDER, many))
+    product = np.empty((size, cols))
+    room = np.empty((groups + size, many))
+    known_span = -1.0
+    known_steps = used = 0
+    for p in range(stretch.shape[0]):
+        graded = stretch[p, 0] != stretch[p, ORDER - 1]
+        constant = not graded
         length = 0.0
         for j in range(ORDER):
             length = max(length, scale * stretch[p, j])
-        constant = not graded
         for g in range(groups):
-            top_k = top_c = 0.0
-            for j in range(ORDER):
-                if varying:
-                    top_k = max(top_k, abs(k[g, at + j]))
-                if moving:
-                    top_c = max(top_c, abs(c[g, at + j]))
-            active[g] = top_k > 0.0 or top_c > 0.0
-            if active[g]:
-                constant = False
-        for i in range(ORDER):
-            for q in range(1 + 3 * groups):
-                poly[q, i] = 0.0
-            for j in range(ORDER):
-                f = powers[i, j]
-                if graded:
-                    f *= scale * stretch[p, j]
-                    poly[0, i] += f
-                for g in range(groups):
-                    if active[g]:
-                        poly[1 + 3 * g, i] += f * k[g, at + j]
-                        if moving:
-                            poly[2 + 3 * g, i] += f * c[g, at + j]
-                    if forced:
-                        poly[3 + 3 * g, i] += f * force[g, at + j]
-        # the series converges anyhow, but on the way to the last digits its terms should not become large
-        most = _REACH if constant else 2.0 * _REACH
-        steps = max(1, math.ceil((math.sqrt(size_k) + size_c) * 2.0 * length / most))
-        while (
-            not constant
-            and steps < _MOST
-            and growth(poly, local, 2.0 / steps, steps, length, graded, size_k, size_c, shares) > most
-        ):
-            steps += 1 + steps // 8
-        span = 2.0 / steps
+            if p > 0 and base[g, p] != base[g, p - 1]:
+                known_span = -1.0
+            for i in range(ORDER):
+                if poly[p, 1 + 3 * g, i] != 0.0 or poly[p, 2 + 3 * g, i] != 0.0:
+                    constant = False
+        span = 2.0 / steps[p]
         one = alone[p]
         for i in range(size):
             for j in range(cols):
                 one[i, j] = 1.0 if i == j else 0.0
-        if constant and abs(span * length - known_span) > 1e-13 * known_span:
-            # every step has the same propagator, and the same response to a power of x
+        # where all is constant every step has the same propagator, and the same response to a power of x
+        new = not constant or abs(span * length - known_span) > 1e-13 * known_span
+        if constant and new:
             known_span = span * length
             known_steps = 0
             for i in range(size):
                 for j in range(many):
-                    step_matrix[i, j] = 1.0 if i == j else 0.0
-            known = series(
-                step_matrix, matrix, damping, left, right, local, known_span, active, moving, False, _EXACT,
-                hall[0], hall[1], hy, hw,
-            )  # fmt: skip
-        fresh = steps != known_steps
+                    known[i, j] = 1.0 if i == j else 0.0
+        fresh = steps[p] != known_steps
         if constant:
-            known_steps = steps
-        for step in range(steps):
+            known_steps = steps[p]
+        into = plain if constant else terms
+        for step in range(steps[p]):
             origin = -1.0 + span * step
             for q in range(1 + 3 * groups):
-                shifted(poly[q], origin, span, local[q])
+                shifted(poly[p, q], origin, span, local[q])
                 if graded:
                     for i in range(ORDER):
                         local[q, i] *= span
-            used = 0
-            if not constant:
+            if new:
                 used = series(
-                    one, matrix, damping, left, right, local, span * length, active, moving, graded, _CLOSE,
-                    y, w, ry, rw,
+                    known if constant else one, matrices[p], damping, left, right, local, span * length, moving, graded,
+                    _EXACT if constant else _CLOSE, into, room,
                 )  # fmt: skip
+                new = not constant
             if forced:
                 for j in range(ORDER):
                     x = (nodes[j] - origin) / span
                     if x < -1e-9 or x > 1.0 + 1e-9:
                         continue
-                    for g in range(groups):
-                        for part in range(2):
-                            into = rows[g, part, p, j]
-                            if not constant:
-                                evaluate(ry if part == 0 else rw, used, g, cols, x, into)
-                                continue
-                            row = at_nodes[j, g, part]
-                            if fresh:
-                                evaluate(hy if part == 0 else hw, known, g, many, x, row)
-                            through(row, one, local, into)
+                    for i in range(2 * groups):
+                        at = size + 2 * groups * j + i
+                        out = rows[i % groups, i // groups, p, j]
+                        if fresh or not constant:
+                            evaluate(into, used, size + i, x, known[at] if constant else out)
+                        if constant:
+                            through(known[at], one, local, out)
             if constant:
                 for i in range(size):
-                    through(step_matrix[i], one, local, product[i])
+                    through(known[i], one, local, product[i])
                 for i in range(size):
                     for j in range(cols):
                         one[i, j] = product[i, j]
         advance(total, one, left, right, kick, p, product)
-    return total, alone, rows
 
 
 @kernel(fastmath=FAST)
