@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         periodic_orbit,
         stability,
         switch_branch,
+        track,
         verify,
     )
     from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
@@ -113,6 +114,7 @@ _HOME = {
     "Monodromy": "suboctave.stability",
     "Hill": "suboctave.stability",
     "KoopmanHill": "suboctave.stability",
+    "track": "suboctave.analysis",
     "verify": "suboctave.analysis",
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
@@ -182,6 +184,7 @@ __all__ = [
     "plot_spectrum",
     "stability",
     "switch_branch",
+    "track",
     "verify",
     "write_report",
 ]

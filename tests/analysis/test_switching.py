@@ -68,6 +68,49 @@ def test_the_cascade_of_the_strongly_forced_oscillator(strong, reference):
     assert four.arrives.omega == pytest.approx(two.bifurcations["PD"][1].omega, abs=1e-6)
 
 
+def direction_of(item):
+    """Which way omega goes on the branch that leaves a period doubling, from its first three points."""
+    stepping = so.SteppingOptions(max_step=1e-3, initial_step=1e-3, max_points=3)
+    branch = so.switch_branch(item, stepping=stepping)
+    return np.sign(branch.omega[1] - branch.omega[0])
+
+
+def stands_for(item):
+    """The side on which the branch must lie: a supercritical one where the parent's multiplier is beyond -1."""
+    form = item.normal_form
+    return np.sign(form["curvature"])
+
+
+def test_criticality_is_that_of_the_branch_itself(weak, strong):
+    response, two = strong
+    four = so.switch_branch(two.bifurcations["PD"][0])
+    doublings = [d for curve in (weak, response, two, four) for d in curve.bifurcations["PD"]]
+    assert len(doublings) == 10
+    for item in doublings:
+        assert direction_of(item) == stands_for(item)
+    # the branch of a subcritical one turns back at a limit point before it can attract
+    assert [item.criticality for item in doublings].count("subcritical") >= 1
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, *(pytest.param(n, marks=pytest.mark.slow) for n in range(3, 20))])
+def test_criticality_along_the_curve_of_doublings_over_the_gap(number):
+    """Twenty gaps drawn by a fixed seed, on both sides of the generalised period doublings of the arctan law.
+
+    For j between these the branch leaves on the other side at once. Just outside, it begins as told and turns back at a
+    limit point within 1e-3.
+    """
+    gap = np.random.default_rng(11).uniform(0.0, 0.177, 20)[number]
+    system = so.library.reference_oscillator(p=0.55, j=float(gap), regularization=3000.0)
+    curve = so.frequency_response(system, (4.5, 1.9))
+    first, last = curve.bifurcations["PD"]
+    for item in (first, last):
+        assert item.criticality is not None
+        assert direction_of(item) == stands_for(item)
+        unstable = curve.omega[~curve.stable & (curve.omega < first.omega) & (curve.omega > last.omega)]
+        inwards = np.sign(unstable.mean() - item.omega)
+        assert (item.criticality == "supercritical") == (direction_of(item) == inwards)
+
+
 @pytest.mark.slow
 def test_no_event_hides_right_beside_the_parent(strong):
     """The 8T branch doubles again within 4e-4 of where it begins: seen from either end, the events are the same."""

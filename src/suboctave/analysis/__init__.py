@@ -5,6 +5,8 @@ from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
+from suboctave.analysis.track import track
+from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
@@ -15,6 +17,7 @@ __all__ = [
     "Results",
     "Seeds",
     "Table",
+    "TrackedBranch",
     "Verification",
     "bifurcation_diagram",
     "continue_branch",
@@ -24,5 +27,6 @@ __all__ = [
     "periodic_orbit",
     "stability",
     "switch_branch",
+    "track",
     "verify",
 ]

@@ -15,6 +15,7 @@ from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.branching import doubled_direction
 from suboctave.bifurcation.finder import position
+from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import Arrival, CurvePoint, between, make_point
@@ -25,7 +26,18 @@ from suboctave.harmonic.basis import ComplexArray, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind
 from suboctave.stability import FloquetResult, floquet_multipliers
 
-__all__ = ["UNSEEN", "Beside", "Junction", "Meeting", "beside", "doubled", "emanating", "meeting", "period_name"]
+__all__ = [
+    "UNSEEN",
+    "Beside",
+    "Junction",
+    "Meeting",
+    "beside",
+    "curvature_of",
+    "doubled",
+    "emanating",
+    "meeting",
+    "period_name",
+]
 
 #: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
@@ -154,7 +166,9 @@ def _last_before(
     direction = emanating(found, curve, b.weights)
     if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
         direction = -direction
-    close = beside(curve, there, direction, b.weights, doubled(found.floquet), newton, 0.7 * way)
+    assert found.vectors is not None
+    form = normal_form("PD", found.state, found.vectors, curve.name)
+    close = beside(curve, there, direction, b.weights, doubled(found.floquet), newton, curvature_of(form), 0.7 * way)
     if close is None:
         return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
     point = close.point
@@ -188,6 +202,7 @@ def beside(
     weights: Array,
     multipliers: ComplexArray,
     newton: NewtonOptions,
+    curvature: float | None = None,
     reach: float = np.inf,
 ) -> Beside | None:
     """The curve's point close to a bifurcation in a direction, with its tangent pointing away; None if there is none.
@@ -202,6 +217,8 @@ def beside(
         The bifurcation, and where the curve leaves it, of unit length in `weights`.
     multipliers
         Of the motion at u, over the period of the curve's motions.
+    curvature
+        Which way the parameter goes, by its sign, where a normal form tells.
     reach
         Distance that the point must not exceed.
     """
@@ -214,7 +231,7 @@ def beside(
         except ConvergenceError:
             continue
         points.append((distance, point))
-        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1]):
+        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1], curvature):
             return Beside(points[-2][1], True)
     return Beside(points[-1][1], False) if points else None
 
@@ -237,7 +254,7 @@ def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
     return float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
 
 
-def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint]) -> bool:
+def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint], curvature: float | None) -> bool:
     """Whether the parameter goes one way between two points beside a bifurcation, and goes on so at both.
 
     The bifurcation's own place is not asked: cut off at a harmonic, the two curves meet a little elsewhere.
@@ -246,7 +263,15 @@ def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint]) -
     way = far[1].u[index] - close[1].u[index]
     slopes = [point.tangent[index] for _, point in (far, close)]
     moved = abs(way) * far[1].weights[index]
-    return moved <= _STILL or all(slope * way > 0.0 for slope in slopes)
+    foretold = curvature is None or curvature * way > 0.0
+    return moved <= _STILL or (foretold and all(slope * way > 0.0 for slope in slopes))
+
+
+def curvature_of(form: NormalForm | None) -> float | None:
+    """Which way the parameter goes on the branch that leaves a bifurcation; None where its form leaves that open."""
+    if form is None or form.criticality is None:
+        return None
+    return form.coefficients.get("curvature")
 
 
 def doubled(result: FloquetResult) -> ComplexArray:

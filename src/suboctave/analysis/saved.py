@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +18,12 @@ import numpy as np
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.junction import Junction
+from suboctave.analysis.tracked_branch import TrackedBranch, tracked_points, tracked_record
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.normal_form import NormalForm
+from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
@@ -89,6 +92,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
         "tables": writer.tables(),
+        "tracked": tracked_record(branch) if isinstance(branch, TrackedBranch) else None,
     }
     new["record"] = ((), np.array(to_json(record), dtype=object))
     for name, array in writer.arrays.items():
@@ -310,7 +314,9 @@ class _Reader:
         for (place, index), event in zip(record["event_list"], events, strict=True):
             lists[place][index] = event
         bifurcations, own = ([found[i] for i in range(len(found))] for found in lists)
-        branch = Branch(
+        tracked = record.get("tracked")
+        make = partial(TrackedBranch, tracked["kind"], tracked["names"]) if tracked else Branch
+        branch: Branch = make(
             self.system,
             record["name"],
             points,
@@ -339,6 +345,8 @@ class _Reader:
             at = {name: float(value) for name, value in zip(names, values[i], strict=True)}
             orbit, floquet = motions.at(i, said, float(omega[i]), at, float(residual[i]), float(error[i]))
             points.append(BranchPoint(orbit, floquet, float(arclength[i]), int(iterations[i])))
+        if self.record.get("tracked"):
+            points[:] = tracked_points(points, self.record["tracked"])
         return points
 
     def _events(self) -> list[Bifurcation]:
@@ -359,7 +367,8 @@ class _Reader:
                 context["system"] = self.systems[context["system"]]
             # older files hold no normal forms: they are computed when asked for
             fields = {name: value for name, value in said["fields"].items() if name != "criticality"}
-            event = Bifurcation(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            made = TrackedEvent if "curve" in fields else Bifurcation
+            event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
             events.append(event.with_normal_form(said["normal_form"]) if "normal_form" in said else event)
         return events
 

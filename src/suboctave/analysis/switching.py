@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_bounds, make_settings
 from suboctave.analysis.follow import follow, same_event
-from suboctave.analysis.junction import UNSEEN, beside, doubled, emanating, period_name
+from suboctave.analysis.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
@@ -324,7 +324,8 @@ def _away(
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
     expected = doubled(item.floquet) if item.kind == "PD" else item.floquet.multipliers
-    close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton)
+    leads = curvature_of(item.normal_form)
+    close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
     if close is None:
         raise ConvergenceError(
             f"no point of the other branch was found beside the {KINDS[item.kind]} at {curve.where(u)}: its direction "
@@ -337,7 +338,7 @@ def _away(
         u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
         weights = adapted.weights(u, 0.0)
         direction = direction / length(weights * direction)
-        again = beside(adapted, u, direction, weights, expected, settings.newton)
+        again = beside(adapted, u, direction, weights, expected, settings.newton, leads)
         if again is not None and (again.smooth or not close.smooth):
             close = again
     if not close.smooth:

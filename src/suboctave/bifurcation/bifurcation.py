@@ -24,6 +24,14 @@ KINDS = {
     "PD": "period doubling",
     "NS": "Neimark-Sacker",
     "grazing": "grazing contact",
+    "extremum": "extremum of a parameter along a curve of bifurcations",
+    "CP": "cusp",
+    "GPD": "generalised period doubling",
+    "R1": "1:1 resonance",
+    "R2": "1:2 resonance",
+    "R3": "1:3 resonance",
+    "R4": "1:4 resonance",
+    "LPPD": "fold-flip",
 }
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)
@@ -157,6 +165,11 @@ class Bifurcation:
         """Where the multipliers come from, in words."""
         return self.floquet.method
 
+    @property
+    def free_names(self) -> tuple[str, ...]:
+        """Names of the parameters that are free on the curve."""
+        return (self.parameter_name,)
+
     def parameter(self, name: str) -> float:
         """omega or a parameter by name."""
         if name == "omega":
@@ -233,18 +246,18 @@ class BifurcationList:
     def __repr__(self) -> str:
         if not self.met:
             return "no bifurcations"
-        free = next((b.parameter_name for b in self.met if b.parameter_name != "omega"), None)
+        free = [name for name in dict.fromkeys(n for b in self.met for n in b.free_names) if name != "omega"]
         width = max(6, 1 + max(len(b.kind) for b in self.met))
         head = (
             f"{'kind':<{width}}{'omega':>13}"
-            + (f"{free:>14}" if free else "")
+            + "".join(f"{name:>14}" for name in free)
             + f"{'amplitude':>14}{'multiplier':>24}{'criticality':>15}{'residual':>11}"
         )
         rows = [head]
         for b in self.met:
             mu = b.critical_multiplier()
             text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
-            extra = f"{b.parameter(free):>14.8g}" if free else ""
+            extra = "".join(f"{b.parameter(name):>14.8g}" for name in free)
             remark = b.remark()
             label = b.criticality or ("" if b.normal_form is None else b.normal_form.shape)
             rows.append(

@@ -114,12 +114,12 @@ class Touch(BifurcationKind):
         """
         start = guess.state()
         tau = np.array([self._nearest(start)])
-        direction = _direction(start, self.element)
+        direction = read_direction(start, self.element)
         high = start.basis.harmonics
         column = np.zeros(start.balance.dimension)
 
         def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
-            rows = _rows(high, float(extra[0]))
+            rows = basis_rows(high, float(extra[0]))
             u = state.x @ direction
             value, slope, curve = (float(row @ u) for row in rows)
             level = levels(state.local(self.element))[self.index]
@@ -141,8 +141,8 @@ class Touch(BifurcationKind):
     def rise(self, found: Grazing, name: str) -> Array:
         """Gradient of the extremum's height over the gap by coefficients and free parameter, shape (dimension + 1,)."""
         state = found.state
-        value = _rows(state.basis.harmonics, found.tau)[0]
-        direction = _direction(state, self.element)
+        value = basis_rows(state.basis.harmonics, found.tau)[0]
+        direction = read_direction(state, self.element)
         by_x = state.balance.packed(np.multiply.outer(value, direction))
         return np.append(by_x, -level_rate(state, self.element, self.index, name))
 
@@ -156,13 +156,13 @@ class Touch(BifurcationKind):
         raise ConvergenceError("the motion has no extremum here")
 
 
-def _direction(state: BalanceState, element: int) -> Array:
+def read_direction(state: BalanceState, element: int) -> Array:
     """The displacement that an element's gaps are places of, in the unknown DOFs."""
     system = state.balance.system
     return state.linear.retain(reads(system.elements[element], system.n))
 
 
-def _rows(high: int, tau: float) -> tuple[Array, Array, Array]:
+def basis_rows(high: int, tau: float) -> tuple[Array, Array, Array]:
     """Basis functions at an instant and their first two derivatives by tau, shape (2 H + 1,) each."""
     k = np.arange(1.0, high + 1.0)
     value, slope, curve = np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1)

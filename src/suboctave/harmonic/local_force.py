@@ -60,6 +60,15 @@ class CoefficientForce:
 
 
 @dataclass(frozen=True)
+class CoefficientChange:
+    """Fourier coefficients of what a change of the element's coefficients does to `f`, `f_u`, `f_v`, (top + 1,)."""
+
+    force: ComplexArray
+    stiffness: ComplexArray
+    damping: ComplexArray | None
+
+
+@dataclass(frozen=True)
 class LocalMotion:
     """An element on a motion: coefficients of the relative displacement (H + 1,), the base frequency, the element's
     numbers.
@@ -195,3 +204,24 @@ def coefficient_force(local: LocalMotion) -> CoefficientForce:
         second[j, i] -= chi
         second[j, j] += contact.side * s * comb
     return CoefficientForce(force, stiffness, None, second)
+
+
+def coefficient_change(local: LocalMotion, rates: Array) -> CoefficientChange:
+    """First derivatives along a change of the element's coefficients, `rates` (nc,); kept with the motion."""
+    known: dict[bytes, CoefficientChange] = local.__dict__.setdefault("_changes", {})
+    key = rates.tobytes()
+    if key not in known:
+        known[key] = _coefficient_change(local, rates)
+    return known[key]
+
+
+def _coefficient_change(local: LocalMotion, rates: Array) -> CoefficientChange:
+    if local.pieces is not None:
+        whole = coefficient_force(local)
+        return CoefficientChange(rates @ whole.force, rates @ whole.stiffness, None)
+    nodes = local.nodes()
+    x, xd = kernels.motion(local.motion, nodes.zr, nodes.zi)
+    parts = local.element.coefficient_tangent(x, local.rate * xd, local.coefficients)
+    rows = np.array([(rates @ part) * nodes.weights for part in parts if part is not None])
+    found = kernels.spectra(rows, nodes.zr, nodes.zi, local.top)
+    return CoefficientChange(found[0], found[1], found[2] if len(found) > 2 else None)

@@ -21,7 +21,7 @@ import numpy as np
 
 from suboctave.harmonic import kernels, nodal_second, real_form
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.local_force import Curvature, coefficient_force
+from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.second import Direction, second_derivative
 from suboctave.harmonic.state import BalanceState, apply_blocks
@@ -170,11 +170,7 @@ def bilinear_gradient(
             change = coefficient_rates(element, state.values, {name: 1.0})
             if change.any():
                 d = linear.retain(element.direction(state.balance.system.n))
-                ue, ve = u_force @ d, v @ d
-                c = coefficient_force(local)
-                rates[name] += _inner(ue, _toeplitz_apply(change @ c.stiffness, ve))
-                if c.damping is not None:
-                    rates[name] += _inner(ue, _toeplitz_apply(change @ c.damping, 1j * frequency * ve))
+                rates[name] += _change_of_form(local, change, u_force @ d, v @ d, frequency)
     g_kappa += _form(u, slope, v)
     compliance_slope = linear.compliance(frequency, 1)
     if compliance_slope is not None:
@@ -195,6 +191,52 @@ def bilinear_gradient(
     if kind is Kind.FREE:
         return Gradient(gx, rates, g_kappa)
     return Gradient(gx.real, {k: complex(r.real) for k, r in rates.items()}, g_kappa)
+
+
+def form_rates(
+    state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray, names: tuple[str, ...], kappa: float = 0.0
+) -> dict[str, complex] | None:
+    """Derivatives of `left^H J_kappa right` by parameters alone, as `bilinear_gradient` gives them with all others.
+
+    None where that takes more than the elements' coefficients and the linear part: elements with nodes of their own, a
+    condensed model.
+    """
+    linear, elements = state.linear, state.balance.elements
+    if state.nodal or state.compliance is not None:
+        return None
+    size, rates = state.balance.size, dict.fromkeys(names, 0j)
+    for name in names:
+        changes = [coefficient_rates(element, state.values, {name: 1.0}) for element in elements]
+        if not (name in linear_names(state) or any(change.any() for change in changes)):
+            continue
+        u, f = _as_waves(left, kind, size, left=True)
+        v, _ = _as_waves(right, kind, size, left=False)
+        frequency = f * state.rate + (kappa if kind is Kind.FREE else 0.0)
+        for element, local, change in zip(elements, state.local_motions, changes, strict=True):
+            if change.any():
+                d = linear.retain(element.direction(state.balance.system.n))
+                rates[name] += _change_of_form(local, change, u @ d, v @ d, frequency)
+        block = linear.stiffness_by(frequency, (name,))
+        if block is not None:
+            rates[name] += _form(u, block, v)
+    return rates if kind is Kind.FREE else {name: complex(rate.real) for name, rate in rates.items()}
+
+
+def linear_names(state: BalanceState) -> frozenset[str]:
+    """Parameters that the linear part depends on."""
+    system = state.balance.system
+    return frozenset(system.mass.names | system.damping.names | system.stiffness.names)
+
+
+def _change_of_form(
+    local: LocalMotion, change: Array, left: ComplexArray, right: ComplexArray, frequency: Array
+) -> complex:
+    """What a change of an element's coefficients does to the form, along the element's direction."""
+    c = coefficient_change(local, change)
+    result = _inner(left, _toeplitz_apply(c.stiffness, right))
+    if c.damping is not None:
+        result += _inner(left, _toeplitz_apply(c.damping, 1j * frequency * right))
+    return result
 
 
 def _inner(left: ComplexArray, right: ComplexArray) -> complex:
@@ -301,10 +343,10 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
             if change.any():
                 d = linear.retain(element.direction(state.balance.system.n))
                 ue = u_force @ d
-                c = coefficient_force(local)
-                part = _transposed(change @ c.stiffness, ue, basis.harmonics)
+                c = coefficient_change(local, change)
+                part = _transposed(c.stiffness, ue, basis.harmonics)
                 if c.damping is not None:
-                    part = part - state.omega * basis.derivative(_transposed(change @ c.damping, ue, basis.harmonics))
+                    part = part - state.omega * basis.derivative(_transposed(c.damping, ue, basis.harmonics))
                 gx += np.multiply.outer(part, d)
     for nodal in state.nodal:
         found = nodal_second.parameter_form_gradient(nodal, u_force, state.x, state.values, name, _waves_of)

@@ -17,7 +17,7 @@ from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.group_force import Group, curvature_of
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_force
+from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
 from suboctave.harmonic.rates import coefficient_rates
@@ -290,7 +290,7 @@ class BalanceState:
             for element, local in zip(self.balance.elements, self.local_motions, strict=True):
                 rates = coefficient_rates(element, self.values, {name: 1.0})
                 if rates.any():
-                    spectrum = (rates @ coefficient_force(local).force)[:, None]
+                    spectrum = coefficient_change(local, rates).force[:, None]
                     direction = self.linear.retain(element.direction(self.balance.system.n))
                     parts.append((spectrum_to_real(spectrum, self.basis.harmonics)[:, 0], direction))
         for nodal in self.nodal:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from suboctave.errors import InputError
+from suboctave.pictures.boundary import is_boundary, plot_boundaries
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.view import View
 
@@ -55,7 +56,8 @@ def plot(
     harmonic, element, dof
         Of which harmonic (alone: its amplitude), of which element, of which degree of freedom.
     x
-        The horizontal axis: "omega" or a parameter; default what the curves were followed in.
+        The horizontal axis: "omega" or a parameter; default what the curves were followed in. Curves of bifurcations
+        (`track`) are drawn over the plane of their two parameters.
     frequency
         "rad/s" or "Hz", where the system's time is in seconds.
     omega_reference
@@ -80,6 +82,8 @@ def plot(
         several = list(several.values())
     given = list(several) if isinstance(several, list | tuple) else [several]
     datasets = [_dataset(item, view) for item in given]
+    if all(is_boundary(dataset) for dataset in datasets) and datasets:
+        return plot_boundaries(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
 
 

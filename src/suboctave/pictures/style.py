@@ -155,6 +155,14 @@ KINDS = {
     "NS": KindStyle("Neimark–Sacker", "s", "#009E73", MARKER_SIZE * 0.92),
     "BP": KindStyle("branch point", "D", "#F0E442", MARKER_SIZE * 0.88),
     "grazing": KindStyle("grazing contact", "x", INK, MARKER_SIZE * 1.4),
+    "extremum": KindStyle("extremum", "d", "#ffffff", MARKER_SIZE * 0.9),
+    "CP": KindStyle("cusp", "P", "#0072B2", MARKER_SIZE * 1.1),
+    "GPD": KindStyle("generalised period doubling", "h", "#E69F00", MARKER_SIZE * 1.12),
+    "R1": KindStyle("1:1 resonance", "<", "#56B4E9"),
+    "R2": KindStyle("1:2 resonance", ">", "#56B4E9"),
+    "R3": KindStyle("1:3 resonance", "p", "#56B4E9", MARKER_SIZE * 1.1),
+    "R4": KindStyle("1:4 resonance", "8", "#56B4E9"),
+    "LPPD": KindStyle("fold-flip", "X", "#CC79A7", MARKER_SIZE * 1.05),
 }
 
 

@@ -203,11 +203,18 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
         period=branch.orbits[0].basis.nu if len(branch.orbits) else 1,
         observed_dof=branch.observe,
         dofs=branch.system.n,
-        options={
+        options=_of_tracked(branch)
+        | {
             name: value if isinstance(value, str | int | float) else repr(value)
             for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
         },
     )
+
+
+def _of_tracked(branch: BranchLike) -> dict[str, str | int | float]:
+    """The kind and the two parameters of a curve of bifurcations."""
+    kind = getattr(branch, "kind", None)
+    return {} if kind is None else {"tracked": str(kind), "plane": "\n".join(getattr(branch, "names", ()))}
 
 
 def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,163 @@
+"""Where a curve of bifurcations ends although its parameters stay in range: its motions cease to be of its kind.
+
+- NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there.
+- BP: the unfolding is not zero any more: the symmetry that forces branch points is broken.
+- LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
+  the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
+  tracker would slide on along them: J at the parent is block diagonal, J_0 and J_half.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_events import CurveTest, DoubleMultiplier, Found, GeneralisedDoubling
+from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
+from suboctave.bifurcation.augmented import BranchPointUnfolded, SingularOperator
+from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+
+#: sub-harmonic share of the motion from which on the end of the curve is looked for, and which is none any more
+_FAINT, _NOTHING_LEFT = 3e-3, 1e-5
+#: way along the parent's curve, in scaled arclength, within which that end lies
+_BESIDE = 0.05
+#: the same along a curve of LP or PD for the end of an NS curve
+_AROUND = 0.2
+#: kappa in units of the base frequency, from 0 or 1/2, at which an NS curve has reached its end
+_RESONANT = 2e-3
+#: unfolding, in units of the forces that balance, above which there is no branch point
+_UNFOLDING = 1e-8
+
+
+@dataclass(frozen=True)
+class End:
+    """Why a curve ends, the event there where it was located, and whether the motion there is the curve's last."""
+
+    reason: str
+    event: Found | None = None
+    last: bool = False
+
+    def way(self, a: TrackedSample) -> float:
+        """Distance in the plane of the parameters from a point to the event, in scaled arclength."""
+        if self.event is None:
+            return 0.0
+        return float(np.linalg.norm(a.point.weights[-2:] * (self.event.sample.point.u[-2:] - a.point.u[-2:])))
+
+
+def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
+    """The end of a curve between two neighbours, None if it goes on."""
+    augmentation = b.curve.augmentation
+    if isinstance(augmentation, BranchPointUnfolded):
+        beta = float(b.evaluation.extra[0])
+        if abs(beta) > _UNFOLDING:
+            return End(
+                f"the branch points end after {a.curve.where(a.point.u)}: their unfolding is {beta:.1e} at "
+                f"{b.curve.where(b.point.u)}, the symmetry that forces them is broken there"
+            )
+    if isinstance(augmentation, SingularOperator) and augmentation.kind is Kind.FREE:
+        share = b.kappa / b.state.rate
+        if not _RESONANT < share < 0.5 - _RESONANT:
+            return _resonance(a, share > 0.25, newton)
+    if b.curve.balance.basis.nu == 1:
+        return None
+    share = subharmonic_share(b.point)
+    parent = _on_the_parent(a, newton) if share <= _FAINT else None
+    if parent is not None:
+        where = parent.sample.curve.where(parent.sample.point.u)
+        reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
+        return End(reason, parent, last=True)
+    if share <= _NOTHING_LEFT:
+        return End(
+            f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are period "
+            "doublings of the parent motion, which solve the same equations"
+        )
+    return None
+
+
+def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
+    """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""
+    name, operator, words = ("R2", Kind.HALF, "1:2") if double else ("R1", Kind.INTEGER, "1:1")
+    try:
+        found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(name), newton, _AROUND)
+    except ConvergenceError as failure:
+        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failure})")
+    return End(f"the curve ends in a {words} resonance at {found.sample.curve.where(found.sample.point.u)}", found)
+
+
+def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
+    """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
+    basis = a.curve.balance.basis
+    if a.curve.augmentation.name != "LP" or basis.nu % 2:
+        return None
+    parent = HarmonicBasis(max(1, basis.harmonics // 2), basis.nu // 2)
+    x = np.zeros((parent.size, a.curve.balance.size))
+    x[0], x[1::2], x[2::2] = a.state.x[0], a.state.x[3::4][: parent.harmonics], a.state.x[4::4][: parent.harmonics]
+    try:
+        balance = a.curve.balance.with_basis(parent).settle(x, a.state.omega, a.state.values)
+        curve = replace(a.curve, balance=balance, cache={balance.basis: balance})
+        return _zero_beside(a, curve, x, Kind.HALF, GeneralisedDoubling(), newton, _BESIDE)
+    except ConvergenceError:
+        return None
+
+
+def _zero_beside(
+    a: TrackedSample,
+    curve: TrackedCurve,
+    x: Array,
+    operator: Kind,
+    test: CurveTest,
+    newton: NewtonOptions,
+    reach: float,
+) -> Found:
+    """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
+    state = curve.balance.at(x, a.state.omega, a.state.values)
+    curve = replace(curve, augmentation=SingularOperator.of(state, operator))
+    u = curve.join(x, np.zeros(0), a.point.u[-2:])
+    start = nearest_point(curve, u, curve.weights(u, curve.size(u)), newton)
+    return Found(test, zero_along(start, test.value, newton, reach))
+
+
+def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
+    """A motion of the parent in the basis of a curve of doubled motions."""
+    balance = a.curve.balance
+    return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
+
+
+def keeps_subharmonics(a: CurvePoint, b: CurvePoint) -> bool:
+    """False if the sub-harmonic part of a motion may have vanished between two neighbours."""
+    curve = b.curve
+    assert isinstance(curve, TrackedCurve)
+    if curve.balance.basis.nu == 1 or subharmonic_share(b) <= _NOTHING_LEFT:
+        return True
+    before = _parts(replace(a, u=curve.transfer(a.u, a.curve), curve=curve))
+    return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, _parts(b), strict=True))
+
+
+def subharmonic_share(point: CurvePoint) -> float:
+    """Smallest share of a motion that one of its period multiplications has brought about."""
+    curve = point.curve
+    assert isinstance(curve, TrackedCurve)
+    return min(float(np.linalg.norm(part)) for part in _parts(point)) / (curve.size(point.u) or 1.0)
+
+
+def _parts(point: CurvePoint) -> list[Array]:
+    """Harmonics that the motion would not have if it repeated earlier: one array for each prime factor of nu."""
+    curve = point.curve
+    assert isinstance(curve, TrackedCurve)
+    basis = curve.balance.basis
+    nu = basis.nu
+    x = point.u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
+    k = np.repeat(np.arange(1, basis.harmonics + 1), 2)
+    primes = [d for d in range(2, nu + 1) if nu % d == 0 and all(d % e for e in range(2, math.isqrt(d) + 1))]
+    return [x[1:][k % prime != 0].ravel() for prime in primes]
+
+
+__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]

@@ -1,0 +1,212 @@
+"""Following a curve of bifurcations in two parameters: points, events, until it ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
+from suboctave.analysis.tracked_branch import TrackedPoint
+from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
+from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation import CurvePoint, March, kernels
+from suboctave.continuation.march import between, make_point
+from suboctave.continuation.newton import correct
+from suboctave.errors import ConvergenceError
+
+#: steps longer than this, in scaled arclength, must not change the curve's orientation
+_JUMP = 1e-4
+
+
+@dataclass
+class TrackedTrace:
+    """What following a curve in one direction gave."""
+
+    points: list[TrackedPoint] = field(default_factory=list)
+    events: list[TrackedEvent] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    closed: bool = False
+    ended: str = ""
+    interrupted: bool = False
+
+    def reversed_before(self, other: TrackedTrace) -> TrackedTrace:
+        """This trace walked backwards, then `other`, which started from the same point."""
+        whole = self.points[-1].arclength
+        points = [replace(p, arclength=whole - p.arclength) for p in reversed(self.points)]
+        points += [replace(p, arclength=whole + p.arclength) for p in other.points[1:]]
+        events = [replace(e, arclength=whole - e.arclength) for e in reversed(self.events)]
+        events += [replace(e, arclength=whole + e.arclength) for e in other.events]
+        same = self.ended == other.ended
+        ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
+        return TrackedTrace(points, events, self.warnings + other.warnings, False, ended, other.interrupted)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Ranges of the two free parameters, None where one is not bounded: the curve ends where it leaves them."""
+
+    first: tuple[float, float] | None
+    second: tuple[float, float]
+
+
+def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> TrackedTrace:
+    """Follow a curve from a solved start along the start's own tangent; KeyboardInterrupt ends it politely."""
+    return _Tracker(start, box, settings).run()
+
+
+class _Tracker:
+    def __init__(self, start: CurvePoint, box: Box, settings: Settings) -> None:
+        assert isinstance(start.curve, TrackedCurve)
+        self.settings = settings
+        self.box = box
+        heading = math.copysign(1.0, start.tangent[start.curve.parameter])
+        self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
+        self.trace = TrackedTrace()
+        self.tests: tuple[CurveTest, ...] = tests_of(start.curve)
+        self.previous: TrackedSample | None = None
+
+    def run(self) -> TrackedTrace:
+        trace = self.trace
+        try:
+            for point in self.march:
+                stop = self._accept(point)
+                if stop is not None:
+                    trace.ended = stop
+                    break
+            else:
+                trace.closed, trace.ended = self.march.closed, self.march.ended
+        except KeyboardInterrupt:
+            where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
+            trace.interrupted = True
+            trace.ended = f"interrupted at {where}; what was computed is kept"
+        if trace.closed:
+            _drop_seam(trace.events)
+        return trace
+
+    @staticmethod
+    def _clear(a: CurvePoint, b: CurvePoint) -> bool:
+        """True if a step stays on its curve."""
+        if b.orientation != a.orientation and b.arclength - a.arclength > _JUMP:
+            return False
+        return keeps_subharmonics(a, b)
+
+    def _accept(self, point: CurvePoint) -> str | None:
+        """Take a point in; a sentence if the curve ends there or before it."""
+        settings, new = self.settings, TrackedSample(point)
+        if self.previous is None:
+            self._add(new)
+            self.previous = new
+            return None
+        if point.curve is self.march.start.curve:
+            new = self._closing(self.previous, new)
+        a = same_discretisation(self.previous, new, settings.newton)
+        end = end_between(a, new, settings.newton)
+        if end is not None:
+            self._take_end(a, end)
+            return end.reason
+        outside = not self._inside(new)
+        landed = self._landed(a, new) if outside else new
+        if landed is None:
+            return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
+        new = self._smooth(a, landed)
+        for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
+            item = refined(found, settings.newton, self.trace.warnings)
+            self.trace.events.append(as_event(item, settings.stability, settings.observe))
+        self._add(new)
+        self.previous = new
+        if settings.report is not None:
+            low, high = self.box.second
+            settings.report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
+        return f"reached the end of the range at {new.curve.where(new.point.u)}" if outside else None
+
+    def _add(self, sample: TrackedSample) -> None:
+        point = sample.point
+        self.trace.points.append(
+            TrackedPoint(
+                sample.orbit,
+                point.arclength,
+                point.iterations,
+                self.settings.stability,
+                sample.instant_or_frequency,
+                sample.coefficient,
+            )
+        )
+
+    def _take_end(self, a: TrackedSample, end: End) -> None:
+        settings, arclength = self.settings, a.point.arclength + end.way(a)
+        if end.event is not None:
+            found = refined(end.event, settings.newton, self.trace.warnings)
+            item = as_event(found, settings.stability, settings.observe)
+            self.trace.events.append(replace(item, arclength=arclength))
+            if end.last:
+                self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability))
+
+    def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
+        """The first point again, with the bordering vectors of the last."""
+        weights = back.point.weights
+        curve = a.curve.adapted(a.point.u, a.evaluation).with_basis(back.curve.balance.basis)
+        try:
+            solved = correct(curve, back.point.u, weights * back.point.tangent, weights, self.settings.newton)
+        except ConvergenceError:
+            return back
+        along = curve.transfer(a.point.tangent, a.curve)
+        return TrackedSample(make_point(solved, curve, along, back.point.arclength))
+
+    def _smooth(self, a: TrackedSample, b: TrackedSample) -> TrackedSample:
+        """The second of two neighbours with the direction in which the curve comes to it.
+
+        On the end of a range a coefficient may have a corner (a gap that is just closed): derivatives there may be
+        those of the far side.
+        """
+        point, angle = b.point, 2.5 * self.settings.stepping.angle
+        if kernels.cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(angle):
+            return b
+        chord = point.weights * (point.u - b.curve.transfer(a.point.u, a.curve))
+        return TrackedSample(replace(point, tangent=kernels.normalised(chord, point.weights)))
+
+    def _inside(self, sample: TrackedSample) -> bool:
+        if self.box.first is None:
+            return True
+        low, high = self.box.first
+        return low <= float(sample.point.u[-2]) <= high
+
+    def _landed(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
+        """The point at which the curve leaves the range of its first parameter between two neighbours."""
+        assert self.box.first is not None
+        index = b.curve.parameter - 1
+        low, high = self.box.first
+        bound = low if b.point.u[index] < low else high
+        left, right = 0.0, 1.0
+        for _ in range(60):
+            middle = 0.5 * (left + right)
+            beyond = (between(a.point, b.point, middle)[index] - bound) * (b.point.u[index] - bound) > 0.0
+            left, right = (left, middle) if beyond else (middle, right)
+        guess = between(a.point, b.point, right)
+        guess[index] = bound
+        row = np.zeros(len(guess))
+        row[index] = 1.0
+        try:
+            solved = correct(b.curve, guess, row, b.point.weights, self.settings.newton)
+        except ConvergenceError:
+            return None
+        solved.u[index] = bound
+        arclength = a.point.arclength + right * (b.point.arclength - a.point.arclength)
+        return TrackedSample(make_point(solved, b.curve, b.point.tangent, arclength))
+
+
+def _drop_seam(events: list[TrackedEvent]) -> None:
+    """What lies on the seam of a closed curve is met at both ends: keep the first."""
+    if len(events) > 1:
+        first, last = events[0], events[-1]
+        names = first.names
+        same = all(math.isclose(first.parameter(n), last.parameter(n), rel_tol=1e-8, abs_tol=1e-12) for n in names)
+        if first.kind == last.kind and first.parameter_name == last.parameter_name and same:
+            events.pop()
+
+
+__all__ = ["Box", "TrackedTrace", "follow_tracked"]

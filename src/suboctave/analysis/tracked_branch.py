@@ -1,0 +1,132 @@
+"""A curve of bifurcations in two parameters: its points, its extrema and points of codimension two."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.bifurcation import Bifurcation
+from suboctave.continuation.problem import Array
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, StabilityMethod
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedPoint:
+    """One point of a tracked curve: orbit, position in scaled arclength, Newton iterations, and the extra unknown.
+
+    `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0; `coefficient` the one that decides the
+    normal form of an LP (a) or a PD (c3), else nan. The multipliers are computed when asked for.
+    """
+
+    orbit: PeriodicOrbit
+    arclength: float
+    iterations: int
+    method: StabilityMethod | None
+    extra: float = 0.0
+    coefficient: float = float("nan")
+    known: FloquetResult | None = None
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Multipliers and their errors."""
+        if self.known is not None or self.method is None:
+            assert self.known is not None
+            return self.known
+        return self.method.along(self.orbit.state())
+
+
+class TrackedBranch(Branch):
+    """Bifurcations of one kind in two free parameters, in order; read like a `Branch`.
+
+    Attributes
+    ----------
+    kind
+        "LP", "BP", "PD", "NS" or "grazing".
+    names
+        The two free parameters; `name` is the second.
+    bifurcations
+        Extrema of either parameter and points of codimension two, in the order met; `extrema` the former.
+    """
+
+    def __init__(self, kind: str, names: tuple[str, str], *args: Any, **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.kind = kind
+        self.names = names
+
+    @property
+    def extrema(self) -> list[Bifurcation]:
+        """Where the curve turns in one of its parameters (`parameter_name`), in the order met."""
+        return self.bifurcations["extremum"]
+
+    @cached_property
+    def stable(self) -> np.ndarray:
+        """Whether all multipliers but the critical one (or pair) lie inside the unit circle, shape (len,), bool.
+
+        Where they do, the curve is a border of stable motions.
+        """
+        return np.array([self._others_inside(p) for p in self.points], dtype=bool)
+
+    @cached_property
+    def kappa(self) -> Array:
+        """Frequency of the critical perturbation along an NS curve, rad per unit time; else zeros; shape (len,)."""
+        return np.array([p.extra if self.kind == "NS" else 0.0 for p in self.tracked])
+
+    @cached_property
+    def coefficient(self) -> Array:
+        """The coefficient that decides the normal form, a of LP, c3 of PD (`bifurcation.normal_form`), else nan.
+
+        c3 is negative where the doublings are supercritical and changes sign at a GPD; a does so at a cusp. Shape
+        (len,).
+        """
+        return np.array([p.coefficient for p in self.tracked])
+
+    @property
+    def tracked(self) -> tuple[TrackedPoint, ...]:
+        """The points, with what only tracked curves have."""
+        return self.points  # type: ignore[return-value]
+
+    def _others_inside(self, point: Any) -> bool:
+        mu = point.floquet.multipliers
+        target: complex | None = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(self.kind)
+        if self.kind == "NS":
+            target = cmath.exp(1j * point.extra * point.orbit.period)
+        if target is not None:
+            distance = np.minimum(np.abs(mu - target), np.abs(mu - np.conj(target)))
+            mu = np.delete(mu, np.argsort(distance, kind="stable")[: 2 if self.kind == "NS" else 1])
+        return bool(np.all(np.abs(mu) < 1.0))
+
+    def __repr__(self) -> str:
+        ends = [", ".join(f"{n}={self.parameter(n)[i]:.6g}" for n in self.names) for i in (0, -1)]
+        text = f"{self.kind} curve: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."
+        for warning in self.warnings:
+            text += f"\n  note: {warning}"
+        return text + "\n" + repr(self.bifurcations)
+
+
+def tracked_record(branch: TrackedBranch) -> dict[str, Any]:
+    """What a file holds of a tracked curve besides what it holds of any branch."""
+    return {
+        "kind": branch.kind,
+        "names": branch.names,
+        "extra": [p.extra for p in branch.tracked],
+        "coefficient": [p.coefficient for p in branch.tracked],
+    }
+
+
+def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> list[Any]:
+    """Points that were read, as those of a tracked curve."""
+    return [
+        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet)
+        for p, extra, coefficient in zip(points, record["extra"], record["coefficient"], strict=True)
+    ]
+
+
+__all__ = ["TrackedBranch", "TrackedPoint", "tracked_points", "tracked_record"]

@@ -1,0 +1,245 @@
+"""Bifurcations in two free parameters as curves for the continuation engine: unknowns `u = (X, extra, p, q)`.
+
+`extra` are the unknowns that come with the kind (kappa, an unfolding, an instant; `bifurcation.augmented`), p and q the
+free parameters, "omega" and a named one, or two named ones. The engine's free parameter is the last, q.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.bifurcation.augmented import Augmentation, Equations
+from suboctave.continuation.linear import length
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, next_harmonics
+from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, floquet_multipliers
+
+#: distance of the critical multiplier from the unit circle up to which harmonics suffice
+_CRITICAL = 1e-3
+#: steps after which that is looked at again
+_LOOKED_AT = 5
+_TINY = float(np.finfo(float).tiny)
+
+
+class TrackedEvaluation:
+    """The augmented equations and their derivatives at one u."""
+
+    def __init__(self, curve: TrackedCurve, state: BalanceState, extra: Array) -> None:
+        self.curve = curve
+        self.state = state
+        self.extra = extra
+        self.equations: Equations = curve.augmentation.at(state, extra, curve.names)
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Multipliers of the motion, by the monodromy matrix."""
+        return floquet_multipliers(self.state)
+
+    @property
+    def critical(self) -> complex | None:
+        """The multiplier that lies on the unit circle at a solution, None if none need."""
+        kind = self.curve.augmentation.name
+        if kind == "NS":
+            return cmath.exp(2j * cmath.pi * float(self.extra[0]) / self.state.rate)
+        return {"LP": 1.0 + 0.0j, "BP": 1.0 + 0.0j, "PD": -1.0 + 0.0j}.get(kind)
+
+    @property
+    def doubt(self) -> float:
+        """Distance of the critical multiplier from where it should be: what the harmonics left out make of it."""
+        critical = self.critical
+        return 0.0 if critical is None else float(np.abs(self.floquet.multipliers - critical).min())
+
+    @lazy
+    def residual(self) -> Array:
+        """`[R + addition; scalar equations]`, in units of the forces that balance at the curve's last point."""
+        equations, force = self.equations, self.curve.force
+        top = self.state.residual
+        if equations.addition is not None:
+            top = top + equations.addition
+        return np.concatenate((top, equations.values * force))
+
+    @lazy
+    def jacobian(self) -> Array:
+        """Derivatives by u, shape (N, N + 1)."""
+        state, equations = self.state, self.equations
+        n, q = state.balance.dimension, len(self.extra)
+        out = np.zeros((n + q + 1, n + q + 2))
+        out[:n, :n] = state.jacobian
+        if equations.column is not None:
+            out[:n, n] = equations.column
+        for i, name in enumerate(self.curve.names):
+            out[:n, n + q + i] = state.residual_by(name)
+        out[n:] = equations.rows
+        out[n:] *= self.curve.force
+        return out
+
+    @lazy
+    def error(self) -> float:
+        """The larger of the residual in units of the forces that balance and the scalar equations'."""
+        state, addition = self.state, self.equations.addition
+        if addition is None:
+            size = state.residual_size()
+        else:
+            shaped = (state.residual + addition).reshape(state.x.shape)
+            size = length(shaped * state.balance.scales()[1])
+        balanced = size / max(state.force_scale(), self.curve.floor, _TINY)
+        return max(balanced, *map(abs, self.equations.values.tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedCurve:
+    """Bifurcations of one kind in two free parameters.
+
+    balance
+        Equations of motion in the present basis.
+    augmentation
+        What singles the bifurcation out, with its bordering vectors.
+    names, spans
+        The two free parameters and the widths of their ranges.
+    omega
+        Frequency, where it is not free.
+    adaptive, tolerance
+        Rule for the number of harmonics (None to keep it) and the neglected share of the motion that is tolerated.
+    force, floor
+        Size of the forces at the last point; size below which residuals are not judged (a motion at rest).
+    steps
+        How many steps lie behind.
+    """
+
+    balance: HarmonicBalance
+    augmentation: Augmentation
+    names: tuple[str, str]
+    spans: tuple[float, float]
+    omega: float
+    adaptive: AdaptiveHarmonics | None
+    tolerance: float
+    force: float
+    floor: float
+    cache: dict[HarmonicBasis, HarmonicBalance]
+    steps: int = 0
+
+    @property
+    def parameter(self) -> int:
+        """Index of the second free parameter in u: the last."""
+        return self.balance.dimension + self.augmentation.extras + 1
+
+    def index(self, name: str) -> int:
+        """Index of one of the free parameters in u."""
+        return self.parameter - 1 + self.names.index(name)
+
+    @lazy
+    def _weight(self) -> Array:
+        return np.tile(self.balance.scales()[0], self.balance.basis.size)
+
+    def split(self, u: Array) -> tuple[Array, Array, float, Mapping[str, float]]:
+        """Coefficients (2 H + 1, size), extra unknowns, omega and parameter values of a vector u."""
+        n = self.balance.dimension
+        x = u[:n].reshape(self.balance.basis.size, self.balance.size)
+        free = dict(zip(self.names, u[-2:].tolist(), strict=True))
+        omega = free.pop("omega", self.omega)
+        return x, u[n:-2], omega, {**self.balance.values, **free}
+
+    def join(self, x: Array, extra: Array, values: Array) -> Array:
+        """The vector u of coefficients, extra unknowns and the two parameters."""
+        return np.concatenate((x.ravel(), extra, values))
+
+    def evaluate(self, u: Array) -> TrackedEvaluation:
+        """See `Curve.evaluate`."""
+        if not math.isfinite(u.dot(u)):
+            raise ConvergenceError("the iteration left the range of numbers")
+        x, extra, omega, values = self.split(u)
+        if not omega > 0.0:
+            raise ConvergenceError("omega is not positive")
+        return TrackedEvaluation(self, self.balance.at(x, omega, values), extra)
+
+    def size(self, u: Array) -> float:
+        """Norm of the coefficients, weighted by the square roots of the masses."""
+        return length(self._weight * u[: self.balance.dimension])
+
+    def weights(self, u: Array, largest: float) -> Array:
+        """See `Curve.weights`."""
+        size = max(self.size(u), 0.01 * largest) or 1.0
+        extra = self.augmentation.spans(self.evaluate(u).state)
+        return self.join(self._weight / size, 1.0 / extra, 1.0 / np.array(self.spans))
+
+    def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
+        """The curve with the harmonics, samples and bordering vectors of this point."""
+        assert isinstance(evaluation, TrackedEvaluation)
+        state = evaluation.state
+        augmentation = evaluation.equations.renewed()
+        balance = self.balance
+        if self.adaptive is not None:
+            balance = self._in_basis(self._basis(evaluation, self.adaptive))
+        x = state.x if balance is self.balance else self.balance.basis.resized(state.x, balance.basis)
+        balance = balance.settle(x, state.omega, state.values)
+        self.cache[balance.basis] = balance
+        if balance.basis != self.balance.basis:
+            augmentation = augmentation.resized(balance.basis, balance.size)
+        force = max(state.force_scale(), self.floor)
+        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
+
+    def _basis(self, evaluation: TrackedEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
+        """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""
+        state, present = evaluation.state, self.balance.basis
+        basis = choose_harmonics(state, adaptive, self.tolerance)
+        lower = basis.harmonics < present.harmonics
+        if basis.harmonics > present.harmonics or not (lower or self.steps % _LOOKED_AT == 0):
+            return basis
+        if evaluation.doubt > _CRITICAL:
+            return next_harmonics(state, adaptive)
+        return present if lower and evaluation.doubt > 0.1 * _CRITICAL else basis
+
+    def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
+        if basis == self.balance.basis:
+            return self.balance
+        if basis not in self.cache:
+            self.cache[basis] = self.balance.with_basis(basis)
+        return self.cache[basis]
+
+    def with_basis(self, basis: HarmonicBasis) -> TrackedCurve:
+        """The same curve in another basis."""
+        if basis == self.balance.basis:
+            return self
+        balance = self._in_basis(basis)
+        return replace(self, balance=balance, augmentation=self.augmentation.resized(basis, balance.size))
+
+    def transfer(self, u: Array, origin: Curve) -> Array:
+        """See `Curve.transfer`."""
+        assert isinstance(origin, TrackedCurve)
+        basis = origin.balance.basis
+        if origin is self or basis == self.balance.basis:
+            return u
+        n = origin.balance.dimension
+        x = u[:n].reshape(basis.size, -1)
+        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), u[n:]))
+
+    def images(self, u: Array) -> list[Array]:
+        """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""
+        basis, n = self.balance.basis, self.balance.dimension
+        found = []
+        for shift in range(basis.nu):
+            turn = 2.0 * np.pi * shift / basis.nu
+            angle = turn * np.arange(1, basis.harmonics + 1)[:, None]
+            x = u[:n].reshape(basis.size, -1)
+            y = x.copy()
+            y[1::2] = np.cos(angle) * x[1::2] + np.sin(angle) * x[2::2]
+            y[2::2] = np.cos(angle) * x[2::2] - np.sin(angle) * x[1::2]
+            found.append(self.join(y, self.augmentation.shifted(u[n:-2], turn), u[-2:]))
+        return found
+
+    def where(self, u: Array) -> str:
+        """Where in the plane of the two parameters, in words."""
+        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, u[-2:], strict=True))
+
+
+__all__ = ["TrackedCurve", "TrackedEvaluation"]

@@ -1,0 +1,280 @@
+"""What is looked for along a curve of bifurcations: extrema of its parameters, and points of codimension two.
+
+Functions of the curve's points that change sign:
+
+    extremum of p     component of the tangent along p
+    CP                psi . R''[phi, phi] on LP curves; both components of the tangent vanish with it
+    R1, R2            psi . (dJ_kappa/dkappa) phi on LP, PD curves: the multiplier is double
+    R3, R4            kappa - w0/3, kappa - w0/4 on NS curves
+    GPD               the cubic coefficient c3 on PD curves: super- turns into subcritical
+    LPPD              det J_half on LP curves, det J_0 on PD curves: the other multiplier is critical too
+
+At a cusp the curve turns in both parameters, which makes no extremum of either: there the tangent's components divided
+by the cusp's function keep their signs. (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., chapters 8, 9.)
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+
+from scipy.optimize import brentq
+
+from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
+from suboctave.bifurcation.augmented import SingularOperator
+from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation.march import point_between
+from suboctave.continuation.newton import NewtonOptions
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.selection import choose_harmonics
+from suboctave.stability import StabilityMethod
+
+#: way along a curve, in scaled arclength, that more harmonics may move an event
+_BESIDE = 0.05
+#: share of a step to which an event is located
+_RESOLVED = 1e-11
+
+
+class CurveTest(ABC):
+    """One kind of event: a function of the curve's points that changes sign."""
+
+    kind: str
+
+    @abstractmethod
+    def value(self, sample: TrackedSample) -> float:
+        """The test function; 0 where it says nothing."""
+
+    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+        """The test with a function that is smooth between two neighbours."""
+        return self
+
+
+@dataclass(frozen=True)
+class Extremum(CurveTest):
+    """The curve turns in one of its parameters."""
+
+    name: str
+    kind = "extremum"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        slope = float(sample.point.tangent[sample.curve.index(self.name)])
+        # at a cusp both change sign
+        return slope / sample.bend if sample.curve.augmentation.name == "LP" and sample.bend != 0.0 else slope
+
+
+@dataclass(frozen=True)
+class Cusp(CurveTest):
+    """Two limit points meet and vanish."""
+
+    kind = "CP"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        return sample.bend
+
+
+@dataclass(frozen=True)
+class GeneralisedDoubling(CurveTest):
+    """The motions that branch off change sides; a curve of their limit points begins."""
+
+    kind = "GPD"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        # at a fold-flip c3 passes through infinity, and det J_0 through zero
+        return sample.cubic * sample.other
+
+
+@dataclass(frozen=True)
+class DoubleMultiplier(CurveTest):
+    """R1 on LP curves, R2 on PD curves: a curve of Neimark-Sacker points begins."""
+
+    kind: str
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        return sample.twist
+
+
+@dataclass(frozen=True)
+class Resonance(CurveTest):
+    """R3, R4 on NS curves: kappa = w0 / order."""
+
+    order: int
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """R3 or R4."""
+        return f"R{self.order}"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        return sample.kappa / sample.state.rate - 1.0 / self.order
+
+
+@dataclass(frozen=True)
+class FoldFlip(CurveTest):
+    """Multipliers +1 and -1 at once; between neighbours by g of the other operator with fixed borders."""
+
+    borders: NullVectors | None = None
+    operator: Kind = Kind.HALF
+    kind = "LPPD"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        if self.borders is None:
+            return sample.other
+        return float(bordered(sample.state, self.operator, self.borders).g.real)
+
+    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+        """See `CurveTest.within`."""
+        operator = Kind.HALF if b.equations.of.kind is Kind.INTEGER else Kind.INTEGER
+        return FoldFlip(null_vectors(b.state, operator), operator)
+
+
+def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
+    """What to look for along a curve, by the kind of its bifurcations."""
+    turns = tuple(Extremum(name) for name in curve.names)
+    augmentation = curve.augmentation
+    if not isinstance(augmentation, SingularOperator):
+        return turns
+    own: dict[Kind, tuple[CurveTest, ...]] = {
+        Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), FoldFlip()),
+        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier("R2"), FoldFlip()),
+        Kind.FREE: (Resonance(3), Resonance(4)),
+    }
+    return turns + own[augmentation.kind]
+
+
+@dataclass(frozen=True)
+class Found:
+    """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns."""
+
+    test: CurveTest
+    sample: TrackedSample
+    extreme: str = ""
+
+
+def events_between(
+    a: TrackedSample, b: TrackedSample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
+) -> list[Found]:
+    """Every event between two neighbours in the same discretisation, in the order met."""
+    found = []
+    for test in tests:
+        try:
+            for low, high in _brackets(test, a, b, newton):
+                sample = _zero_between(low, high, test.within(low, high), newton)
+                found.append(Found(test, sample, _extreme(test, low)))
+        except ConvergenceError as failure:
+            warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
+    return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def _brackets(
+    test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
+) -> list[tuple[TrackedSample, TrackedSample]]:
+    """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    first, last = test.value(a), test.value(b)
+    if first * last < 0.0 or (last == 0.0 and first != 0.0):
+        return [(a, b)]
+    share = _turn_inside(test.name, a, b) if isinstance(test, Extremum) else None
+    if share is None:
+        return []
+    middle = TrackedSample(point_between(a.point, b.point, share, newton))
+    return [(a, middle), (middle, b)] if test.value(middle) * first < 0.0 else []
+
+
+def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
+    """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
+    i, way = a.curve.index(name), b.point.arclength - a.point.arclength
+    if not way > 0.0:
+        return None
+    chord = float(b.point.u[b.curve.index(name)] - a.point.u[i]) / way
+    start, stop = float(a.point.tangent[i]), float(b.point.tangent[b.curve.index(name)])
+    # the slope start (1 - s) (1 - 3 s) + stop s (3 s - 2) + 6 chord s (1 - s) has its vertex at s
+    curve = 3.0 * start + 3.0 * stop - 6.0 * chord
+    if curve == 0.0:
+        return None
+    s = (2.0 * start + stop - 3.0 * chord) / curve
+    if not 0.0 < s < 1.0:
+        return None
+    slope = start * (1.0 - s) * (1.0 - 3.0 * s) + stop * s * (3.0 * s - 2.0) + 6.0 * chord * s * (1.0 - s)
+    # where it nearly vanishes the interpolation cannot tell
+    return s if slope * math.copysign(1.0, start) < 0.05 * abs(start) else None
+
+
+def _zero_between(a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> TrackedSample:
+    """Where a test vanishes between two neighbours, by Brent's method on the way along the chord."""
+    known = {0.0: a, 1.0: b}
+
+    def value(share: float) -> float:
+        if share not in known:
+            known[share] = TrackedSample(point_between(a.point, b.point, share, newton))
+        return test.value(known[share])
+
+    return known[float(brentq(value, 0.0, 1.0, xtol=_RESOLVED, rtol=8.9e-16))]
+
+
+def _extreme(test: CurveTest, a: TrackedSample) -> str:
+    if not isinstance(test, Extremum):
+        return ""
+    return "maximum" if a.point.tangent[a.curve.index(test.name)] > 0.0 else "minimum"
+
+
+def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
+    """An event located again with the harmonics that events ask for."""
+    sample = found.sample
+    arclength = sample.point.arclength
+    for _ in range(6):
+        curve = sample.curve
+        if curve.adaptive is None:
+            break
+        basis = choose_harmonics(sample.state, curve.adaptive, curve.adaptive.event_tolerance)
+        if basis.harmonics <= curve.balance.basis.harmonics:
+            break
+        finer = curve.with_basis(basis)
+        u = finer.transfer(sample.point.u, curve)
+        try:
+            x, _, omega, values = finer.split(u)
+            finer = replace(finer, balance=finer.balance.settle(x, omega, values))
+            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton)
+            near = TrackedSample(start)
+            test = found.test.within(near, near)
+            sample = zero_along(start, test.value, newton, _BESIDE)
+        except ConvergenceError as failure:
+            warnings.append(
+                f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
+                f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
+            )
+            break
+    if sample is found.sample:
+        return found
+    return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
+
+
+def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEvent:
+    """An event as users get it; `observe`: the DOF whose amplitude is reported."""
+    sample = found.sample
+    curve, orbit = sample.curve, sample.orbit
+    return TrackedEvent(
+        found.test.kind,
+        orbit,
+        method.along(sample.state),
+        orbit.residual,
+        orbit.amplitude(observe),
+        getattr(found.test, "name", curve.names[1]),
+        sample.vectors,
+        sample.kappa,
+        arclength=sample.point.arclength,
+        curve=curve.augmentation.name,
+        names=curve.names,
+        extreme=found.extreme,
+    )
+
+
+__all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]

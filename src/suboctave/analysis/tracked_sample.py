@@ -1,0 +1,193 @@
+"""A point of a tracked curve with what tests of it ask: null vectors, normal-form coefficients, other determinants.
+
+Besides the points between two neighbours (`continuation`), single ones: the nearest to a guess, and the zero of a
+function beside a point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
+from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations, SingularOperator
+from suboctave.bifurcation.bordered import NullVectors
+from suboctave.bifurcation.cubic import cubic_coefficient
+from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.march import CurvePoint, make_point
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.selection import truncation
+from suboctave.harmonic.state import BalanceState
+from suboctave.lazy import lazy
+
+#: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
+_NOTHING = 1e-9
+
+
+class TrackedSample:
+    """A point of a tracked curve with what the tests ask of it."""
+
+    def __init__(self, point: CurvePoint) -> None:
+        assert isinstance(point.curve, TrackedCurve)
+        assert isinstance(point.evaluation, TrackedEvaluation)
+        self.point = point
+        self.curve = point.curve
+        self.evaluation = point.evaluation
+        self.state: BalanceState = point.evaluation.state
+
+    @property
+    def equations(self) -> SingularEquations:
+        """The scalar equations, where they are those of a singular operator."""
+        equations = self.evaluation.equations
+        assert isinstance(equations, SingularEquations)
+        return equations
+
+    @lazy
+    def orbit(self) -> PeriodicOrbit:
+        """The motion."""
+        state, values = self.state, dict(self.state.values)
+        error, neglected = self.evaluation.error, truncation(state)
+        return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, error, neglected, self.curve.adaptive)
+
+    def curve_tangent(self, curve: TrackedCurve) -> np.ndarray:
+        """The tangent in the discretisation of another point's curve."""
+        return curve.transfer(self.point.tangent, self.curve)
+
+    @property
+    def kappa(self) -> float:
+        """Frequency of the critical perturbation at an NS, else 0."""
+        equations = self.evaluation.equations
+        return equations.kappa if isinstance(equations, SingularEquations) else 0.0
+
+    @property
+    def instant_or_frequency(self) -> float:
+        """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, else 0."""
+        equations = self.evaluation.equations
+        if isinstance(equations, GrazingEquations):
+            return equations.tau % (2.0 * math.pi)
+        return self.kappa
+
+    @property
+    def vectors(self) -> NullVectors | None:
+        """Null vectors of the singular operator, None where there is none."""
+        found = getattr(self.evaluation.equations, "bordered", None)
+        return None if found is None else found.vectors
+
+    @lazy
+    def bend(self) -> float:
+        """psi . R''[phi, phi] of an LP."""
+        equations = self.equations
+        return float((equations.gradient[0] @ equations.bordered.right).real)
+
+    @lazy
+    def twist(self) -> float:
+        """psi . (dJ_kappa/dkappa) phi of an LP or PD; 0 where it is rounding."""
+        equations = self.equations
+        b = equations.bordered
+        size = length(b.left / b.scale) * length(b.right / b.scale) * self.state.omega
+        value = float(equations.gradient[2].imag)
+        return 0.0 if abs(value) <= _NOTHING * size else value
+
+    @lazy
+    def cubic(self) -> float:
+        """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
+        b, by_x = self.equations.bordered, self.equations.gradient[0].real
+        by_motion = -by_x.reshape(self.state.x.shape)
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._other_factor)
+
+    @lazy
+    def coefficient(self) -> float:
+        """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
+        augmentation = self.curve.augmentation
+        kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
+        if kind is Kind.FREE:
+            return float("nan")
+        turn = -1.0 if self.twist > 0.0 else 1.0
+        return turn * (0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+
+    @property
+    def other(self) -> float:
+        """Sign of det J_half of an LP, of det J_0 of a PD."""
+        return self._other_factor.sign
+
+    @lazy
+    def _other_factor(self) -> Factor:
+        limit = self.equations.of.kind is Kind.INTEGER
+        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
+
+
+def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:
+    """The first of two neighbours solved again in the discretisation of the second, where that differs."""
+    curve, point = b.curve, a.point
+    if a.curve.balance is curve.balance:
+        return a
+    weights = b.point.weights
+    along = curve.transfer(point.tangent, a.curve)
+    row = weights * along / length(weights * along)
+    solved = correct(curve, curve.transfer(point.u, a.curve), row, weights, newton)
+    return TrackedSample(make_point(solved, curve, along, point.arclength))
+
+
+def nearest_point(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions) -> CurvePoint:
+    """The point of a curve nearest to a guess close to it.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not converge.
+    """
+    row = null_row(curve, u, weights)
+    return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
+
+
+def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Unit vector that the scaled Jacobian at u maps to zero: the curve's direction there."""
+    jacobian = curve.evaluate(u).jacobian / weights
+    q = np.linalg.qr(jacobian.T, mode="complete")[0]
+    result: np.ndarray = q[:, -1]
+    return result
+
+
+def zero_along(
+    start: CurvePoint,
+    function: Callable[[TrackedSample], float],
+    newton: NewtonOptions,
+    reach: float,
+    iterations: int = 12,
+) -> TrackedSample:
+    """The zero of a function along a curve near one of its points, by secants in arclength.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is none within `reach`.
+    """
+    curve, weights = start.curve, start.weights
+    row = weights * start.tangent
+    row = row / length(row)
+
+    def at(s: float) -> TrackedSample:
+        solved = correct(curve, start.u + s * row / weights, row, weights, newton)
+        return TrackedSample(make_point(solved, curve, start.tangent, s))
+
+    s, old = 0.02 * reach, 0.0
+    value_old = function(at(0.0))
+    for _ in range(iterations):
+        sample = at(s)
+        value = function(sample)
+        if value == 0.0 or abs(s - old) < 1e-11:
+            return sample
+        if value == value_old:
+            break
+        s, old, value_old = s - value * (s - old) / (value - value_old), s, value
+        if abs(s) > reach:
+            break
+    raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")
+
+
+__all__ = ["TrackedSample", "nearest_point", "null_row", "same_discretisation", "zero_along"]

@@ -1,0 +1,65 @@
+"""The step "track": a bifurcation of an earlier branch in two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, ClassVar
+
+from suboctave.analysis import Branch, track
+from suboctave.analysis.checks import check_bounds, check_parameter, check_range
+from suboctave.bifurcation.tracked import TRACKED_KINDS
+from suboctave.errors import suggest
+from suboctave.study.steps.base import Complaint, Context, Range, Surroundings, chosen, tried
+from suboctave.study.steps.curves import CurveStep
+
+
+class Track(CurveStep):
+    """`so.track`: `start` names a bifurcation of an earlier branch."""
+
+    kind: ClassVar[str] = "track"
+
+    parameter: str | list[str]
+    bounds: Range | list[Range]
+    omega: Range | None = None
+
+    def check(self, around: Surroundings) -> Iterator[Complaint]:
+        """See `Step.check`."""
+        yield from super().check(around)
+        yield from self._check_start()
+        names = [self.parameter] if isinstance(self.parameter, str) else self.parameter
+        ranges = [self.bounds] if isinstance(self.parameter, str) else self.bounds
+        wrong = [c for name in names for c in tried("parameter", partial(check_parameter, around.system, name))]
+        yield from wrong
+        if not isinstance(self.parameter, str) and len(names) != 2:
+            yield ("parameter",), "is one name, beside omega, or two"
+        elif len(ranges) != len(names) or any(not isinstance(r, list) for r in ranges):
+            yield ("bounds",), "needs a range [from, to] for each parameter"
+        elif not wrong:
+            for name, ends in zip(names, ranges, strict=True):
+                yield from tried("bounds", partial(check_bounds, around.system, name, ends))
+        if self.omega is not None:
+            yield from tried("omega", lambda: check_range("omega", self.omega, positive=True))
+        for name in names:
+            if name in self.parameters:
+                yield ("parameters", name), "is a parameter that varies: its range is in bounds"
+        for given, key in ((self.events, "events"), (self.formulation, "formulation")):
+            if given:
+                yield (key,), "is no option of a curve of bifurcations: leave it out"
+
+    def _check_start(self) -> Iterator[Complaint]:
+        kind = None if self.motion is None else self.motion.bifurcation
+        if kind is None:
+            yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
+        elif kind not in TRACKED_KINDS:
+            yield ("start", "bifurcation"), f"{kind} cannot be tracked{suggest(kind, TRACKED_KINDS)}"
+
+    def run(self, context: Context) -> Branch:
+        """See `Step.run`."""
+        options: dict[str, Any] = self.options(context)
+        assert self.motion is not None
+        start = chosen(self.motion, context)
+        self._moved(start.orbit, context)
+        if self.omega is not None:
+            options["omega"] = (self.omega[0], self.omega[1])
+        return track(start, self.parameter, self.bounds, **options)

@@ -1,0 +1,78 @@
+"""The step "track" of study files: the same curve as by a script; mistakes are told with their keys."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.study.file import read_study
+from suboctave.study.runner import run_study
+
+STUDY = """
+title = "limit points over the load"
+[system]
+mass = 1.0
+damping = "c"
+stiffness = 1.0
+parameters = { c = 0.1, alpha = 1.0, F = 0.3 }
+[[system.elements]]
+type = "CubicSpring"
+dof = 0
+coefficient = "alpha"
+[[system.loads]]
+type = "HarmonicLoad"
+dof = 0
+amplitude = "F"
+[[analyses]]
+name = "response"
+type = "frequency_response"
+omega = [3.0, 0.5]
+harmonics = 3
+[[analyses]]
+name = "limits"
+type = "track"
+start = { analysis = "response", bifurcation = "LP", index = 1 }
+parameter = "F"
+bounds = [0.05, 0.5]
+"""
+
+
+def test_as_by_a_script(study_file, suboctave):
+    path = study_file(STUDY)
+    status, _, err = suboctave("run", path)
+    assert status == 0, err
+    found = so.load(path.parent / "study_results" / "results.nc")["limits"]
+    study = read_study(path)
+    response = so.frequency_response(study.system, (3.0, 0.5), 3)
+    curve = so.track(response.bifurcations["LP"][1], "F", (0.05, 0.5))
+    assert found.kind == "LP"
+    assert found.omega == pytest.approx(curve.omega, rel=1e-9)
+    (cusp,) = found.bifurcations["CP"]
+    assert cusp.parameter("F") == pytest.approx(found.parameter("F").min(), rel=0.05)
+
+
+def test_two_parameters(study_file):
+    text = STUDY.replace('parameter = "F"', 'parameter = ["F", "c"]').replace(
+        "bounds = [0.05, 0.5]", "bounds = [[0.2, 0.5], [0.05, 0.2]]"
+    )
+    curve = run_study(read_study(study_file(text))).finished[1].result
+    assert curve.names == ("F", "c")
+    assert np.ptp(curve.omega) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('parameter = "F"', 'parameter = "G"', "unknown parameter 'G'"),
+        ('parameter = "F"', 'parameter = ["F"]', "is one name, beside omega, or two"),
+        ("bounds = [0.05, 0.5]", "bounds = [0.5, 0.5]", "two different finite ends"),
+        ('bifurcation = "LP", index = 1', "point = 3", "name a bifurcation"),
+        ('bifurcation = "LP"', 'bifurcation = "CP"', "CP cannot be tracked"),
+        ('parameter = "F"', 'parameter = "F"\nomega = [0.0, 1.0]', "frequencies are positive"),
+    ],
+)
+def test_mistakes(study_file, suboctave, old, new, message):
+    status, _, err = suboctave("run", study_file(STUDY.replace(old, new)))
+    assert status != 0
+    assert message in err
