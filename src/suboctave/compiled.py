@@ -36,8 +36,6 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 PATIENCE, LESS, QUICK = 1.0, 0.03, 0.02
 #: seconds of compilation that may follow each other, and what every second of other work adds to what is left of them
 CREDIT, SHARE = 2.5, 0.7
-#: seconds beyond that after which a kernel no longer waits for those that it calls: they may never be called
-UNUSED = 1.0
 #: entries of a kernel's arguments beyond which it is compiled at once: a single call could take long
 LARGE = 40000
 
@@ -159,8 +157,11 @@ class _Patient(_Kernel):
         patience = self.patience if _ledger.fresh and _ledger.runs < 2 else min(self.patience, LESS)
         if not (spent > patience and _ledger.allows()):
             return False
-        # those that it calls first, one by one: otherwise all of them would be compiled at one go
-        return spent > patience + UNUSED or not any(isinstance(part, _Patient) for part in self._parts())
+        # those that it has called first, one by one: otherwise all of them would be compiled at one go
+        waiting = [part for part in self._parts() if isinstance(part, _Patient) and "_spent" in part.__dict__]
+        for part in waiting:
+            part.patience = 0.0
+        return not waiting
 
     def _parts(self) -> list[Any]:
         """The kernels that this one calls."""

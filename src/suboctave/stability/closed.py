@@ -5,7 +5,6 @@ call (the common small case, in which the calls would cost more than what they d
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -56,14 +55,6 @@ def _multipliers(
 
 
 #: what the call above is made of: compiled one by one before it is, so that nobody waits for all of it at one go
-_PARTS: list[Any] = [events_along, _panels, _filled, standing_single, closed_changes, corrected_single]
-
-
-def _ready() -> Any:
-    """`_multipliers`, interpreted as long as one of its parts is."""
-    while _PARTS and getattr(_PARTS[-1], "signatures", True):
-        _PARTS.pop()
-    return _multipliers.py_func if _PARTS and hasattr(_multipliers, "py_func") else _multipliers
 
 
 class ClosedSingle:
@@ -114,7 +105,7 @@ class ClosedSingle:
         state, laws, balance = self.state, self.laws, self.state.balance
         assert isinstance(state.linear, StructuralMatrices)
         mu, shift = np.empty(2, dtype=complex), np.empty(2)
-        share = _ready()(
+        share = _multipliers(
             state.motions,
             state.spectra_table[0],
             state.rate,
