@@ -13,7 +13,8 @@ from suboctave.study.commands import examples
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
-FIRST, CASCADE = TUTORIAL.split("## 5. ")
+FIRST, LAST = TUTORIAL.split("## 5. ")
+CASCADE, SUBHARMONIC = LAST.split("### Sub-harmonics")
 
 
 def blocks(kind, part=FIRST):
@@ -102,6 +103,12 @@ def test_its_cascade(suboctave, tmp_path, monkeypatch, capsys):
     assert found["once more"].nu == 8
     np.testing.assert_array_equal(found["cascade"][1].branch.omega, diagram[1].branch.omega)
     np.testing.assert_allclose(sorted(found["once more"].omega[[0, -1]]), [2.42595, 2.4488], atol=3e-4)
+
+
+def test_its_isolated_subharmonic(capsys):
+    (script,), (printed,) = blocks("python", SUBHARMONIC), blocks("text", SUBHARMONIC)
+    exec(compile("import suboctave as so\n" + script, "docs/tutorial.md", "exec"), {})
+    assert capsys.readouterr().out == printed
 
 
 def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):
