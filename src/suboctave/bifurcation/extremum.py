@@ -26,6 +26,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -76,9 +77,9 @@ class Extremal(Augmentation):
         """See `Augmentation.own`."""
         return self.base
 
-    def spans(self, state: BalanceState) -> Array:
+    def spans(self, *at: Any) -> Array:
         """See `Augmentation.spans`."""
-        return self.base.spans(state)
+        return self.base.spans(*at)
 
     def shifted(self, extra: Array, angle: float) -> Array:
         """See `Augmentation.shifted`."""
@@ -117,7 +118,13 @@ class ExtremalEquations(Equations):
 
 
 def extremal_of(
-    base: Augmentation, state: BalanceState, extra: Array, beside: str, turning: str, spans: Mapping[str, float]
+    base: Augmentation,
+    state: BalanceState,
+    extra: Array,
+    beside: str,
+    turning: str,
+    spans: Mapping[str, float],
+    extra_spans: Array,
 ) -> Extremal:
     """The extremum of a parameter along a curve of bifurcations, at a motion near it.
 
@@ -127,12 +134,12 @@ def extremal_of(
         What singles the bifurcation out, with bordering vectors of this motion, and its extra unknowns.
     beside, turning
         The two parameters of the curve, the latter extreme.
-    spans
-        Sizes of all free parameters by name.
+    spans, extra_spans
+        Sizes of all free parameters by name, and of the extra unknowns.
     """
     if isinstance(base, SingularOperator) and base.name == "LP":
         return LimitPointExtremal(base, beside, state.force_scale() / spans[beside], turning)
-    return BorderedExtremal.of(base, state, extra, beside, turning, spans)
+    return BorderedExtremal.of(base, state, extra, beside, turning, spans, extra_spans)
 
 
 @dataclass(frozen=True)
@@ -239,6 +246,7 @@ class BorderedExtremal(Extremal):
     force: float
     size: float
     sizes: Mapping[str, float]
+    extra_sizes: Array
     turning: str = ""
 
     @classmethod
@@ -250,12 +258,13 @@ class BorderedExtremal(Extremal):
         beside: str,
         turning: str,
         sizes: Mapping[str, float],
+        extra_sizes: Array,
     ) -> BorderedExtremal:
         """With the singular vectors of M at a motion."""
         weight = state.balance.per_unknown(state.balance.scales()[0])
         size = length(weight * state.x.ravel()) or 1.0
         blank = np.zeros(state.balance.dimension + base.extras + 1)
-        own = cls(base, beside, blank, blank, state.force_scale() or 1.0, size, dict(sizes), turning)
+        own = cls(base, beside, blank, blank, state.force_scale() or 1.0, size, dict(sizes), extra_sizes, turning)
         matrix = own.at(state, extra, tuple(sizes)).matrix
         u, _, vt = np.linalg.svd(matrix)
         return replace(own, right=vt[-1], left=u[:, -1])
@@ -315,7 +324,7 @@ class BorderedExtremalEquations(ExtremalEquations):
         """Of the unknowns."""
         state, of = self.state, self.of
         weight = state.balance.per_unknown(state.balance.scales()[0])
-        return np.concatenate((of.size / weight, of.base.spans(state), [of.sizes[name] for name in self.names]))
+        return np.concatenate((of.size / weight, of.extra_sizes, [of.sizes[name] for name in self.names]))
 
     @property
     def matrix(self) -> Array:

@@ -214,7 +214,7 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
 def _of_tracked(branch: BranchLike) -> dict[str, str | int | float]:
     """The kind and the two parameters of a curve of bifurcations."""
     kind = getattr(branch, "kind", None)
-    return {} if kind is None else {"tracked": str(kind), "plane": "\n".join(getattr(branch, "names", ()))}
+    return {} if kind is None else {"tracked": str(kind), "plane": "\n".join(getattr(branch, "plane", ()))}
 
 
 def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:
