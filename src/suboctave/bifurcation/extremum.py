@@ -376,14 +376,15 @@ class BorderedExtremalEquations(ExtremalEquations):
         return np.vstack((self.base.rows, row / self._sizes))
 
     def _moved(self, by: Array) -> BorderedExtremalEquations:
-        """The equations beside, for unknowns changed in the units of `BorderedExtremal`."""
+        """The equations for M and h beside, for unknowns changed in the units of `BorderedExtremal`."""
         state, step = self.state, by * self._sizes
         n, q = state.balance.dimension, len(self.extra)
         x = state.x + state.balance.spread(step[:n])
         change = dict(zip(self.names, step[n + q :].tolist(), strict=True))
         omega = state.omega + change.pop("omega", 0.0)
         values = {**state.values, **{name: state.values[name] + d for name, d in change.items()}}
-        return self.of.at(state.balance.at(x, omega, values), self.extra + step[n : n + q], self.names)
+        # M has a column of that parameter alone
+        return self.of.at(state.balance.at(x, omega, values), self.extra + step[n : n + q], (self.of.beside,))
 
     @property
     def curvature(self) -> float:
