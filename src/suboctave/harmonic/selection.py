@@ -26,11 +26,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.harmonic import group_kernels
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
 from suboctave.lazy import lazy
@@ -86,24 +86,30 @@ def motion_size(state: BalanceState) -> float:
 
 def truncation(state: BalanceState) -> float:
     """Estimated size of the neglected harmonics relative to the motion."""
-    weight = state.balance.scales()[0]
-    tail, size = group_kernels.tails(state.x, state.neglected, weight)
+    tail, size = state.tails
     if size == 0.0:
         return 0.0
     beyond = float(tail[state.basis.harmonics])
-    return beyond if state.basis.kept is None else math.hypot(beyond, _modulus(state.left_out * weight) / size)
+    if state.basis.kept is None:
+        return beyond
+    return math.hypot(beyond, _modulus(state.left_out * state.balance.scales()[0]) / size)
 
 
 def _modulus(amplitudes: ComplexArray) -> float:
     return float(np.linalg.norm(amplitudes))
 
 
-def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
+def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, ...]:
     """Numbers of harmonics of omega to choose from."""
-    nu, high = state.basis.nu, state.basis.harmonics
-    lowest = max(options.minimum, state.balance.highest_load)
-    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-    return [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
+    basis = state.basis
+    return _rungs(options, basis.harmonics, basis.nu, state.balance.size, state.balance.highest_load)
+
+
+@lru_cache(maxsize=256)
+def _rungs(options: AdaptiveHarmonics, high: int, nu: int, size: int, highest_load: int) -> tuple[int, ...]:
+    lowest = max(options.minimum, highest_load)
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / size - 1) / (2 * nu)))
+    return tuple(h for h in _LADDER if lowest <= h <= most) or (max(lowest, high // nu),)
 
 
 def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
@@ -143,7 +149,7 @@ def choose_harmonics(
     if basis.nu > 1:
         return _Classes(state, options).chosen(tolerance, dropping)
     nu, high = basis.nu, basis.harmonics
-    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
+    tail, size = state.tails
     if size == 0.0:
         return basis
     ladder = _ladder(options, state)
