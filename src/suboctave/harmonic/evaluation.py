@@ -12,10 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.group_force import add_sampled_spectra
 from suboctave.harmonic.group_kernels import add_pieces, add_polynomial, balance_residual, tangent_matrix
 from suboctave.harmonic.linear_part import StructuralMatrices
+from suboctave.harmonic.nodal import add_tangent
+from suboctave.harmonic.quadrature import uniform_nodes
 
 if TYPE_CHECKING:
     from suboctave.harmonic.state import BalanceState
@@ -151,9 +155,10 @@ def neglected_of_one(force, shape, multiples, omega, matrices, out):
         out[h, 0] = -total / block if abs(block) > 0.0 else complex(np.inf, np.inf)
 
 
-def evaluated(state: BalanceState) -> tuple[tuple[ComplexArray, Array, Array], bool]:
-    """Spectra along all directions, A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P; whether they are
-    finite. The state gets its displacements and the blocks of A besides.
+def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
+    """Spectra along all directions, A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P.
+
+    The state gets its displacements and the blocks of A besides. Raises ConvergenceError if a force is not finite.
     """
     balance, basis, linear = state.balance, state.basis, state.linear
     count, size = len(balance.groups), balance.size
@@ -194,7 +199,38 @@ def evaluated(state: BalanceState) -> tuple[tuple[ComplexArray, Array, Array], b
     known["motions"], known["blocks"] = motions, blocks
     if not balance.own:
         known["nodal"] = []
-    return (table, parts, sizes), finite
+    if not finite:
+        _refuse(state)
+    return table, parts, sizes
 
 
-__all__ = ["along_directions", "evaluate", "evaluated", "jacobian", "neglected_of_one"]
+def _refuse(state: BalanceState) -> None:
+    for local in state.local_motions:
+        nodes = uniform_nodes(64) if local.pieces is not None else local.nodes()
+        u, du = kernels.motion(local.motion, nodes.zr, nodes.zi)
+        parts = local.element.tangent(u, state.rate * du, local.coefficients)
+        if not all(np.isfinite(part).all() for part in parts if part is not None):
+            raise ConvergenceError(
+                f"{local.element.label} returned a force that is not finite at omega = {state.omega:.6g} "
+                f"(largest coefficient of the motion {np.abs(state.x).max():.3g})"
+            )
+    raise ConvergenceError(f"the element forces are not finite at omega = {state.omega:.6g}")
+
+
+def structural_jacobian(state: BalanceState, matrices: Array, mean: bool, columns: int = 0) -> Array:
+    """R_X in the integer (mean=True) or the half-odd basis with all harmonics up to H, and the linear part of R_omega
+    if a column is added for it; matrices: M, C, K.
+    """
+    balance, basis, table = state.balance, state.basis, state.spectra_table
+    rows = balance.size * (2 * basis.harmonics + (1 if mean else 2))
+    out = np.zeros((rows, rows + columns))
+    multiples = basis.multiples if mean else basis.half_multiples
+    jacobian(
+        out, table, balance.moving, state.rate, mean, *balance.directions, matrices, multiples, state.omega, state.x
+    )
+    if state.nodal:
+        add_tangent(state.nodal, out, mean, balance.size)
+    return out
+
+
+__all__ = ["along_directions", "evaluate", "evaluated", "jacobian", "neglected_of_one", "structural_jacobian"]

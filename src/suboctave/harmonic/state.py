@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from suboctave.errors import ConvergenceError
 from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.group_force import Group, curvature_of
@@ -21,7 +20,6 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
-from suboctave.harmonic.quadrature import uniform_nodes
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.lazy import lazy
 
@@ -118,22 +116,7 @@ class BalanceState:
     @lazy
     def _evaluated(self) -> tuple[ComplexArray, Array, Array]:
         """`spectra_table` and both of `_parts` without elements that have nodes of their own."""
-        found, finite = evaluation.evaluated(self)
-        if not finite:
-            self._refuse()
-        return found
-
-    def _refuse(self) -> None:
-        for local in self.local_motions:
-            nodes = uniform_nodes(64) if local.pieces is not None else local.nodes()
-            u, du = kernels.motion(local.motion, nodes.zr, nodes.zi)
-            parts = local.element.tangent(u, self.rate * du, local.coefficients)
-            if not all(np.isfinite(part).all() for part in parts if part is not None):
-                raise ConvergenceError(
-                    f"{local.element.label} returned a force that is not finite at omega = {self.omega:.6g} "
-                    f"(largest coefficient of the motion {np.abs(self.x).max():.3g})"
-                )
-        raise ConvergenceError(f"the element forces are not finite at omega = {self.omega:.6g}")
+        return evaluation.evaluated(self)
 
     @lazy
     def spectra(self) -> list[tuple[Group, ComplexArray, ComplexArray, ComplexArray]]:
@@ -207,26 +190,11 @@ class BalanceState:
         add_tangent(self.nodal, out, mean, balance.size)
         return out
 
-    def _structural_jacobian(self, matrices: Array, mean: bool, columns: int = 0) -> Array:
-        """R_X in the integer (mean=True) or the half-odd basis, with the linear part of R_omega if a column is added
-        for it; matrices: M, C, K.
-        """
-        balance, basis, table = self.balance, self.basis, self.spectra_table
-        rows = balance.size * (2 * basis.harmonics + (1 if mean else 2))
-        out = np.zeros((rows, rows + columns))
-        multiples = basis.multiples if mean else basis.half_multiples
-        evaluation.jacobian(
-            out, table, balance.moving, self.rate, mean, *balance.directions, matrices, multiples, self.omega, self.x
-        )
-        if self.nodal:
-            add_tangent(self.nodal, out, mean, balance.size)
-        return out
-
     @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
         if isinstance(self.linear, StructuralMatrices):
-            return self._restricted(self._structural_jacobian(self.linear.matrices, mean=True))
+            return self._restricted(evaluation.structural_jacobian(self, self.linear.matrices, mean=True))
         return self._restricted(
             self._with_linear(self._tangent_matrix(mean=True), self.blocks, self.compliance, mean=True)
         )
@@ -242,7 +210,7 @@ class BalanceState:
             out = np.column_stack((self.jacobian, np.zeros(self.balance.dimension)))
             out[:, -1] = self.residual_by(name)
             return out
-        out = self._structural_jacobian(self.linear.matrices, mean=True, columns=1)
+        out = evaluation.structural_jacobian(self, self.linear.matrices, mean=True, columns=1)
         if name != "omega":
             out[:, -1] = self.residual_by(name)
         elif not self.balance.steady:
@@ -255,7 +223,7 @@ class BalanceState:
     def half_jacobian(self) -> Array:
         """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
         if isinstance(self.linear, StructuralMatrices):
-            return self._structural_jacobian(self.linear.matrices, mean=False)
+            return evaluation.structural_jacobian(self, self.linear.matrices, mean=False)
         frequencies = self.basis.half_multiples * self.omega
         return self._with_linear(
             self._tangent_matrix(mean=False),
