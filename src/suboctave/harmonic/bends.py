@@ -26,7 +26,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.group_force import GroupLaw, uniform_count
 from suboctave.harmonic.nodal import NodalForce
 from suboctave.harmonic.nodal_third import nodal_third
-from suboctave.harmonic.quadrature import even, graded_nodes, search_grid, uniform_nodes
+from suboctave.harmonic.quadrature import Nodes, even, graded_motion, search_grid, uniform_nodes
 from suboctave.harmonic.state import BalanceState
 from suboctave.harmonic.third_weights import Third
 from suboctave.lazy import lazy
@@ -94,12 +94,12 @@ def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, movin
     ):
         if not members:
             continue
-        nodes = (
-            uniform_nodes(uniform_count(law, balance.samples, high, top))
-            if points is None or widths is None
-            else graded_nodes(motion, points, widths, top)
-        )
-        u, du = kernels.motion(motion, nodes.zr, nodes.zi)
+        if points is None or widths is None:
+            nodes = uniform_nodes(uniform_count(law, balance.samples, high, top))
+            u, du = kernels.motion(motion, nodes.zr, nodes.zi)
+        else:
+            zr, zi, w, u, du = graded_motion(motion, points, widths, top)
+            nodes = Nodes(zr, zi, w)
         weights = np.zeros((2, 2, 2, len(u)) if moving else (1, 1, 1, len(u)))
         for i, c in members:
             uuu, *rest = balance.elements[i].third(u, state.rate * du, c)

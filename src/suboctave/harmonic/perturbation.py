@@ -233,7 +233,7 @@ def _change_of_form(
 ) -> complex:
     """What a change of an element's coefficients does to the form, along the element's direction."""
     c = coefficient_change(local, change)
-    result = _inner(left, _toeplitz_apply(c.stiffness, right))
+    result = complex(kernels.toeplitz_form(left, c.stiffness, right))
     if c.damping is not None:
         result += _inner(left, _toeplitz_apply(c.damping, 1j * frequency * right))
     return result

@@ -137,10 +137,12 @@ class ElasticStop(Element):
             f_c = np.array([contact * (u - c[1]), -c[0] * contact])
             return f_c, np.array([contact, np.zeros_like(u)]), None
         k, b, s = c
-        sign, y = self._sign, u - b
-        f, f_u, _ = self.tangent(u, v, np.array([1.0, b, s]))
-        f_c = np.array([f, k * self._by_gap(y, b, s), k * sign * (_phi_s(y, s) - _phi_s(-b, s))])
-        f_uc = np.array([f_u, -k * sign * _phi_yy(y, s), k * sign * _phi_ys(y, s)])
+        sign = self._sign
+        # what the constant that makes the force right at u = 0 adds
+        by_gap = sign * _phi_y(-b, s) - (1.0 if sign * b < 0.0 else 0.0)
+        f_c, f_uc = _rates_kernel()(
+            np.ascontiguousarray(u), k, b, s, sign, self._at_rest(b, s), by_gap, -sign * _phi_s(-b, s)
+        )
         return f_c, f_uc, None
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
@@ -178,6 +180,13 @@ def _kernel() -> Callable[..., tuple[Array, Array]]:
     from suboctave.model.stop_kernel import regularised_tangent
 
     return regularised_tangent
+
+
+@functools.cache
+def _rates_kernel() -> Callable[..., tuple[Array, Array]]:
+    from suboctave.model.stop_kernel import regularised_rates
+
+    return regularised_rates
 
 
 def _phi(y: float, s: float) -> float:
