@@ -85,10 +85,15 @@ def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, movin
     if law.polynomial.shape[0] > 3:
         nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
         u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
-        third = np.polynomial.polynomial.polyval(u, np.polynomial.polynomial.polyder(law.polynomial, 3))
+        third = np.zeros_like(u)
+        for p in range(len(law.polynomial) - 1, 2, -1):
+            third = third * u + p * (p - 1) * (p - 2) * law.polynomial[p]
         yield _in_displacement(nodes.zr, nodes.zi, nodes.weights * third, None, moving)
+    if law.told:
+        sampled = graded_motion(motion, *law.told_places, top)
+        third = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[1]
+        yield _in_displacement(sampled[0], sampled[1], third, None, moving)
     for members, points, widths in (
-        (law.told, law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy()),
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),
     ):

@@ -271,8 +271,11 @@ def curvature_of(
         for p in range(len(law.polynomial) - 1, 1, -1):
             bend = bend * u + p * (p - 1) * law.polynomial[p]
         parts.append(Curvature(nodes.zr, nodes.zi, nodes.weights * bend, None, None))
+    if law.told:
+        sampled = graded_motion(motion, *law.told_places, top)
+        bend = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[0]
+        parts.append(Curvature(sampled[0], sampled[1], bend, None, None))
     for members, points, widths in (
-        (law.told, *law.told_places),
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),
     ):

@@ -23,6 +23,30 @@ from suboctave.harmonic.state import BalanceState
 
 
 @kernel()
+def _half_turn(zr, zi):
+    """Real and imaginary part of `exp(i tau / 2)`, up to a sign."""
+    if zr > 0.0:
+        cosine = math.sqrt(0.5 * (1.0 + zr))
+        return cosine, 0.5 * zi / cosine
+    sine = math.sqrt(0.5 * (1.0 - zr))
+    return 0.5 * zi / sine, sine
+
+
+@kernel()
+def half_odd_values(waves, zr, zi):
+    """`Re sum_k c_k exp(i (k + 1/2) tau)` of every row of amplitudes (R, F) at instants, (R, N), up to a sign that all
+    rows share.
+    """
+    values = polynomial(waves, zr, zi)
+    out = np.empty((waves.shape[0], zr.shape[0]))
+    for j in range(zr.shape[0]):
+        cosine, sine = _half_turn(zr[j], zi[j])
+        for r in range(waves.shape[0]):
+            out[r, j] = values[r, j].real * cosine - values[r, j].imag * sine
+    return out
+
+
+@kernel()
 def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
     """Add the gradient of one direction's force, given as weights `uu` at the points z, to `gx` (2 H + 1, n)."""
     high = gx.shape[0] // 2
@@ -44,13 +68,8 @@ def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
     for j in range(n):
         cosine, sine = 1.0, 0.0
         if not mean:
-            # exp(i tau / 2) up to a sign, which both functions share
-            if zr[j] > 0.0:
-                cosine = math.sqrt(0.5 * (1.0 + zr[j]))
-                sine = 0.5 * zi[j] / cosine
-            else:
-                sine = math.sqrt(0.5 * (1.0 - zr[j]))
-                cosine = 0.5 * zi[j] / sine
+            # up to a sign, which both functions share
+            cosine, sine = _half_turn(zr[j], zi[j])
         u = values[0, j].real * cosine - values[0, j].imag * sine
         v = values[1, j].real * cosine - values[1, j].imag * sine
         product[0, j] = u * v * uu[j]
@@ -113,4 +132,4 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     return gx, by_omega, 1j * by_kappa
 
 
-__all__ = ["applies", "real_gradient"]
+__all__ = ["applies", "half_odd_values", "real_gradient"]
