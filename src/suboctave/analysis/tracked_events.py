@@ -292,7 +292,8 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
         try:
             x, _, omega, values = finer.split(u)
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
-            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton)
+            along = finer.transfer(sample.point.tangent, curve)
+            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton, along)
             near = TrackedSample(start)
             test = found.test.within(near, near)
             sample = zero_along(start, test.value, newton, _BESIDE)

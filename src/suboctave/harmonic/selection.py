@@ -187,8 +187,7 @@ class _Classes:
         self.beyond = np.array([_beyond(np.where(self.divisor == d, shares, 0.0)) for d in self.divisors])
         lowest = max(options.minimum, state.balance.highest_load)
         most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-        rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
-        self.rungs = [r for r in rungs if lowest * nu <= r <= most * nu] or [max(lowest * nu, high)]
+        self.rungs = [r for r in _finer_rungs(nu) if lowest * nu <= r <= most * nu] or [max(lowest * nu, high)]
         #: where each class ends now: before the first of its harmonics that is missing
         missing = np.arange(len(squares)) > high
         missing[basis.left_out] = True
@@ -258,6 +257,11 @@ class _Classes:
         end[nu] = max(end[nu], self.rungs[0])
         kept = [k for k in range(high + 1) if k <= end[math.gcd(k, nu)]]
         return HarmonicBasis(kept[-1], nu, tuple(kept))
+
+
+@lru_cache(maxsize=16)
+def _finer_rungs(nu: int) -> list[int]:
+    return sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
 
 
 def _beyond(shares: Array) -> Array:

@@ -102,7 +102,7 @@ class ElasticStop(Element):
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gap with width 1/s."""
         if self.regularised:
-            k, b, sharpness = (float(value) for value in c)
+            k, b, sharpness = c.tolist()
             # right: k [phi + at_rest], left: k [u - phi + at_rest], phi = y / 2 + an arctan step at the gap
             constant = k * (self._at_rest(b, sharpness) - 0.5 * self._sign * b)
             return SharpSampling((b,), (1.0 / sharpness,), constant, 0.5 * k, (self._sign * k,))
@@ -136,10 +136,10 @@ class ElasticStop(Element):
             contact = self._contact(u, c)
             f_c = np.array([contact * (u - c[1]), -c[0] * contact])
             return f_c, np.array([contact, np.zeros_like(u)]), None
-        k, b, s = c
+        k, b, s = c.tolist()
         sign = self._sign
         # what the constant that makes the force right at u = 0 adds
-        by_gap = sign * _phi_y(-b, s) - (1.0 if sign * b < 0.0 else 0.0)
+        by_gap = sign * (0.5 - math.atan(s * b) / math.pi) - (1.0 if sign * b < 0.0 else 0.0)
         f_c, f_uc = _rates_kernel()(
             np.ascontiguousarray(u), k, b, s, sign, self._at_rest(b, s), by_gap, -sign * _phi_s(-b, s)
         )
