@@ -167,6 +167,19 @@ class PackedLaws(NamedTuple):
     @classmethod
     def of(cls, laws: list[GroupLaw]) -> PackedLaws:
         """Pack the laws of all directions."""
+        if len(laws) == 1:
+            # what follows, without the joining
+            law = laws[0]
+            return cls(
+                law.pieces,
+                np.zeros(len(law.pieces), dtype=np.int64),
+                np.array((0, len(law.pieces))),
+                law.polynomial[None],
+                law.smooth_steps,
+                np.zeros(len(law.smooth_steps), dtype=np.int64),
+                law.line[None],
+                bool(law.told or law.sharp or law.uniform),
+            )
         number = np.arange(len(laws))
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
         for g, law in enumerate(laws):

@@ -202,9 +202,19 @@ def form_rates(
     if state.nodal or state.compliance is not None:
         return None
     size, rates = state.balance.size, dict.fromkeys(names, 0j)
+    if kind is Kind.INTEGER:
+        left, right = state.balance.spread(left), state.balance.spread(right)
     for name in names:
         changes = changes_by(state, name)
-        if not (changes or name in linear_names(state)):
+        direct = name in linear_names(state)
+        if not (changes or direct):
+            continue
+        if not (kind is Kind.FREE or direct or any(change.damping is not None for _, change in changes)):
+            u, v = left.reshape(-1, size), right.reshape(-1, size)
+            for group, change in changes:
+                rates[name] += real_form.toeplitz_part(
+                    u, v, kind is Kind.INTEGER, group.dofs, group.values, change.stiffness
+                )
             continue
         u, f = _as_waves(left, kind, size, left=True)
         v, _ = _as_waves(right, kind, size, left=False)

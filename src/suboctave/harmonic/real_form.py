@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.kernels import polynomial, spectra
+from suboctave.harmonic.kernels import polynomial, spectra, toeplitz_form
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.state import BalanceState
 
@@ -82,6 +82,29 @@ def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
 
 
 @kernel()
+def toeplitz_part(left, right, mean, dofs, shape, spectrum):
+    """`left^T T right` along a direction, T the product with a real periodic function whose Fourier coefficients
+    0 .. top are given; vectors (rows, n) of the integer basis (mean) or the half-odd one.
+    """
+    count = left.shape[0] // 2
+    middle = count + 1 if mean else count
+    waves = np.zeros((2, middle + count), dtype=np.complex128)
+    for s in range(dofs.shape[0]):
+        d = dofs[s]
+        if mean:
+            waves[0, count] += shape[s] * left[0, d]
+            waves[1, count] += shape[s] * right[0, d]
+        for k in range(count):
+            at = 2 * k + 1 if mean else 2 * k
+            waves[0, middle + k] += shape[s] * complex(left[at, d], -left[at + 1, d])
+            waves[1, middle + k] += 0.5 * shape[s] * complex(right[at, d], -right[at + 1, d])
+    for k in range(count):
+        waves[0, count - 1 - k] = waves[0, middle + k].conjugate()
+        waves[1, count - 1 - k] = waves[1, middle + k].conjugate()
+    return toeplitz_form(waves[0], spectrum, waves[1]).real
+
+
+@kernel()
 def _linear_rates(left, right, mean, multiples, omega, matrices):
     """Derivatives of the linear part of the form by omega, and by kappa (its imaginary part, the real one is zero)."""
     n = left.shape[1]
@@ -132,4 +155,4 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     return gx, by_omega, 1j * by_kappa
 
 
-__all__ = ["applies", "half_odd_values", "real_gradient"]
+__all__ = ["applies", "half_odd_values", "real_gradient", "toeplitz_part"]
