@@ -54,6 +54,9 @@ def _multipliers(
     return factor
 
 
+#: what the call above is made of: compiled one by one before it is, so that nobody waits for all of it at one go
+
+
 class ClosedSingle:
     """Multipliers of a motion of one DOF whose laws are known in closed form (`applies`).
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path, PurePath
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.analysis import Branch, Results, Table
+from suboctave.analysis import BifurcationDiagram, Branch, Results
 from suboctave.analysis.contacts import check_element, gapped_elements
+from suboctave.analysis.junction import period_name
+from suboctave.analysis.results import Result
+from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_response
@@ -52,6 +55,9 @@ class FigureSection(BaseModel):
     unit: str | None = None
     xlabel: str | None = None
     ylabel: str | None = None
+    xlim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    ylim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    marks: list[str] | None = None
 
     @property
     def view(self) -> View:
@@ -84,7 +90,8 @@ def check_outputs(
     outputs: Outputs, steps: Sequence[Step], system: System | None
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """What is wrong with the outputs, before any work: key and message."""
-    curves = [step.name for step in steps if step.gives_branch]
+    curves = [step.name for step in steps if step.gives_branch or step.gives_diagram]
+    kinds = {step.name: type(step) for step in steps}
     names: list[tuple[tuple[str | int, ...], str]] = [(("results",), outputs.results)]
     yield from _wrong_suffix(("results",), outputs.results, (".nc",))
     if outputs.html is not None:
@@ -98,7 +105,7 @@ def check_outputs(
         yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
         yield from _wrong_texts(figure, key)
         if isinstance(figure, MotionFigure):
-            yield from (((*key, *where), text) for where, text in figure.check(curves, system))
+            yield from (((*key, *where), text) for where, text in figure.check(kinds, system))
             continue
         for i, name in enumerate(figure.analyses):
             if name not in curves:
@@ -115,6 +122,10 @@ def check_outputs(
             size_in_inches(figure.size)
         except InputError as error:
             yield (*key, "size"), str(error)
+        events = [event.name for step in steps for event in getattr(step, "events", ())]
+        for i, kind in enumerate(figure.marks or ()):
+            if kind not in (*KINDS, *events):
+                yield (*key, "marks", i), f"neither a kind nor an event{suggest(kind, [*KINDS, *events])}"
         try:
             view = figure.view
         except InputError as error:
@@ -183,7 +194,7 @@ def csv_names(steps: Sequence[Step]) -> list[str]:
     names = []
     for step in steps:
         names.append(f"{step.name}.csv")
-        if step.gives_branch:
+        if step.gives_branch or step.gives_diagram:
             names.append(f"{step.name}_bifurcations.csv")
     return names
 
@@ -205,43 +216,72 @@ def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) 
     if outputs.csv:
         for name, item in results.items():
             yield from _tables(name, item, folder)
-    curves = results.branches
+    curves = {name: found for name, item in results.items() if (found := _curves(item))}
     missing = []
     for index, figure in enumerate(outputs.figures):
+        path = folder / figure.file
         if isinstance(figure, MotionFigure):
             try:
-                if figure.draw(curves, folder / figure.file):
-                    yield folder / figure.file
+                if figure.draw(results, path):
+                    yield path
             except InputError as error:
                 missing.append(f"outputs.figures[{index}] is not drawn: {error}")
-            continue
-        chosen = [name for name in figure.analyses or curves if name in curves and len(curves[name])]
-        if not chosen:
-            continue
-        every = figure.analyses or list(curves)
-        labels = None if figure.labels is None else [figure.labels[every.index(name)] for name in chosen]
-        path = folder / figure.file
-        view = figure.view
-        readings = [] if view.variable == "amplitude" else [view.variable]
-        drawn = [curves[name].to_xarray(readings=readings) for name in chosen]
-        plot_response(drawn, path, x=figure.x, labels=labels, title=figure.title, size=figure.size, view=view)
-        yield path
+        elif _drawn(figure, results, curves, path):
+            yield path
     if outputs.html is not None and curves:
         path = folder / outputs.html
         report: Any = importlib.import_module(_REPORT)
-        datasets: Mapping[str, Any] = {
-            name: item.to_xarray().assign_attrs(seconds=results.details.get(name, {}).get("seconds", float("nan")))
-            for name, item in results.items()
-            if len(item)
-        }
-        report.write_report(datasets, path, title=title or "Study", overwrite=True)
+        shown = {name: _shown(item, results.details.get(name, {})) for name, item in results.items() if len(item)}
+        report.write_report(shown, path, title=title or "Study", overwrite=True)
         yield path
     if missing:
         rest = "everything else is written; change the figure, and go on with --resume"
         raise InputError("; ".join([*missing, rest]))
 
 
-def _tables(name: str, item: Branch | Table, folder: Path) -> Iterator[Path]:
+def _curves(item: Result) -> list[Branch]:
+    """The branches of a result that can be drawn."""
+    if isinstance(item, BifurcationDiagram):
+        return [branch for branch in item.branches if len(branch)]
+    return [item] if isinstance(item, Branch) and len(item) else []
+
+
+def _drawn(figure: FigureSection, results: Results, curves: Mapping[str, list[Branch]], path: Path) -> bool:
+    """Draw a figure of curves; False where none of them is there."""
+    chosen = [name for name in figure.analyses or curves if name in curves]
+    if not chosen:
+        return False
+    labels: list[str] | None = None
+    view = figure.view
+    if len(chosen) == 1 and figure.marks is None and isinstance(diagram := results[chosen[0]], BifurcationDiagram):
+        view = replace(view, marks=diagram.marks)
+    if figure.labels is not None:
+        every = figure.analyses or [name for name in results if name in curves]
+        told = {name: figure.labels[every.index(name)] for name in chosen}
+        labels = [label for name in chosen for label in _labels(results[name], curves[name], told[name])]
+    elif len(chosen) == 1 and isinstance(diagram := results[chosen[0]], BifurcationDiagram):
+        labels = diagram.legend
+    readings = [] if view.variable == "amplitude" else [view.variable]
+    drawn = [branch.to_xarray(readings=readings) for name in chosen for branch in curves[name]]
+    plot_response(drawn, path, x=figure.x, labels=labels, title=figure.title, size=figure.size, view=view)
+    return True
+
+
+def _labels(item: Result, branches: Sequence[Branch], label: str) -> list[str]:
+    """The label of a curve; those of a diagram's branches tell their periods, too."""
+    if isinstance(item, BifurcationDiagram):
+        return [f"{label}, {period_name(branch.nu)}" for branch in branches]
+    return [label]
+
+
+def _shown(item: Result, details: Mapping[str, Any]) -> Any:
+    """What the report page is told of a result."""
+    if isinstance(item, BifurcationDiagram):
+        return item
+    return item.to_xarray().assign_attrs(seconds=details.get("seconds", float("nan")))
+
+
+def _tables(name: str, item: Result, folder: Path) -> Iterator[Path]:
     yield item.to_csv(files.free_place(folder / f"{name}.csv", True), overwrite=True)
-    if isinstance(item, Branch):
+    if isinstance(item, Branch | BifurcationDiagram):
         yield item.to_csv(folder / f"{name}_bifurcations.csv", "bifurcations", overwrite=True)
