@@ -169,7 +169,7 @@ class TrackedCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * largest) or 1.0
-        extra = self.augmentation.spans(self.evaluate(u).state)
+        extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu)
         return self.join(self._weight / size, 1.0 / extra, 1.0 / np.array(self.spans))
 
     def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
