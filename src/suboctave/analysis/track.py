@@ -15,6 +15,7 @@ from suboctave.analysis.track_start import Box, discretisation, is_extremum, kin
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.formulation import BorderedSystem, Formulation, written
 from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
@@ -41,6 +42,7 @@ def track(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
 ) -> TrackedBranch:
     """The curve of a bifurcation in two parameters, in both directions, from end to end or closed.
 
@@ -63,6 +65,10 @@ def track(
     max_step
         Largest distance between neighbours in scaled arclength: each parameter in units of its range (omega without a
         range in units of its value at the start), the motion in units of its own size.
+
+    formulation
+        As in `frequency_response`: with "extended" the null vector is among the unknowns, with "alcorta2019" period
+        doublings are those of the published system.
 
     Other parameters as `frequency_response`.
 
@@ -91,7 +97,14 @@ def track(
         names, ranges = _free(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit
     system = orbit.system
-    settings = make_settings(system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability)
+    settings = make_settings(
+        system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
+    )
+    if turning and not isinstance(settings.formulation, BorderedSystem):
+        raise InputError(
+            f"curves of extrema are followed by the bordered system, not {settings.formulation.name!r}: leave "
+            "formulation= out; locate_extremum solves for a single one by the published system"
+        )
     basis = orbit.basis
     wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     adaptive, basis = discretisation(basis, wanted)
@@ -112,6 +125,7 @@ def track(
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
         "stability": settings.stability.name,
+        "formulation": written(settings.formulation),
         "observe": settings.observe,
     }
     context = {"system": system, "parameter": names[-1], **options}

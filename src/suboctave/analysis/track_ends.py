@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -157,9 +158,14 @@ def _parts(point: CurvePoint) -> list[Array]:
     basis = curve.balance.basis
     nu = basis.nu
     x = point.u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
-    k = np.repeat(np.arange(1, basis.harmonics + 1), 2)
+    return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
+
+
+@lru_cache(maxsize=64)
+def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
+    k = np.append(0, np.repeat(np.arange(1, harmonics + 1), 2))
     primes = [d for d in range(2, nu + 1) if nu % d == 0 and all(d % e for e in range(2, math.isqrt(d) + 1))]
-    return [x[1:][k % prime != 0].ravel() for prime in primes]
+    return [np.flatnonzero(k % prime) for prime in primes]
 
 
 __all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]

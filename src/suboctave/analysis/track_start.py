@@ -18,7 +18,10 @@ from suboctave.bifurcation.augmented import (
     GrazingContactEquations,
     SingularOperator,
 )
-from suboctave.bifurcation.extremum import extremal_of
+from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
+from suboctave.bifurcation.extremum import LimitPointExtremal
+from suboctave.bifurcation.extremum_bordered import BorderedExtremal
+from suboctave.bifurcation.formulation import BORDERED, Alcorta2019, ExtendedSystem, Formulation
 from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint
@@ -73,7 +76,9 @@ def linear_part(item: Bifurcation) -> LinearPart | None:
     return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
 
 
-def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[Augmentation, np.ndarray]:
+def _augmentation(
+    item: Bifurcation, state: BalanceState, names: tuple[str, ...], formulation: Formulation
+) -> tuple[Augmentation, np.ndarray]:
     """What singles the bifurcation out, and the start of its extra unknowns."""
     if kind_of(item) == "grazing":
         assert item.contact is not None
@@ -88,7 +93,12 @@ def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, ...]
     if kind is Kind.FREE:
         kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
         extra = np.array([kappa])
-    return SingularOperator.of(state, kind, float(extra.sum())), extra
+    kappa = float(extra.sum())
+    if isinstance(formulation, Alcorta2019) and kind is Kind.HALF:
+        return PublishedDoubling.started(state, names), extra
+    if isinstance(formulation, ExtendedSystem) or (isinstance(formulation, Alcorta2019) and kind is Kind.INTEGER):
+        return ExtendedOperator.started(state, kind, kappa)
+    return SingularOperator.of(state, kind, kappa), extra
 
 
 def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tuple[float, ...]:
@@ -106,13 +116,14 @@ def curve_through(
     adaptive: AdaptiveHarmonics | None,
     names: tuple[str, ...],
     spans: tuple[float, ...],
+    formulation: Formulation = BORDERED,
 ) -> tuple[TrackedCurve, np.ndarray]:
     """The curve of bifurcations in free parameters through one of them, and its u there, in the basis of `balance`."""
     orbit = item.orbit
     x = orbit.basis.resized(orbit.coefficients, balance.basis)
     balance = balance.settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
-    augmentation, extra = _augmentation(item, state, names)
+    augmentation, extra = _augmentation(item, state, names, formulation)
     force = state.force_scale()
     floor = 0.0 if force > 0.0 else 1e-8 * orbit.omega**2
     curve = TrackedCurve(
@@ -139,7 +150,12 @@ def with_extremum(curve: TrackedCurve, u: np.ndarray, turning: str, plane: tuple
     n = curve.balance.dimension
     extra_spans = 1.0 / curve.weights(u, 0.0)[n : n + len(extra)]
     state = curve.evaluate(u).state
-    augmentation = extremal_of(curve.augmentation.own, state, extra, beside, turning, sizes, extra_spans)
+    base = curve.augmentation.own
+    augmentation: Augmentation
+    if isinstance(base, SingularOperator) and base.name == "LP":
+        augmentation = LimitPointExtremal(base, beside, state.force_scale() / sizes[beside], turning)
+    else:
+        augmentation = BorderedExtremal.of(base, state, extra, beside, turning, sizes, extra_spans)
     return replace(curve, augmentation=augmentation)
 
 
@@ -158,7 +174,7 @@ def solved_start(
     ConvergenceError
         If it is not found again.
     """
-    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box))
+    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), settings.formulation)
     for name, ends in ((names[0], box.first), (names[-1], box.second)):
         if ends is not None:
             u[curve.index(name)] = min(ends[1], max(ends[0], u[curve.index(name)]))

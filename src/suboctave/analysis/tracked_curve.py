@@ -172,7 +172,7 @@ class TrackedCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * largest) or 1.0
-        extra = self.augmentation.spans(self.evaluate(u).state)
+        extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu)
         return self.join(self._weight / size, 1.0 / extra, 1.0 / np.array(self.spans))
 
     def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
@@ -224,7 +224,8 @@ class TrackedCurve:
             return u
         n = origin.balance.dimension
         x = u[:n].reshape(basis.size, -1)
-        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), u[n:]))
+        extra = origin.augmentation.carried(u[n:-2], self.balance.basis, self.balance.size)
+        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), extra, u[-2:]))
 
     def images(self, u: Array) -> list[Array]:
         """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""

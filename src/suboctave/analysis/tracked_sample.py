@@ -28,6 +28,8 @@ from suboctave.lazy import lazy
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
+#: way along a curve, in scaled arclength, that a zero may still be off by the last secant
+_AT_ZERO = 1e-10
 
 
 class TrackedSample:
@@ -148,15 +150,17 @@ def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOption
     return TrackedSample(make_point(solved, curve, along, point.arclength))
 
 
-def nearest_point(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it.
+def nearest_point(
+    curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions, along: np.ndarray | None = None
+) -> CurvePoint:
+    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known.
 
     Raises
     ------
     ConvergenceError
         If Newton's method does not converge.
     """
-    row = null_row(curve, u, weights)
+    row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
     return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
 
 
@@ -186,20 +190,22 @@ def zero_along(
     row = weights * start.tangent
     row = row / length(row)
 
-    def at(s: float) -> TrackedSample:
-        solved = correct(curve, start.u + s * row / weights, row, weights, newton)
-        return TrackedSample(make_point(solved, curve, start.tangent, s))
-
     s, old = 0.02 * reach, 0.0
-    value_old = function(at(0.0))
+    value_old = function(TrackedSample(start))
+    guess = start.u + s * row / weights
+    before = start.u
     for _ in range(iterations):
-        sample = at(s)
+        solved = correct(curve, guess, row, weights, newton)
+        sample = TrackedSample(make_point(solved, curve, start.tangent, s))
         value = function(sample)
-        if value == 0.0 or abs(s - old) < 1e-11:
-            return sample
-        if value == value_old:
+        if value == value_old and value != 0.0:
             break
-        s, old, value_old = s - value * (s - old) / (value - value_old), s, value
+        change = value * (s - old) / (value - value_old) if value != 0.0 else 0.0
+        if abs(change) < _AT_ZERO:
+            return sample
+        # on the straight line through the last two, in the plane that belongs to the next
+        guess = solved.u - change * (solved.u - before) / (s - old)
+        s, old, value_old, before = s - change, s, value, solved.u
         if abs(s) > reach:
             break
     raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")

@@ -87,8 +87,8 @@ class Augmentation(ABC):
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> Equations:
         """Evaluate at a motion, values of the extra unknowns, and the names of the free parameters."""
 
-    def spans(self, state: BalanceState) -> Array:
-        """Natural sizes of the extra unknowns, shape (q,)."""
+    def spans(self, rate: float) -> Array:
+        """Natural sizes of the extra unknowns, shape (q,); rate: the base frequency."""
         return np.ones(self.extras)
 
     def resized(self, basis: HarmonicBasis, size: int) -> Augmentation:
@@ -97,6 +97,10 @@ class Augmentation(ABC):
 
     def shifted(self, extra: Array, angle: float) -> Array:
         """Extra unknowns of the motion shifted in time, `x(tau + angle)`."""
+        return extra
+
+    def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
+        """Extra unknowns in a basis with other harmonics."""
         return extra
 
 
@@ -130,9 +134,9 @@ class SingularOperator(Augmentation):
         """See `Augmentation.at`."""
         return SingularEquations(self, state, float(extra[0]) if self.extras else 0.0, names)
 
-    def spans(self, state: BalanceState) -> Array:
+    def spans(self, rate: float) -> Array:
         """kappa in units of the base frequency."""
-        return np.full(self.extras, state.rate)
+        return np.full(self.extras, rate)
 
     def resized(self, basis: HarmonicBasis, size: int) -> SingularOperator:
         """See `Augmentation.resized`."""
@@ -290,7 +294,7 @@ class GrazingContactEquations(Augmentation):
         """See `Augmentation.at`."""
         return GrazingEquations(self, state, float(extra[0]), names)
 
-    def spans(self, state: BalanceState) -> Array:
+    def spans(self, rate: float) -> Array:
         """tau in periods."""
         return np.array([2.0 * math.pi])
 
