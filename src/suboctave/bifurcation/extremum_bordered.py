@@ -19,7 +19,7 @@ from suboctave.lazy import lazy
 __all__ = ["BorderedExtremal"]
 
 #: step of the differences that h is differentiated by, in units of the motion and of the parameters' ranges
-_STEP = 3e-5
+_STEP = 1e-5
 
 
 @dataclass(frozen=True)
