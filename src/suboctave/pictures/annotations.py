@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["annotate"]
 
+#: nearest first; further away where everything near is taken
+_DISTANCES = (1.0, 2.4, 3.8)
 _SIDES = ((1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1))
 
 
@@ -41,21 +44,22 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
         probe = axes.text(0.0, 0.0, text, fontsize=look.small)
         size = probe.get_window_extent()
         probe.remove()
-        best: tuple[float, tuple[int, int]] | None = None
-        for rank, side in enumerate(_SIDES):
-            box = _beside(point, side, size.width, size.height, gap * unit)
-            cost = _covered(box, taken) + 40.0 * sum(_overlap(box, other) for other in boxes)
+        best: tuple[float, tuple[int, int], float] | None = None
+        for distance, (rank, side) in product(_DISTANCES, enumerate(_SIDES)):
+            reach = distance * gap
+            box = _beside(point, side, size.width, size.height, reach * unit)
             inside = frame.x0 <= box[0] and box[2] <= frame.x1 and frame.y0 <= box[1] and box[3] <= frame.y1
-            cost += (0.0 if inside else 400.0) + 0.1 * rank
+            cost = _covered(box, taken) + 400.0 * sum(_overlap(box, other) for other in boxes)
+            cost += (0.0 if inside else 400.0) + 0.1 * rank + 8.0 * (distance - 1.0)
             if best is None or cost < best[0]:
-                best = (cost, side)
+                best = (cost, side, reach)
         assert best is not None
-        side = best[1]
-        boxes.append(_beside(point, side, size.width, size.height, gap * unit))
+        _, side, reach = best
+        boxes.append(_beside(point, side, size.width, size.height, reach * unit))
         axes.annotate(
             text,
             axes.transData.inverted().transform(point),
-            xytext=_offset(side, gap),
+            xytext=_offset(side, reach),
             textcoords="offset points",
             ha=("center", "left", "right")[side[0]],
             va=("center", "bottom", "top")[side[1]],

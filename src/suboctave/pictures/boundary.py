@@ -69,7 +69,10 @@ class Plane:
         """The dataset with what is drawn upwards as a variable of its own."""
         if self.upwards is None:
             self.view.check(dataset)
-            values, at_events = dataset[self.view.variable].to_numpy(), dataset[f"event_{self.view.variable}"].to_numpy()
+            values, at_events = (
+                dataset[self.view.variable].to_numpy(),
+                dataset[f"event_{self.view.variable}"].to_numpy(),
+            )
         else:
             values, at_events = coordinate(dataset, self.upwards)
         return dataset.assign({_UPWARDS: ("point", values), f"event_{_UPWARDS}": ("event", at_events)})
@@ -221,7 +224,7 @@ def _limit(axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane) -> None
     every = np.concatenate([every, *(places(data, plane) for data in prepared)])
     for limits, column in zip((axes.set_xlim, axes.set_ylim), every.T, strict=True):
         known = column[np.isfinite(column)]
-        margin = 0.05 * (float(np.ptp(known)) or abs(float(known[0])) or 1.0)
+        margin = 0.06 * (float(np.ptp(known)) or abs(float(known[0])) or 1.0)
         limits(float(known.min()) - margin, float(known.max()) + margin)
 
 
@@ -360,9 +363,9 @@ def _name_events(
                 spots.append(place)
                 texts.append(str(kind))
             elif plane.upwards is not None and str(extreme).endswith(f" of {plane.upwards}"):
-                extrema.append((place, f"{place[1]:.4g}"))
+                extrema.append((place, f"{place[1]:#.4g}"))
     if len(extrema) <= _NAMED:
-        spots += [place for place, _ in extrema]
-        texts += [text for _, text in extrema]
+        spots = [place for place, _ in extrema] + spots
+        texts = [text for _, text in extrema] + texts
     inside = [i for i, place in enumerate(spots) if math.isfinite(place[0]) and math.isfinite(place[1])]
     annotate(figure, axes, np.array([spots[i] for i in inside]), [texts[i] for i in inside], look)

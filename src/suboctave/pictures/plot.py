@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["plot"]
+__all__ = ["datasets_of", "plot"]
 
 
 def plot(
@@ -83,11 +83,7 @@ def plot(
     if quantity is None:
         quantity = "amplitude" if harmonic is None else "harmonic"
     view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
-    several = getattr(curves, "branches", curves)
-    if isinstance(several, Mapping) and several is not curves:
-        several = list(several.values())
-    given = list(several) if isinstance(several, list | tuple) else [several]
-    datasets = [_dataset(item, view) for item in given]
+    datasets = datasets_of(curves, view)
     tracked = [is_boundary(dataset) for dataset in datasets]
     if tracked and all(tracked):
         return plot_boundaries(
@@ -101,6 +97,15 @@ def plot(
             "other; or draw each kind by itself"
         )
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
+
+
+def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
+    """The datasets of what `plot` takes, with the quantity that is drawn."""
+    several = getattr(curves, "branches", curves)
+    if isinstance(several, Mapping) and several is not curves:
+        several = list(several.values())
+    given = list(several) if isinstance(several, list | tuple) else [several]
+    return [_dataset(item, view) for item in given]
 
 
 def _dataset(item: Any, view: View) -> xarray.Dataset:

@@ -16,8 +16,8 @@ that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is t
 it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...; docs/pictures.md) are further variables on
 `point`, each with its own on `event`.
 
-Curves of bifurcations (`track`) have the attributes `tracked`, their kind, and `plane`, their two free parameters, one a
-line; `stable` means that all multipliers but the critical ones lie inside the unit circle; on `point` there is
+Curves of bifurcations (`track`) have the attributes `tracked`, their kind, and `plane`, their two free parameters, one
+a line; `stable` means that all multipliers but the critical ones lie inside the unit circle; on `point` there is
 `coefficient`, which decides the normal form (a of limit points, c3 of period doublings, negative where they are
 supercritical; else nan), on `event` `event_extreme` ("maximum of j" at an extremum, else empty).
 """
