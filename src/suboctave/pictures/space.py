@@ -30,12 +30,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["Space", "plot_space", "space_axes"]
+__all__ = ["SHADE", "Space", "plot_space", "space_axes", "strokes_in_space"]
 
 _DEPTH = "_depth"
 _ASPECT = (1.5, 1.15, 0.95)
 _THIN = 0.7  # of a response curve, beside a curve of bifurcations
-_SHADE = 0.55  # share of white in the projection on the floor
+#: share of white in the projection on the floor
+SHADE = 0.55
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,7 @@ def _draw(
     verdicts: set[bool | None] = set()
     for dataset, curve in zip(bounds, styles, strict=True):
         for piece in strokes_in_space(dataset, space):
-            pale = {"color": tinted(curve.colour, _SHADE), "linewidth": 0.7 * look.line * curve.width, "zorder": 1}
+            pale = {"color": tinted(curve.colour, SHADE), "linewidth": 0.7 * look.line * curve.width, "zorder": 1}
             axes.plot(piece[0][0], piece[0][1], floor, gid="floor", **pale)
     depths = [float(np.nanmean(space.values(dataset)[0][1])) for dataset in responses]
     for index in np.argsort(depths, kind="stable")[::-1]:
@@ -295,11 +296,12 @@ def _cut(dataset: xarray.Dataset, x: str, y: str) -> list[tuple[np.ndarray, np.n
 
 
 def _dress(axes: Any, labels: tuple[str, str, str], zlabel: str | None, look: style.Look) -> None:
-    pad = 0.55 * look.large
+    small = axes.figure.get_figwidth() < 4.2
+    pad = (-0.6 if small else 0.3) * look.large
     axes.set_xlabel(labels[0], fontsize=look.large, color=style.INK, labelpad=pad)
     axes.set_ylabel(labels[1], fontsize=look.large, color=style.INK, labelpad=pad)
     axes.set_zlabel(zlabel or labels[2], fontsize=look.large, color=style.INK, labelpad=pad)
-    axes.tick_params(labelsize=look.small, color=style.INK, pad=0.15 * look.small)
+    axes.tick_params(labelsize=look.small, color=style.INK, pad=(-0.5 if small else -0.1) * look.small)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 1.0))
         axis.pane.set_edgecolor(style.GRID)
