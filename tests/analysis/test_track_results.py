@@ -40,7 +40,7 @@ def test_drawn_over_the_plane_of_its_parameters(curve, tmp_path):
     figure = so.plot(curve, tmp_path / "limits.png", title="limit points")
     (axes,) = figure.axes
     assert axes.get_ylabel() == "F"
-    drawn = [line for line in axes.get_lines() if line.get_gid() in ("stable", "unstable")]
+    drawn = [line for line in axes.get_lines() if line.get_gid() in ("border", "within")]
     y = np.concatenate([line.get_ydata() for line in drawn])
     assert (y.min(), y.max()) == pytest.approx((curve.parameter("F").min(), 0.2), rel=1e-2)
     markers = [line for line in axes.get_lines() if line.get_gid() == "CP"]

@@ -58,7 +58,7 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
         boxes.append(_beside(point, side, size.width, size.height, reach * unit))
         axes.annotate(
             text,
-            axes.transData.inverted().transform(point),
+            tuple(axes.transData.inverted().transform(point)),
             xytext=_offset(side, reach),
             textcoords="offset points",
             ha=("center", "left", "right")[side[0]],

@@ -32,7 +32,7 @@ from suboctave.pictures.boundary_lines import (
 from suboctave.pictures.legend import place_legend
 from suboctave.pictures.response import dress
 from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import Stroke, without_repeats
+from suboctave.pictures.strokes import strokes, without_repeats
 from suboctave.pictures.view import View
 from suboctave.store.layout import check_layout, coordinate
 
@@ -147,14 +147,12 @@ def plot_boundaries(
     names = [name.replace("$", r"\$") for name in (labels if labels is not None else boundary_names(group))]
     styles = boundary_styles(group, names)
     cut = [parts(dataset, plane.across, _UPWARDS) for dataset in prepared]
-    _lines(axes, cut, styles, plane, look)
+    _lines(axes, prepared, styles, plane, look)
     legend = _entries(group, cut, names, styles, look)
     for dataset in prepared:
         mark_events(axes, dataset, places(dataset, plane).T, look)
-    place_legend(figure, [axes], legend, look)
-    if isinstance(size, str) and figure.legends:  # a named size is a width: what stands above the frame adds height
-        more = figure.legends[0].get_window_extent().height / figure.dpi
-        figure.set_size_inches(inches[0], inches[1] + more)
+    # a named size is a width: what stands above the frame adds height
+    place_legend(figure, [axes], legend, look, grow=isinstance(size, str))
     figure.draw_without_rendering()  # the frame has its place: marks along lines are spaced on paper
     for dataset, pieces, curve in zip(prepared, cut, styles, strict=True):
         _along(figure, axes, dataset, pieces, curve, plane, look)
@@ -222,7 +220,8 @@ def _limit(axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane) -> None
         [np.column_stack([coordinate(data, plane.across)[0], data[_UPWARDS].to_numpy()]) for data in prepared]
     ) * np.array(plane.factors())
     every = np.concatenate([every, *(places(data, plane) for data in prepared)])
-    for limits, column in zip((axes.set_xlim, axes.set_ylim), every.T, strict=True):
+    setters: tuple[Any, Any] = (axes.set_xlim, axes.set_ylim)
+    for limits, column in zip(setters, every.T, strict=True):
         known = column[np.isfinite(column)]
         margin = 0.06 * (float(np.ptp(known)) or abs(float(known[0])) or 1.0)
         limits(float(known.min()) - margin, float(known.max()) + margin)
@@ -230,7 +229,7 @@ def _limit(axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane) -> None
 
 def _lines(
     axes: Axes,
-    cut: Sequence[Sequence[Part]],
+    prepared: Sequence[xarray.Dataset],
     styles: Sequence[style.CurveStyle],
     plane: Plane,
     look: style.Look,
@@ -238,9 +237,9 @@ def _lines(
     factors = plane.factors()
     spread = tuple(abs(b - a) / f for (a, b), f in zip((axes.get_xlim(), axes.get_ylim()), factors, strict=True))
     earlier: dict[style.CurveStyle, list[np.ndarray]] = {}
-    for pieces, curve in zip(cut, styles, strict=True):
-        strokes = [Stroke(part.x, part.y, part.stable) for part in pieces]
-        for stroke in without_repeats(strokes, earlier.setdefault(curve, []), (spread[0], spread[1])):
+    for dataset, curve in zip(prepared, styles, strict=True):
+        pieces = strokes(dataset, plane.across, _UPWARDS)
+        for stroke in without_repeats(pieces, earlier.setdefault(curve, []), (spread[0], spread[1])):
             axes.plot(
                 stroke.x * factors[0],
                 stroke.y * factors[1],
@@ -322,7 +321,7 @@ def _along(
     clear = style.MARKER_SIZE * look.marker * figure.dpi / 72.0
     for part in pieces:
         on_paper = axes.transData.transform(np.column_stack([part.x, part.y]) * np.array(plane.factors()))
-        found = stations(*on_paper.T, spacing)
+        found = stations(on_paper[:, 0], on_paper[:, 1], spacing)
         keep = [p for p in found if not len(events) or np.hypot(*(events - p).T).min() > clear]
         if not keep:
             continue

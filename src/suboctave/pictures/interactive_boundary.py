@@ -201,7 +201,7 @@ def space_data(curves: Mapping[str, xarray.Dataset], across: str, depth: str, na
             **scene,
             "aspectmode": "manual",
             "aspectratio": {"x": 1.5, "y": 1.15, "z": 0.95},
-            "camera": {"eye": {"x": 1.0, "y": -1.6, "z": 0.8}},
+            "camera": {"eye": {"x": 1.05, "y": -1.75, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.2}},
         },
     }
     return {"data": data, "layout": layout, "name": name, "space": True}

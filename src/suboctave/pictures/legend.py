@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 __all__ = ["ordered", "place_legend"]
 
 
-def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line2D], look: style.Look) -> None:
-    """Put the legend where there is room for it."""
+def place_legend(
+    figure: Figure, frames: Sequence[Axes], entries: dict[str, Line2D], look: style.Look, *, grow: bool = False
+) -> None:
+    """Put the legend where there is room for it; where it stands above the frames, `grow` adds its height to theirs."""
     if not entries:
         return
     drawing: dict[str, Any] = {
@@ -38,10 +40,15 @@ def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line
                 return
             legend.remove()
     columns = min(len(entries), 4)
+    width, height = figure.get_size_inches()
     while True:
+        if grow:  # as high as it may become, so that the frames keep theirs while it is measured
+            figure.set_size_inches(width, height + 2.0 * look.small / 72.0 * (len(entries) // columns + 2))
         legend = figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns, **drawing)
         figure.draw_without_rendering()
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            if grow:
+                figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
             return
         legend.remove()
         columns -= 1

@@ -141,7 +141,8 @@ def _curve(name: str, dataset: xarray.Dataset) -> str:
     if "stable" in dataset:
         unstable = int(np.count_nonzero(~dataset["stable"].to_numpy().astype(bool)))
     said = f"{count} points" + ("" if unstable is None else f", {unstable} of them unstable")
-    figure, over = _figure, "Bifurcations"
+    figure: Any = _figure
+    over = "Bifurcations"
     if is_boundary(dataset):
         said = f"{_kind(dataset)}: {count} points" + (
             "" if unstable is None else f", {unstable} within unstable motions"

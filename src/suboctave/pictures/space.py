@@ -18,7 +18,7 @@ import numpy as np
 from suboctave.errors import InputError, suggest
 from suboctave.pictures import style
 from suboctave.pictures.boundary import BORDER, SMALL, WITHIN, event_drawing, event_words, mark_events
-from suboctave.pictures.boundary_lines import boundary_names, boundary_styles, is_boundary, kind_of, parts, plane_of
+from suboctave.pictures.boundary_lines import boundary_names, boundary_styles, is_boundary, kind_of, plane_of
 from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
 from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import strokes
@@ -224,6 +224,7 @@ def _draw(
     styles = boundary_styles(bounds, names)
     responses = [dataset for dataset in group if not is_boundary(dataset)]
     entries: dict[str, Line2D] = {}
+    dashed: Any = style.UNSTABLE_DASH
     verdicts: set[bool | None] = set()
     for dataset, curve in zip(bounds, styles, strict=True):
         for piece in strokes_in_space(dataset, space):
@@ -235,7 +236,7 @@ def _draw(
         colour = period_colour(period_of(dataset))
         for (x, y, z), stable in strokes_in_space(dataset, space):
             verdicts.add(stable)
-            dash = style.UNSTABLE_DASH if stable is False else style.STABLE_DASH
+            dash: Any = style.UNSTABLE_DASH if stable is False else style.STABLE_DASH
             axes.plot(x, y, z, color=colour, linewidth=_THIN * look.line, linestyle=dash, zorder=3, gid="response")
     kinds: dict[str, style.KindStyle] = {}
     for nu in sorted({period_of(dataset) for dataset in responses}):
@@ -261,13 +262,11 @@ def _draw(
         mark_events(axes, dataset, space.values(dataset)[1], look)
         kinds |= {kind: mark for kind, mark, _ in style.marks(dataset)}
     if False in verdicts:
-        entries["unstable"] = Line2D(
-            [], [], color=style.SOFT, linewidth=_THIN * look.line, linestyle=style.UNSTABLE_DASH
-        )
+        entries["unstable"] = Line2D([], [], color=style.SOFT, linewidth=_THIN * look.line, linestyle=dashed)
     if False in within:
         for stable, words in ((True, BORDER), (False, WITHIN)):
             if stable in within:
-                dash = style.STABLE_DASH if stable else style.UNSTABLE_DASH
+                dash = style.STABLE_DASH if stable else dashed
                 entries[words] = Line2D([], [], color=style.SOFT, linewidth=1.25 * look.line, linestyle=dash)
     order = list(style.KINDS)
     for kind in sorted(kinds, key=lambda k: (order.index(k) if k in order else len(order), k)):
@@ -282,17 +281,10 @@ def strokes_in_space(dataset: xarray.Dataset, space: Space) -> list[tuple[np.nda
     prepared = dataset.assign({_DEPTH: ("point", depth), f"event_{_DEPTH}": ("event", at_events)})
     factors = space.factors()
     found = []
-    for up, into in zip(
-        _cut(prepared, space.across, space.view.variable), _cut(prepared, space.across, _DEPTH), strict=True
-    ):
-        found.append((np.array([up[0] * factors[0], into[1] * factors[1], up[1] * factors[2]]), up[2]))
+    variables = (space.view.variable, _DEPTH)
+    for up, into in zip(*(strokes(prepared, space.across, name) for name in variables), strict=True):
+        found.append((np.array([up.x * factors[0], into.y * factors[1], up.y * factors[2]]), up.stable))
     return found
-
-
-def _cut(dataset: xarray.Dataset, x: str, y: str) -> list[tuple[np.ndarray, np.ndarray, bool | None]]:
-    if is_boundary(dataset):
-        return [(part.x, part.y, part.stable) for part in parts(dataset, x, y)]
-    return [(stroke.x, stroke.y, stroke.stable) for stroke in strokes(dataset, x, y)]
 
 
 def _dress(axes: Any, labels: tuple[str, str, str], zlabel: str | None, look: style.Look) -> None:
@@ -348,14 +340,15 @@ def _place(figure: Figure, axes: Any, entries: dict[str, Line2D], title: str | N
 
 def _extent(figure: Figure, axes: Any) -> tuple[np.ndarray, np.ndarray]:
     """The lower left and the upper right corner of the frame with its labels, pixels."""
-    from mpl_toolkits.mplot3d import proj3d
+    from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
 
     limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
     cube = np.array(list(product(*limits))).T
     flat = np.array(proj3d.proj_transform(*cube, axes.get_proj())[:2]).T
     corners = [axes.transData.transform(flat)]
+    canvas: Any = figure.canvas
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        box = axis.get_tightbbox(figure.canvas.get_renderer())
+        box = axis.get_tightbbox(canvas.get_renderer())
         corners.append(np.array([[box.x0, box.y0], [box.x1, box.y1]]))
     every = np.concatenate(corners)
     return every.min(axis=0), every.max(axis=0)
