@@ -97,7 +97,7 @@ def test_drawn_as_by_a_script(study_file, suboctave, tmp_path):
         ('title = "Where it jumps"', 'analyses = ["limit"]', "did you mean 'limits'"),
         ('title = "Where it jumps"', 'labels = ["a", "b"]', "2 labels for 1 curves"),
         ('title = "Where it jumps"', 'y = "c"', "is not free on these curves"),
-        ('title = "Where it jumps"', 'elevation = 3.0', "elevation"),
+        ('title = "Where it jumps"', "elevation = 3.0", "elevation"),
         ('file = "responses.png"', 'file = "responses.png"\nanalyses = ["limits"]', 'kind = "boundary" draws it'),
         ('title = "Where it jumps"', 'title = "$\\\\frac{$"', "cannot be drawn"),
     ],

@@ -49,8 +49,8 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
             reach = distance * gap
             box = _beside(point, side, size.width, size.height, reach * unit)
             inside = frame.x0 <= box[0] and box[2] <= frame.x1 and frame.y0 <= box[1] and box[3] <= frame.y1
-            cost = _covered(box, taken) + 400.0 * sum(_overlap(box, other) for other in boxes)
-            cost += (0.0 if inside else 400.0) + 0.1 * rank + 8.0 * (distance - 1.0)
+            cost = 2.0 * _covered(box, taken) + 400.0 * sum(_overlap(box, other) for other in boxes)
+            cost += (0.0 if inside else 400.0) + 0.1 * rank + 5.0 * (distance - 1.0)
             if best is None or cost < best[0]:
                 best = (cost, side, reach)
         assert best is not None

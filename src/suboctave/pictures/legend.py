@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
 
-__all__ = ["ordered", "place_legend"]
+__all__ = ["TIGHT", "ordered", "place_legend"]
+
+#: so that two columns fit into the width of a journal's column
+TIGHT: dict[str, Any] = {"handlelength": 2.0, "handletextpad": 0.5, "columnspacing": 1.0}
 
 
 def place_legend(
@@ -31,6 +34,8 @@ def place_legend(
         "edgecolor": style.GRID,
         "handlelength": 2.6,
     }
+    if grow:
+        drawing |= TIGHT
     figure.draw_without_rendering()  # places the frames; a legend inside one of them moves nothing
     for axes in frames:
         for location in ("upper left", "upper right", "center left", "center right", "lower left", "lower right"):

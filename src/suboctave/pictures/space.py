@@ -19,6 +19,7 @@ from suboctave.errors import InputError, suggest
 from suboctave.pictures import style
 from suboctave.pictures.boundary import BORDER, SMALL, WITHIN, event_drawing, event_words, mark_events
 from suboctave.pictures.boundary_lines import boundary_names, boundary_styles, is_boundary, kind_of, plane_of
+from suboctave.pictures.legend import TIGHT
 from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
 from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import strokes
@@ -142,7 +143,7 @@ def plot_space(
     entries = _draw(axes, group, space, floor, look)
     _dress(axes, space.labels(group[0]), zlabel, look)
     axes.view_init(float(elevation), float(azimuth))
-    _place(figure, axes, entries, title, look)
+    _place(figure, axes, entries, title, look, grow=isinstance(size, str))
     if path is not None:
         save_figure(figure, path)
     setattr(figure, "_repr_png_", partial(png_bytes, figure))  # noqa: B010
@@ -152,7 +153,7 @@ def plot_space(
 def _inches(size: str | tuple[float, float]) -> tuple[float, float]:
     """Named sizes are widths: in space more height is needed."""
     width, height = style.size_in_inches(size)
-    return (width, 0.85 * width if width < 5.0 else 0.7 * width) if isinstance(size, str) else (width, height)
+    return (width, 0.8 * width if width < 5.0 else 0.62 * width) if isinstance(size, str) else (width, height)
 
 
 def space_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:
@@ -289,45 +290,54 @@ def strokes_in_space(dataset: xarray.Dataset, space: Space) -> list[tuple[np.nda
 
 def _dress(axes: Any, labels: tuple[str, str, str], zlabel: str | None, look: style.Look) -> None:
     small = axes.figure.get_figwidth() < 4.2
-    pad = (-0.6 if small else 0.3) * look.large
+    pad = (-0.45 if small else 0.3) * look.large
     axes.set_xlabel(labels[0], fontsize=look.large, color=style.INK, labelpad=pad)
     axes.set_ylabel(labels[1], fontsize=look.large, color=style.INK, labelpad=pad)
     axes.set_zlabel(zlabel or labels[2], fontsize=look.large, color=style.INK, labelpad=pad)
-    axes.tick_params(labelsize=look.small, color=style.INK, pad=(-0.5 if small else -0.1) * look.small)
+    axes.tick_params(labelsize=look.small, color=style.INK, pad=(-0.3 if small else -0.1) * look.small)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 1.0))
         axis.pane.set_edgecolor(style.GRID)
         axis._axinfo["grid"].update({"color": style.GRID, "linewidth": 0.4 * look.line})
         axis.line.set_color(style.INK)
         axis.line.set_linewidth(0.53 * look.line)
-        axis.set_major_locator(_few())
+        axis.set_major_locator(_few(4 if small else 5))
     axes.set_box_aspect(_ASPECT)
 
 
-def _few() -> Any:
+def _few(count: int) -> Any:
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10])
+    return MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10])
 
 
-def _place(figure: Figure, axes: Any, entries: dict[str, Line2D], title: str | None, look: style.Look) -> None:
-    """Title and legend above, and the frame as large as what is left."""
-    height, top = figure.bbox.height, 1.0
+def _place(
+    figure: Figure, axes: Any, entries: dict[str, Line2D], title: str | None, look: style.Look, *, grow: bool
+) -> None:
+    """Title and legend above, and the frame as large as what is left; `grow` adds the legend's height to the page."""
+    drawing: dict[str, Any] = {"fontsize": look.small, "edgecolor": style.GRID, "framealpha": 1.0, **TIGHT}
+    if grow:
+        rows = figure.legend(entries.values(), entries.keys(), ncols=_columns(figure, entries, drawing), **drawing)
+        figure.draw_without_rendering()
+        width, height = figure.get_size_inches()
+        figure.set_size_inches(width, height + rows.get_window_extent().height / figure.dpi)
+        rows.remove()
+    top, whole = 1.0, figure.bbox.height
     if title:
         figure.suptitle(title.replace("$", r"\$"), fontsize=look.large, color=style.INK, y=0.985)
-        top -= 2.0 * look.large / 72.0 * figure.dpi / height
-    drawing: dict[str, Any] = {"fontsize": look.small, "edgecolor": style.GRID, "framealpha": 1.0, "handlelength": 2.4}
-    for columns in range(min(len(entries), 4), 0, -1):
-        legend = figure.legend(
-            entries.values(), entries.keys(), loc="upper center", bbox_to_anchor=(0.5, top), ncols=columns, **drawing
-        )
-        figure.draw_without_rendering()
-        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
-            break
-        legend.remove()
-    top = legend.get_window_extent().y0 / height
+        top -= 2.0 * look.large / 72.0 * figure.dpi / whole
+    legend = figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="upper center",
+        bbox_to_anchor=(0.5, top),
+        ncols=_columns(figure, entries, drawing),
+        **drawing,
+    )
+    figure.draw_without_rendering()
+    top = legend.get_window_extent().y0 / whole
     zoom, corner = 1.0, np.zeros(2)
-    room = np.array([figure.bbox.width, top * height])
+    room = np.array([figure.bbox.width, top * whole])
     for _ in range(4):  # letters do not grow with the frame, so that a few rounds are needed
         axes.set_position((*corner, 1.0, top))
         axes.set_box_aspect(_ASPECT, zoom=zoom)
@@ -336,6 +346,18 @@ def _place(figure: Figure, axes: Any, entries: dict[str, Line2D], title: str | N
         corner = corner + (0.5 * (room - low - high)) / figure.bbox.size
         zoom *= float(np.clip((0.97 * room / (high - low)).min(), 0.5, 1.5))
     axes.set_position((*corner, 1.0, top))
+
+
+def _columns(figure: Figure, entries: dict[str, Line2D], drawing: dict[str, Any]) -> int:
+    """As many columns of the legend as the page is wide, four at most."""
+    for columns in range(min(len(entries), 4), 1, -1):
+        legend = figure.legend(entries.values(), entries.keys(), ncols=columns, **drawing)
+        figure.draw_without_rendering()
+        fits = bool(legend.get_window_extent().width <= figure.bbox.width)
+        legend.remove()
+        if fits:
+            return columns
+    return 1
 
 
 def _extent(figure: Figure, axes: Any) -> tuple[np.ndarray, np.ndarray]:
