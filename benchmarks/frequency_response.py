@@ -11,6 +11,7 @@ seconds.
 
 from __future__ import annotations
 
+import functools
 import json
 import platform
 import sys
@@ -51,6 +52,10 @@ def cases() -> dict[str, Callable[[], so.Branch]]:
     for law, system in (("exact", exact), ("s=3000", arctan)):
         for harmonics in ("adaptive", 15, 31):
             found[f"p=0.55, {law}, H {harmonics}"] = response(system, (4.5, 1.3), harmonics)
+    for p in (0.55, 1.7):
+        for law, sharpness in (("exact", None), ("s=3000", 3000.0)):
+            curve = so.frequency_response(so.library.reference_oscillator(p=p, regularization=sharpness), (4.5, 1.3))
+            found[f"2T branch, p={p:g}, {law}"] = functools.partial(so.switch_branch, curve.bifurcations["PD"][0])
     found["NLTVA, F=0.11"] = response(absorber, (0.8, 1.5), "adaptive")
     found["Duffing, F=1"] = response(duffing, (0.3, 6.0), "adaptive")
     found["10 masses, stop"] = response(chain, (0.4, 0.6), "adaptive")

@@ -5,6 +5,7 @@ most cost less there than their compilation would. So a kernel first runs as the
 
 - kernels marked `QUICK` are compiled almost at once, all others when they have cost `PATIENCE` seconds, but `LESS` from
   the second computation of a process on and where an earlier process has compiled others;
+- a kernel waits until those that it calls are compiled;
 - compilation has an allowance, `CREDIT` seconds at first, that grows by `SHARE` of the time in which nothing is
   compiled: however much there is to compile, nobody waits for it all at one go.
 
@@ -154,7 +155,21 @@ class _Patient(_Kernel):
         if _ledger.eager:
             return True
         patience = self.patience if _ledger.fresh and _ledger.runs < 2 else min(self.patience, LESS)
-        return spent > patience and _ledger.allows()
+        if not (spent > patience and _ledger.allows()):
+            return False
+        # those that it has called first, one by one: otherwise all of them would be compiled at one go
+        waiting = [part for part in self._parts() if isinstance(part, _Patient) and "_spent" in part.__dict__]
+        for part in waiting:
+            part.patience = 0.0
+        return not waiting
+
+    def _parts(self) -> list[Any]:
+        """The kernels that this one calls."""
+        known = self.__dict__.get("_called")
+        if known is None:
+            names, there = self.py_func.__code__.co_names, self.py_func.__globals__
+            known = self._called = [there[name] for name in names if isinstance(there.get(name), CPUDispatcher)]
+        return known
 
 
 def compiled(kernel: _Function) -> _Function:

@@ -137,3 +137,27 @@ def test_doubled_limit_points_end_on_the_period_doublings():
     inside = (doubling.omega < expected[0][0]) & (doubling.omega > expected[1][0]) & (doubling.parameter("j") > 0.15)
     assert np.all(doubling.coefficient[inside] > 0.0)
     assert np.all(doubling.coefficient[~inside & (np.abs(doubling.omega - expected[0][0]) > 0.05)] < 0.0)
+
+
+def test_corners_of_the_exact_law_where_another_contact_grazes():
+    """The limit point behind the first touch of the left stop, over the right gap, passes from one stop to the other.
+
+    As the right gap grows to that of the left, both contacts graze at once. With sharp but rounded stops the curve is
+    smooth and runs beside it.
+    """
+    exact, rounded = (
+        so.track(
+            so.frequency_response(so.library.reference_oscillator(regularization=s), (1.8, 1.6)).bifurcations["LP"][0],
+            "j",
+            (0.0, 1.0),
+            harmonics=harmonics,
+        )
+        for s, harmonics in ((None, 63), (3e4, "adaptive"))
+    )
+    for curve in (exact, rounded):
+        assert (curve.parameter("j")[0], curve.parameter("j")[-1]) == pytest.approx((0.0, 1.0)), curve.ended
+    assert any("corner" in note for note in exact.warnings)
+    assert exact.omega[-1] == pytest.approx(rounded.omega[-1], abs=2e-3)
+    inside = np.linspace(0.05, 0.95, 10)
+    beside = np.interp(inside, rounded.parameter("j"), rounded.omega)
+    assert np.interp(inside, exact.parameter("j"), exact.omega) == pytest.approx(beside, abs=2e-3)

@@ -67,6 +67,25 @@ def test_the_other_order_of_bounds_is_the_curve_backwards(limit_point, curve):
     assert (back.omega[0], back.omega[-1]) == pytest.approx((curve.omega[-1], curve.omega[0]), rel=1e-9)
 
 
+def test_response_curves_through_its_points_have_the_bifurcation_there(curve):
+    point = curve.points[len(curve) // 3]
+    omega = point.orbit.omega
+    branch = so.continue_branch(point, "omega", (0.9 * omega, 1.1 * omega))
+    nearest = min(branch.bifurcations["LP"], key=lambda b: abs(b.omega - omega))
+    assert nearest.omega == pytest.approx(omega, rel=1e-8)
+    again = so.track(nearest, "F", (0.01, 0.2))
+    assert again.bifurcations["CP"][0].omega == pytest.approx(curve.bifurcations["CP"][0].omega, rel=1e-8)
+
+
+def test_points_and_events_by_shooting():
+    system = so.library.reference_oscillator()
+    start = so.frequency_response(system, (4.1, 3.9)).bifurcations["PD"][0]
+    curve = so.track(start, "j", (0.0, 0.3))
+    for item in (curve.extrema[0], curve.points[len(curve) // 2]):
+        check = so.verify(item)
+        assert check.agrees, check
+
+
 def test_an_interrupted_curve_keeps_what_it_has(limit_point):
     calls = []
 

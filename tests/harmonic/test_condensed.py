@@ -66,6 +66,23 @@ def test_same_normal_forms(full, condensed_branch):
     assert compared
 
 
+@pytest.mark.parametrize("parameter", ["p", "Kc"])
+def test_same_curves_of_bifurcations(full, condensed_branch, parameter):
+    """In two parameters, with the same extrema and points of codimension two on the way."""
+    kinds = {}
+    for one, other in zip(condensed_branch.bifurcations, full.bifurcations, strict=True):
+        if kinds.setdefault(one.kind, one) is not one:
+            continue
+        value = one.parameters[parameter]
+        a, b = (so.track(item, parameter, (0.8 * value, 1.2 * value)) for item in (one, other))
+        for name in ("omega", parameter):
+            assert a.parameter(name)[[0, -1]] == pytest.approx(b.parameter(name)[[0, -1]], rel=1e-7), one.kind
+        assert [e.remark() or e.kind for e in a.bifurcations] == [e.remark() or e.kind for e in b.bifurcations]
+        for e, f in zip(a.bifurcations, b.bifurcations, strict=True):
+            assert e.omega == pytest.approx(f.omega, rel=1e-6)
+    assert kinds
+
+
 def test_same_curve(full, condensed_branch):
     """Every point of the condensed curve, expanded to all DOFs, solves the full model; stability is the same there."""
     balance = HarmonicBalance(chain(0), HarmonicBasis(9))

@@ -8,7 +8,7 @@ omega. Each case in a plain and in a doubled basis, and each also in flexibility
 import numpy as np
 import pytest
 
-from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis, real_form
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator, parameter_gradient
 from suboctave.harmonic.perturbation_rate import operator_along
 from suboctave.harmonic.second import Direction, second_derivative
@@ -226,6 +226,36 @@ def test_gradient_of_a_bilinear_form_of_the_operator(case, kind):
         assert_close(gradient.rates[name], lambda h, name=name: form(case.at(h, **{name: 1.0})))
     if kind is Kind.FREE:
         assert_close(gradient.kappa, lambda h: form(case.state, KAPPA + h))
+
+
+@pytest.mark.parametrize("kind", [Kind.INTEGER, Kind.HALF])
+@pytest.mark.parametrize("nu", [1, 2])
+@pytest.mark.parametrize("regularization", [None, 20.0])
+def test_compiled_gradient_without_velocity(kind, nu, regularization, monkeypatch):
+    """Forces of displacements alone: against differences, and by kappa against the general form."""
+    case = Case([*contacts(regularization), CubicSpring((0, 1), coefficient="alpha")], nu, None)
+    left, right = case.random.normal(size=(2, len(operator(case.state, kind))))
+    assert real_form.applies(case.state, ("omega",))
+    gradient = bilinear_gradient(case.state, kind, left, right, ("omega",))
+    dx = case.vector()
+
+    def form(state):
+        return left @ operator(state, kind) @ right
+
+    assert_close((gradient.x * dx).sum(), lambda h: form(case.at(h, dx)))
+    assert_close(gradient.rates["omega"], lambda h: form(case.at(h, omega=1.0)))
+    monkeypatch.setattr(real_form, "applies", lambda *_: False)
+    general = bilinear_gradient(case.state, kind, left, right, ("omega",))
+    assert gradient.kappa == pytest.approx(general.kappa, rel=1e-12)
+    np.testing.assert_allclose(gradient.x, general.x, atol=1e-12 * np.abs(general.x).max())
+
+
+@pytest.mark.parametrize("name", ["omega", *NAMES])
+def test_the_column_of_the_parameter(case, name):
+    extended = case.state.extended_jacobian(name)
+    size = np.abs(extended).max()
+    np.testing.assert_allclose(extended[:, :-1], case.state.jacobian, atol=1e-13 * size)
+    np.testing.assert_allclose(extended[:, -1], case.state.residual_by(name), atol=1e-13 * size)
 
 
 @pytest.mark.parametrize("name", ["omega", *NAMES])

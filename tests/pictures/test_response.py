@@ -41,15 +41,15 @@ def test_the_legend_names_only_what_occurs(duffing):
 
 
 def test_each_kind_has_its_own_marker_and_an_unknown_one_its_own_name():
-    x = np.linspace(0, 1, 20)
     kinds = [*KINDS, "mine"]
+    x = np.linspace(0, 1, len(kinds) + 3)
     rows = [EventRow(kind, i, x[i], x[i]) for i, kind in enumerate(kinds)]
     figure = plot_response(curve_dataset(x, x, stable=x < 2, events=rows))
     drawn = {line.get_gid(): line.get_marker() for line in figure.axes[0].get_lines() if line.get_gid() in kinds}
-    shapes = {"LP": "o", "PD": "v", "NS": "s", "BP": "D", "grazing": "x", "mine": "*"}
-    assert {kind: drawn[kind] for kind in shapes} == shapes
+    assert drawn.keys() == set(kinds)
     assert len(set(drawn.values())) == len(kinds)
-    names = {"limit point", "period doubling", "Neimark–Sacker", "branch point", "grazing contact", "cusp", "mine"}
+    assert drawn | {"LP": "o", "PD": "v", "NS": "s", "BP": "D", "grazing": "x", "mine": "*"} == drawn
+    names = {"limit point", "period doubling", "Neimark–Sacker", "branch point", "grazing contact", "mine"}
     assert names < set(texts(figure))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.results import from_dataset
+from suboctave.analysis.results import from_datasets
 from suboctave.store.journal import Journal, read_journal
 from suboctave.study.commands import examples
 from suboctave.study.file import read_study
@@ -263,7 +263,7 @@ def test_a_kill_in_the_middle_loses_no_finished_analysis(study_file, by_script):
     outcome = run_study(read_study(path), resume=True)
     assert [item.reused for item in outcome.finished] == [True, False]
     # what the killed process had finished is taken as it is; what follows starts from it
-    equal(outcome.finished[0].result, from_dataset(first.dataset)[0])
+    equal(outcome.finished[0].result, from_datasets({"": first.dataset})[0])
     for item, branch in zip(outcome.finished, by_script, strict=True):
         np.testing.assert_allclose(item.result.amplitude, branch.amplitude, rtol=1e-9)
     assert outcome.finished[0].seconds == first.dataset.attrs["seconds"]

@@ -13,10 +13,12 @@ from suboctave.study.commands import examples
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+FIRST, LAST = TUTORIAL.split("## 5. ")
+CASCADE, SUBHARMONIC = LAST.split("### Sub-harmonics")
 
 
-def blocks(kind):
-    return re.findall(rf"^```{kind}\n(.*?)^```", TUTORIAL, re.M | re.S)
+def blocks(kind, part=FIRST):
+    return re.findall(rf"^```{kind}\n(.*?)^```", part, re.M | re.S)
 
 
 def touches(amplitude, force, zeta):
@@ -64,6 +66,49 @@ def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
     first, *_, last = scope["curve"].grazings
     assert first.omega == pytest.approx(high, abs=1e-9)
     assert last.omega == pytest.approx(low, abs=1e-9)
+
+
+def without_points(tree):
+    """A printed tree without the numbers of points, which change with the steps."""
+    return re.sub(r"\d+ points, \d+ unstable", "", tree)
+
+
+def test_its_cascade(suboctave, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made, _ = blocks("python")
+    switched, tree = blocks("python", CASCADE)
+    said, printed = blocks("text", CASCADE)
+    scope = {}
+    exec(compile(made.split("curve = ")[0] + switched, "docs/tutorial.md", "exec"), scope)
+    assert capsys.readouterr().out == said
+    exec(compile(tree, "docs/tutorial.md", "exec"), scope)
+    assert without_points(capsys.readouterr().out) == without_points(printed)
+    assert Path("cascade.png").stat().st_size > 0
+    diagram = so.load("cascade.nc")
+    assert repr(diagram) == repr(scope["diagram"])
+    assert diagram.stopped == ""
+    # as long as only the stop at 0 is touched, the equation has no length of its own: the force does not matter
+    weak = scope["hard"].with_parameters({"p": 0.1})
+    again = so.frequency_response(weak, omega=(4.0, 2.1)).bifurcations["PD"]
+    for one, other in zip(again, diagram[0].branch.bifurcations["PD"], strict=True):
+        assert one.omega == pytest.approx(other.omega, abs=1e-6)
+        assert one.amplitude / 0.1 == pytest.approx(other.amplitude / 1.7, rel=1e-5)
+
+    (first,), (second,) = blocks("toml"), blocks("toml", CASCADE)
+    Path("study.toml").write_text(first.split("[[analyses]]")[0] + second, encoding="utf-8")
+    status, out, err = suboctave("run", "study.toml")
+    assert status == 0, err
+    assert "3 branches" in out
+    found = so.load("study_results/results.nc")
+    assert found["once more"].nu == 8
+    np.testing.assert_array_equal(found["cascade"][1].branch.omega, diagram[1].branch.omega)
+    np.testing.assert_allclose(sorted(found["once more"].omega[[0, -1]]), [2.42595, 2.4488], atol=3e-4)
+
+
+def test_its_isolated_subharmonic(capsys):
+    (script,), (printed,) = blocks("python", SUBHARMONIC), blocks("text", SUBHARMONIC)
+    exec(compile("import suboctave as so\n" + script, "docs/tutorial.md", "exec"), {})
+    assert capsys.readouterr().out == printed
 
 
 def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):

@@ -222,9 +222,9 @@ class Branch(BranchReadings):
         InputError
             If the file exists and `overwrite` is not given, or cannot be written there.
         """
-        from suboctave.analysis.results import save_branch
+        from suboctave.analysis.results import save
 
-        return save_branch(self, path, overwrite)
+        return save(self, path, overwrite)
 
     def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
         """The points, or the "bifurcations", as comma-separated text (.csv)."""

@@ -11,13 +11,14 @@ import math
 
 import numpy as np
 
-from suboctave.bifurcation.gaps import contact_side, levels, told_levels
+from suboctave.bifurcation.gaps import contact_side, levels
 from suboctave.errors import InputError
 from suboctave.harmonic import instants
 from suboctave.harmonic.element_force import displacements_read, force_along
 from suboctave.harmonic.grazing_instants import extrema
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.quadrature import search_grid
+from suboctave.model.sampling import told_levels
 from suboctave.model.system import System
 
 __all__ = ["check_element", "contact_of", "gapped_elements", "peak_force"]

@@ -6,18 +6,18 @@ leave these, as deep as asked. A branch that meets its parent at another bifurca
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections import deque
+from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import is_number
-from suboctave.analysis.junction import Junction, period_name
+from suboctave.analysis.junction import Junction
 from suboctave.analysis.making import Harmonics
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.switching import switch_branch
+from suboctave.analysis.tree import BifurcationDiagram, DiagramBranch
 from suboctave.analysis.verbs import frequency_response
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.formulation import Formulation
@@ -25,159 +25,28 @@ from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
+from suboctave.store.layout import events_met
 
-if TYPE_CHECKING:
-    import pandas
-
-__all__ = ["BifurcationDiagram", "DiagramBranch", "bifurcation_diagram"]
+__all__ = ["BifurcationDiagram", "DiagramBranch", "Keeper", "bifurcation_diagram"]
 
 #: kinds at which other branches leave
 _SWITCHED = ("PD", "BP")
 
 
-@dataclass(eq=False)
-class DiagramBranch:
-    """A branch of a diagram with those that leave it.
+class Keeper(Protocol):
+    """Somebody who keeps branches as they are found, and knows those of a run that was stopped.
 
-    Attributes
-    ----------
-    branch
-        The curve.
-    origin
-        The bifurcation of the parent that it leaves at; None for the response itself.
-    depth
-        0 for the response, 1 for what leaves it, ...
-    children
-        The branches that leave it, in the order in which it meets them.
-    failures
-        Bifurcations whose other branch could not be followed, and why.
-    left
-        Bifurcations that were not switched at, since the depth or the budget was reached.
-    met
-        The parent's branch points, some of which it may pass through.
+    A branch is told by the number of its parent and the index of the bifurcation that it leaves at among
+    `events_met(parent)`; the response by -1 and -1.
     """
 
-    branch: Branch
-    origin: Bifurcation | None = None
-    depth: int = 0
-    children: list[DiagramBranch] = field(default_factory=list)
-    failures: list[tuple[Bifurcation, str]] = field(default_factory=list)
-    left: list[Bifurcation] = field(default_factory=list)
-    met: list[Bifurcation] = field(default_factory=list, repr=False)
+    def known(self, parent: int, event: int) -> Branch | None:
+        """The branch, if an earlier run has found it."""
+        ...
 
-    def __iter__(self) -> Iterator[DiagramBranch]:
-        """This one and all below it, parents first."""
-        yield self
-        for child in self.children:
-            yield from child
-
-    @property
-    def label(self) -> str:
-        """Its period and where it begins and ends: "2T, PD 3.993452 to PD 2.303153"."""
-        branch = self.branch
-        text = period_name(branch.nu)
-        name = branch.name
-        ends = [
-            f"{j.kind} {j.parameter:.7g}" if j is not None else f"{name} {branch.parameter(name)[i]:.7g}"
-            for j, i in ((branch.departs, 0), (branch.arrives, -1))
-        ]
-        if branch.closed:
-            origin = self.origin
-            through = "" if origin is None else f" through {origin.kind} {origin.parameter(name):.7g}"
-            return f"{text}, closed{through}"
-        return f"{text}, {ends[0]} to {ends[1]}"
-
-
-class BifurcationDiagram:
-    """A response and the branches that bifurcate from it, as a tree; print it to see all of it.
-
-    Attributes
-    ----------
-    root
-        The response, with `children` at every level (`DiagramBranch`).
-    stopped
-        Why not all branches were followed, in words; empty if they were.
-    seconds
-        How long it took.
-    """
-
-    def __init__(self, root: DiagramBranch, stopped: str = "") -> None:
-        self.root = root
-        self.stopped = stopped
-        self.seconds = float("nan")
-
-    def __iter__(self) -> Iterator[DiagramBranch]:
-        """Every branch with its place in the tree, parents first."""
-        return iter(self.root)
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self.root)
-
-    @property
-    def system(self) -> System:
-        """What vibrates."""
-        return self.root.branch.system
-
-    @property
-    def branches(self) -> list[Branch]:
-        """All curves, parents first."""
-        return [node.branch for node in self]
-
-    @property
-    def bifurcations(self) -> list[Bifurcation]:
-        """All located bifurcations, branch by branch."""
-        return [item for branch in self.branches for item in branch.bifurcations]
-
-    def of_period(self, nu: int) -> list[Branch]:
-        """The branches of motions of `nu` load periods."""
-        return [branch for branch in self.branches if branch.nu == nu]
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per bifurcation: the branch it lies on, kind, place, amplitude."""
-        import pandas as pd
-
-        frames = []
-        for number, node in enumerate(self):
-            frame = node.branch.bifurcations_frame()
-            frame.insert(0, "depth", node.depth)
-            frame.insert(0, "nu", node.branch.nu)
-            frame.insert(0, "branch", number)
-            frames.append(frame)
-        return pd.concat([f for f in frames if len(f)] or frames[:1], ignore_index=True)
-
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """Draw all branches, periods in their own colours; options are those of `suboctave.plot`."""
-        from suboctave.pictures import plot
-
-        return plot(self.branches, path, **options)
-
-    def __repr__(self) -> str:
-        lines = [f"Bifurcation diagram: {len(self)} branches, along {self.root.branch.name}"]
-        lines += _drawn(self.root, "", "")
-        if self.stopped:
-            lines.append(self.stopped)
-        return "\n".join(lines)
-
-
-def _drawn(node: DiagramBranch, first: str, rest: str) -> list[str]:
-    """The lines of a branch and those below it."""
-    branch = node.branch
-    counts = Counter(item.kind for item in branch.bifurcations)
-    shown = ", ".join(
-        f"{kind} " + " ".join(f"{b.parameter(branch.name):.6g}" for b in branch.bifurcations[kind]) for kind in counts
-    )
-    unstable = int((~branch.stable).sum())
-    lines = [f"{first}{node.label}: {len(branch)} points, {unstable} unstable" + (f"; {shown}" if shown else "")]
-    entries: list[Any] = [*node.children, *node.failures]
-    for number, entry in enumerate(entries):
-        last = number == len(entries) - 1
-        head, tail = ("└─ ", "   ") if last else ("├─ ", "│  ")
-        if isinstance(entry, DiagramBranch):
-            lines += _drawn(entry, rest + head, rest + tail)
-        else:
-            item, why = entry
-            lines.append(f"{rest}{head}{item.kind} {item.parameter(branch.name):.6g} not followed: {why}")
-    return lines
+    def keep(self, parent: int, event: int, branch: Branch) -> None:
+        """A branch that has been followed to its end."""
+        ...
 
 
 @timed
@@ -198,6 +67,7 @@ def bifurcation_diagram(
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
     formulation: Formulation | str | None = None,
+    keeper: Keeper | None = None,
 ) -> BifurcationDiagram:
     """The response over a range of frequencies with all branches that bifurcate from it, each once.
 
@@ -212,6 +82,8 @@ def bifurcation_diagram(
         Branches after which no more are followed.
     seconds
         Time after which no new branch is begun; None for as long as it takes.
+    keeper
+        Keeps branches as they are found, and knows those that an earlier run with the same arguments has found.
 
     Other parameters as `frequency_response`. What depth or budget left out is listed: `node.left` at every branch, and
     `stopped` in words. Ctrl-C ends it politely with what was found.
@@ -241,9 +113,13 @@ def bifurcation_diagram(
             "formulation": formulation,
             "progress": told.of(0, 1, "T") if report is not None else None,
         }
-        first = frequency_response(system, omega, harmonics, start=start, **options)
+        first = None if keeper is None else keeper.known(-1, -1)
+        if first is None:
+            first = frequency_response(system, omega, harmonics, start=start, **options)
+            if keeper is not None and not _interrupted(first):
+                keeper.keep(-1, -1, first)
         root = DiagramBranch(first)
-        stopped = _grown(root, depth, max_branches, seconds, begin, options, told)
+        stopped = _grown(root, depth, max_branches, seconds, begin, options, told, keeper)
     return BifurcationDiagram(root, stopped)
 
 
@@ -255,12 +131,11 @@ def _grown(
     begin: float,
     options: dict[str, Any],
     told: _Told,
+    keeper: Keeper | None,
 ) -> str:
     """Follow what leaves the branches, level by level; why that ended early, in words."""
     waiting = deque([root])
-    count, out_of = 1, ""
-    if root.branch.ended.startswith("interrupted"):
-        out_of = "interrupted"
+    count, out_of = 1, "interrupted" if _interrupted(root.branch) else ""
     while waiting:
         node = waiting.popleft()
         switched = [b for b in node.branch.bifurcations if b.kind in _SWITCHED]
@@ -280,7 +155,7 @@ def _grown(
                 where = f"{item.kind} {item.parameter(item.parameter_name):.6g}"
                 options["progress"] = told.of(number, len(switched), where)
             try:
-                branch = switch_branch(item, **options)
+                branch = _switched(node, item, options, keeper)
             except (ConvergenceError, InputError) as failure:
                 node.failures.append((item, str(failure)))
                 continue
@@ -288,12 +163,12 @@ def _grown(
                 node.left.append(item)
                 out_of = "interrupted"
                 continue
+            child = DiagramBranch(branch, item, node.depth + 1, count, met=node.branch.bifurcations["BP"])
             count += 1
-            child = DiagramBranch(branch, item, node.depth + 1, met=node.branch.bifurcations["BP"])
             node.children.append(child)
             waiting.append(child)
             known += _shared(child)
-            if branch.ended.startswith("interrupted"):
+            if _interrupted(branch):
                 out_of = "interrupted"
     left = [(node, item) for node in root for item in node.left]
     if out_of:
@@ -301,6 +176,23 @@ def _grown(
     if left:
         return f"depth={depth} reached: {len(left)} bifurcations of the deepest branches were not switched at"
     return ""
+
+
+def _switched(node: DiagramBranch, item: Bifurcation, options: dict[str, Any], keeper: Keeper | None) -> Branch:
+    """The branch that leaves another at a bifurcation, from the keeper if that knows it."""
+    if keeper is None:
+        return switch_branch(item, **options)
+    event = next(i for i, other in enumerate(events_met(node.branch)) if other is item)
+    branch = keeper.known(node.number, event)
+    if branch is None:
+        branch = switch_branch(item, **options)
+        if not _interrupted(branch):
+            keeper.keep(node.number, event, branch)
+    return branch
+
+
+def _interrupted(branch: Branch) -> bool:
+    return branch.ended.startswith("interrupted")
 
 
 def _shared(node: DiagramBranch) -> list[Junction]:

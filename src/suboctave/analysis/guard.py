@@ -337,9 +337,12 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
     change = abs(p.floquet.unstable - q.floquet.unstable)
+    found = changes(p, q)
+    if change == 0 and not found:
+        return True
     if _open(p, q):
         return True
-    changed = {kind.name for kind in changes(p, q)}
+    changed = {kind.name for kind in found}
     if {"LP", "BP"} <= changed:
         # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
         return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)

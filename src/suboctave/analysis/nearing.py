@@ -27,11 +27,22 @@ def nearing_share(p: Sample, q: Sample) -> float | None:
     there is no such excursion.
     """
     for a, b in zip(p.gaps, q.gaps, strict=True):
-        if _shrinks(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level):
-            return _CUT
-        if _shrinks(b.tau, b.value, b.curve, b.level, a.tau, a.value, a.curve, a.level):
-            return 1.0 - _CUT
+        end = _shrinking_end(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        if end:
+            return _CUT if end == 1 else 1.0 - _CUT
     return None
+
+
+@kernel()
+def _shrinking_end(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
+    """1 where an excursion of the first motion is a small part of the same excursion of the other, 2 where it is the
+    other way round, 0 where neither is.
+    """
+    if _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
+        return 1
+    if _shrinks(other_tau, other_value, other_curve, other_level, tau, value, curve, level):
+        return 2
+    return 0
 
 
 @kernel()

@@ -9,11 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.gaps import rests_in_corner
+from suboctave.compiled import kernel
+from suboctave.continuation.kernels import bordered_transposed
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import jacobian
+from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, motion_size, truncation
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
@@ -23,7 +27,7 @@ _REST = 1e-8
 _TINY = float(np.finfo(float).tiny)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ResponseEvaluation:
     """Harmonic balance and its derivatives at one u; `reference`: a size of the motion elsewhere on the curve."""
 
@@ -40,6 +44,27 @@ class ResponseEvaluation:
     def jacobian(self) -> Array:
         """`[R_X, R_parameter]`, shape (N, N + 1)."""
         return self.state.extended_jacobian(self.name)
+
+    def bordered_transposed(self, row: Array, weights: Array) -> Array:
+        """Transpose of `[F_u / weights; row]`, (N + 1, N + 1): what Newton's method factorises."""
+        state = self.state
+        balance = state.balance
+        plain = self.name == "omega" and balance.steady and balance.basis.kept is None
+        if not plain or not isinstance(state.linear, StructuralMatrices):
+            found: Array = bordered_transposed(self.jacobian, row, weights)
+            return found
+        return _bordered(
+            state.spectra_table,
+            balance.moving,
+            state.rate,
+            *balance.directions,
+            state.linear.matrices,
+            balance.basis.multiples,
+            state.omega,
+            state.x,
+            row,
+            weights,
+        )
 
     @lazy
     def error(self) -> float:
@@ -63,6 +88,15 @@ class ResponseEvaluation:
     def truncation(self) -> float:
         """Estimated size of the neglected harmonics relative to the motion."""
         return truncation(self.state)
+
+
+@kernel()
+def _bordered(table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, row, weights):
+    """`ResponseEvaluation.bordered_transposed` along omega, of a structure's own matrices."""
+    n = x.shape[0] * x.shape[1]
+    extended = np.zeros((n, n + 1))
+    jacobian(extended, table, moving, rate, True, starts, dofs, shape, matrices, multiples, omega, x)
+    return bordered_transposed(extended, row, weights)
 
 
 class ResponseCurve:
@@ -101,7 +135,7 @@ class ResponseCurve:
         self.adaptive = adaptive
         self.reference = reference
         self._cache = {balance.basis: balance} if cache is None else cache
-        self._weight = balance.per_unknown(balance.scales()[0])
+        self._weight = balance.column_weights
 
     @property
     def parameter(self) -> int:
@@ -153,7 +187,9 @@ class ResponseCurve:
         basis = self.balance.basis
         if self.adaptive is not None:
             basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance, dropping=True)
-        balance = self._in_basis(basis)
+        balance = self.balance if basis is self.balance.basis else self._in_basis(basis)
+        if balance is self.balance and balance.settled:
+            return self
         x, omega, values = self.split(u)
         if balance is not self.balance:
             x = self.balance.basis.resized(x, basis)

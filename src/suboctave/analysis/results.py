@@ -1,4 +1,4 @@
-"""What a study leaves: branches and tables by name, with what produced them; and `load`, which reads results files."""
+"""What a study leaves: branches, diagrams and tables by name, with what produced them; and `load`, which reads them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ import numpy as np
 
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.saved import branch_from_dataset, branch_to_dataset
+from suboctave.analysis.saved_diagram import diagram_from_datasets, diagram_to_datasets
+from suboctave.analysis.tree import BifurcationDiagram
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.store import files
@@ -22,10 +24,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["Results", "Table", "from_dataset", "load", "provenance", "save_branch", "to_dataset"]
+__all__ = ["Result", "Results", "Table", "from_datasets", "load", "provenance", "save", "to_datasets"]
 
 #: what a group of a file may hold
-_BRANCH, _TABLE = "branch", "table"
+_BRANCH, _TABLE, _DIAGRAM = "branch", "table", "diagram"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,19 +67,23 @@ class Table:
         return f"Table: {self.title or 'untitled'}, {len(self)} rows\n{self.to_dataframe().to_string()}"
 
 
+#: what an analysis gives
+Result = Branch | BifurcationDiagram | Table
+
+
 @dataclass(frozen=True, eq=False)
-class Results(Mapping[str, "Branch | Table"]):
+class Results(Mapping[str, Result]):
     """The results of a study by the names of its analyses, in their order.
 
     `attributes`: title, version, platform, time, the study's text; `details`: the same for each analysis (its kind, the
     seconds that it took).
     """
 
-    items_by_name: Mapping[str, Branch | Table]
+    items_by_name: Mapping[str, Result]
     attributes: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
-    def __getitem__(self, name: str) -> Branch | Table:
+    def __getitem__(self, name: str) -> Result:
         if name not in self.items_by_name:
             raise InputError(f"there is no analysis {name!r}{suggest(str(name), self.items_by_name)}")
         return self.items_by_name[name]
@@ -93,8 +99,13 @@ class Results(Mapping[str, "Branch | Table"]):
 
     @property
     def branches(self) -> dict[str, Branch]:
-        """The curves among the results."""
+        """The curves among the results; those of diagrams are in the diagrams."""
         return {name: item for name, item in self.items_by_name.items() if isinstance(item, Branch)}
+
+    @property
+    def diagrams(self) -> dict[str, BifurcationDiagram]:
+        """The bifurcation diagrams among the results."""
+        return {name: item for name, item in self.items_by_name.items() if isinstance(item, BifurcationDiagram)}
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """All of it as one NetCDF file (.nc), a group for each analysis; docs/results.md describes the layout.
@@ -105,7 +116,11 @@ class Results(Mapping[str, "Branch | Table"]):
         wrong = [name for name in self if not name or "/" in name or name == "."]
         if wrong:
             raise InputError(f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, no slashes")
-        groups = {name: to_dataset(item, self.details.get(name, {})) for name, item in self.items()}
+        groups = {
+            f"{name}/{part}" if part else name: dataset
+            for name, item in self.items()
+            for part, dataset in to_datasets(item, self.details.get(name, {})).items()
+        }
         files.write(target, groups, {"contents": "study", **provenance(), **self.attributes})
         return target
 
@@ -113,9 +128,15 @@ class Results(Mapping[str, "Branch | Table"]):
         title = self.attributes.get("title") or "untitled"
         lines = [f"Results of the study {title!r}:"]
         for name, item in self.items():
-            what = f"{len(item)} points, {len(item.bifurcations)} bifurcations" if isinstance(item, Branch) else "table"
-            lines.append(f"  {name}: {what}")
+            lines.append(f"  {name}: {_said(item)}")
         return "\n".join(lines)
+
+
+def _said(item: Result) -> str:
+    if isinstance(item, Table):
+        return "table"
+    what = "points" if isinstance(item, Branch) else "branches"
+    return f"{len(item)} {what}, {len(item.bifurcations)} bifurcations"
 
 
 def provenance() -> dict[str, str]:
@@ -129,10 +150,18 @@ def provenance() -> dict[str, str]:
     }
 
 
-def to_dataset(item: Branch | Table, details: Mapping[str, Any] | None = None) -> xarray.Dataset:
-    """A result as a dataset that a file or the journal can hold, `details` among its attributes."""
+def to_datasets(item: Result, details: Mapping[str, Any] | None = None) -> dict[str, xarray.Dataset]:
+    """A result as datasets that a file or the journal can hold, `details` among the attributes of the one named "".
+
+    A branch and a table are one dataset; a diagram has one more for each of its branches.
+    """
+    said = dict(details or {})
     if isinstance(item, Branch):
-        return branch_to_dataset(item).assign_attrs({**(details or {}), "contents": _BRANCH})
+        return {"": branch_to_dataset(item).assign_attrs({**said, "contents": _BRANCH})}
+    if isinstance(item, BifurcationDiagram):
+        head, *branches = diagram_to_datasets(item).items()
+        told = {"": head[1].assign_attrs({**said, "contents": _DIAGRAM})}
+        return told | {name: dataset.assign_attrs({"contents": _BRANCH}) for name, dataset in branches}
     dataset = item.to_xarray()
     for name, variable in list(dataset.variables.items()):
         if variable.dtype.kind == "c":
@@ -141,16 +170,19 @@ def to_dataset(item: Branch | Table, details: Mapping[str, Any] | None = None) -
         elif variable.dtype.kind == "O":
             dataset = dataset.assign({name: ("row", variable.values.astype(str))})
     order = "\n".join(item.columns)
-    return dataset.assign_attrs({**(details or {}), "contents": _TABLE, "columns": order})
+    return {"": dataset.assign_attrs({**said, "contents": _TABLE, "columns": order})}
 
 
-def from_dataset(
-    dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None
-) -> tuple[Branch | Table, dict[str, Any]]:
-    """The result that `to_dataset` wrote, and the dataset's attributes."""
+def from_datasets(
+    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
+) -> tuple[Result, dict[str, Any]]:
+    """The result that `to_datasets` wrote, and the attributes of the dataset named ""."""
+    dataset = groups[""]
     details = {str(name): _plain(value) for name, value in dataset.attrs.items()}
     if details.get("contents") == _BRANCH:
         return branch_from_dataset(dataset, allow_code, linear), details
+    if details.get("contents") == _DIAGRAM:
+        return diagram_from_datasets(groups, allow_code, linear), details
     if details.get("contents") != _TABLE:
         raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
     columns: dict[str, np.ndarray] = {}
@@ -162,15 +194,17 @@ def from_dataset(
     return Table(columns, str(details.get("title", ""))), details
 
 
-def save_branch(branch: Branch, path: str | Path, overwrite: bool = False) -> Path:
-    """One branch as a NetCDF file (.nc) of its own."""
+def save(item: Branch | BifurcationDiagram, path: str | Path, overwrite: bool = False) -> Path:
+    """One branch or diagram as a NetCDF file (.nc) of its own."""
     target = files.free_place(path, overwrite, (".nc",))
-    files.write(target, {"": to_dataset(branch)}, provenance())
+    files.write(target, to_datasets(item), provenance())
     return target
 
 
-def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None) -> Branch | Results:
-    """Read a results file: the branch of `Branch.save`, or the `Results` of a study.
+def load(
+    path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None
+) -> Branch | BifurcationDiagram | Results:
+    """Read a results file: the branch or diagram that was saved, or the `Results` of a study.
 
     Parameters
     ----------
@@ -188,19 +222,31 @@ def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | Non
         If the file is missing, no results file, damaged, or of a newer version; the message says what to do.
     """
     groups = files.read(path)
-    root = groups.pop("")
+    root = groups[""]
+    read: dict[str, tuple[Result, dict[str, Any]]] = {}
     try:
-        if root.attrs.get("contents") == _BRANCH:
-            item, _ = from_dataset(root, allow_code, linear)
-            assert isinstance(item, Branch)
+        if root.attrs.get("contents") in (_BRANCH, _DIAGRAM):
+            item, _ = from_datasets(groups, allow_code, linear)
+            assert not isinstance(item, Table)
             return item
-        read = {name: from_dataset(dataset, allow_code, linear) for name, dataset in groups.items()}
+        for name, parts in _by_analysis(groups).items():
+            read[name] = from_datasets(parts, allow_code, linear)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     order = str(root.attrs.get("analyses", "")).splitlines()
     names = sorted(read, key=lambda name: order.index(name) if name in order else len(order))
     attributes = {str(name): _plain(value) for name, value in root.attrs.items()}
     return Results({n: read[n][0] for n in names}, attributes, {n: read[n][1] for n in names})
+
+
+def _by_analysis(groups: Mapping[str, xarray.Dataset]) -> dict[str, dict[str, xarray.Dataset]]:
+    """The groups of a study's file by analysis: "diagram" and "diagram/branch_0" are parts of one."""
+    found: dict[str, dict[str, xarray.Dataset]] = {}
+    for path, dataset in groups.items():
+        name, _, part = path.partition("/")
+        if name:
+            found.setdefault(name, {})[part] = dataset
+    return found
 
 
 def write_csv(frame: pandas.DataFrame, path: str | Path, overwrite: bool = False) -> Path:

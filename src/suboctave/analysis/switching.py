@@ -38,7 +38,7 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.stability import StabilityMethod
 from suboctave.stability.arbitration import METHODS
 
-__all__ = ["Inherited", "leave_along", "own_linear_part", "switch_branch"]
+__all__ = ["Inherited", "check_left", "leave_along", "own_linear_part", "switch_branch"]
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
@@ -98,8 +98,7 @@ def switch_branch(
             f"switch_branch takes a Bifurcation, not {type(bifurcation).__name__} (branch.bifurcations[0]?)"
         )
     kind = bifurcation.kind
-    if kind not in ("PD", "BP"):
-        raise InputError(f"{_NO_OTHER.get(kind, 'nothing leaves a user event')}. switch_branch takes a PD or a BP")
+    check_left(kind)
     if side not in (None, 1, -1) or isinstance(side, bool):
         raise InputError(f"side must be +1, -1 or None, not {side!r}")
     if bifurcation.uncertainty and bifurcation.null_vectors is None:
@@ -137,6 +136,12 @@ def switch_branch(
         else:
             trace = _other(bifurcation, curve, side, np.sign(last - first), (low, high), settings)
     return make_branch(orbit.system, name, trace, settings, options_of(settings, wanted, {name: (first, last)}))
+
+
+def check_left(kind: str) -> None:
+    """Refuse a kind of bifurcation at which no other branch leaves; InputError."""
+    if kind not in ("PD", "BP"):
+        raise InputError(f"{_NO_OTHER.get(kind, 'nothing leaves a user event')}. switch_branch takes a PD or a BP")
 
 
 # ------------------------------------------------------------------------------------------------ what is inherited

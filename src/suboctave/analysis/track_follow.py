@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
@@ -21,6 +22,8 @@ from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 1e-4
+#: corners after which no further one is passed
+_CORNERS = 5
 
 
 @dataclass
@@ -37,13 +40,14 @@ class TrackedTrace:
     def reversed_before(self, other: TrackedTrace) -> TrackedTrace:
         """This trace walked backwards, then `other`, which started from the same point."""
         whole = self.points[-1].arclength
-        points = [replace(p, arclength=whole - p.arclength) for p in reversed(self.points)]
-        points += [replace(p, arclength=whole + p.arclength) for p in other.points[1:]]
+        points = [p.at(whole - p.arclength) for p in reversed(self.points)]
+        points += [p.at(whole + p.arclength) for p in other.points[1:]]
         events = [replace(e, arclength=whole - e.arclength) for e in reversed(self.events)]
         events += [replace(e, arclength=whole + e.arclength) for e in other.events]
         same = self.ended == other.ended
         ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
-        return TrackedTrace(points, events, self.warnings + other.warnings, False, ended, other.interrupted)
+        warnings = self.warnings + other.warnings
+        return TrackedTrace(points, events, warnings, False, ended, other.interrupted)
 
 
 @dataclass(frozen=True)
@@ -69,17 +73,20 @@ class _Tracker:
         self.trace = TrackedTrace()
         self.tests: tuple[CurveTest, ...] = tests_of(start.curve)
         self.previous: TrackedSample | None = None
+        self.corners = 0
 
     def run(self) -> TrackedTrace:
         trace = self.trace
         try:
-            for point in self.march:
-                stop = self._accept(point)
-                if stop is not None:
-                    trace.ended = stop
+            while True:
+                trace.ended = self._march()
+                beyond = None if trace.ended != self.march.ended or self.march.closed else self._beyond_corner()
+                if beyond is None:
                     break
-            else:
-                trace.closed, trace.ended = self.march.closed, self.march.ended
+                stepping = self.settings.stepping
+                heading = math.copysign(1.0, beyond.tangent[-1])
+                self.march = March(beyond, heading, self.box.second, self.settings.newton, stepping, self._clear)
+            trace.closed = self.march.closed
         except KeyboardInterrupt:
             where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
@@ -87,6 +94,28 @@ class _Tracker:
         if trace.closed:
             _drop_seam(trace.events)
         return trace
+
+    def _march(self) -> str:
+        """Take in points until the curve ends; why it does."""
+        for point in self.march:
+            stop = self._accept(point)
+            if stop is not None:
+                return stop
+        return self.march.ended
+
+    def _beyond_corner(self) -> CurvePoint | None:
+        """A point behind a corner that the steps could not get around, None if there is none."""
+        last = self.previous
+        if last is None or not self.march.ended.startswith("step size fell") or self.corners >= _CORNERS:
+            return None
+        self.corners += 1
+        before = (p.orbit for p in reversed(self.trace.points))
+        found = beyond_corner(last, before, self.settings.newton)
+        if found is None:
+            return None
+        point, note = found
+        self.trace.warnings.append(note)
+        return point if point is not None and self._inside(TrackedSample(point)) else None
 
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
@@ -98,11 +127,11 @@ class _Tracker:
     def _accept(self, point: CurvePoint) -> str | None:
         """Take a point in; a sentence if the curve ends there or before it."""
         settings, new = self.settings, TrackedSample(point)
-        if self.previous is None:
+        if self.previous is None or point is self.march.start:
             self._add(new)
             self.previous = new
             return None
-        if point.curve is self.march.start.curve:
+        if self.march.closed:
             new = self._closing(self.previous, new)
         a = same_discretisation(self.previous, new, settings.newton)
         end = end_between(a, new, settings.newton)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,29 +20,43 @@ if TYPE_CHECKING:
     import pandas
 
 
-@dataclass(frozen=True, eq=False)
-class TrackedPoint:
-    """One point of a tracked curve: orbit, position in scaled arclength, Newton iterations, and the extra unknown.
+class TrackedPoint(BranchPoint):
+    """One point of a tracked curve: a branch point with the extra unknown and the coefficient of its normal form.
 
     `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0; `coefficient` the one that decides the
-    normal form of an LP (a) or a PD (c3), else nan. The multipliers are computed when asked for.
+    normal form of an LP (a) or a PD (c3), else nan. The multipliers are computed when asked for, by `method`, unless
+    they are `known`.
     """
 
-    orbit: PeriodicOrbit
-    arclength: float
-    iterations: int
-    method: StabilityMethod | None
-    extra: float = 0.0
-    coefficient: float = float("nan")
-    known: FloquetResult | None = None
+    extra: float
+    coefficient: float
+
+    def __init__(
+        self,
+        orbit: PeriodicOrbit,
+        arclength: float,
+        iterations: int,
+        method: StabilityMethod | None,
+        extra: float = 0.0,
+        coefficient: float = float("nan"),
+        known: FloquetResult | None = None,
+    ) -> None:
+        said = {"orbit": orbit, "arclength": arclength, "iterations": iterations, "method": method, "extra": extra}
+        self.__dict__.update(said, coefficient=coefficient)
+        if known is not None:
+            self.__dict__["floquet"] = known
 
     @lazy
     def floquet(self) -> FloquetResult:
         """Multipliers and their errors."""
-        if self.known is not None or self.method is None:
-            assert self.known is not None
-            return self.known
-        return self.method.along(self.orbit.state())
+        method: StabilityMethod = self.__dict__["method"]
+        return method.along(self.orbit.state())
+
+    def at(self, arclength: float) -> TrackedPoint:
+        """The same at another place on the curve."""
+        kept = self.__dict__
+        args = self.orbit, arclength, self.iterations, kept["method"], self.extra, self.coefficient
+        return TrackedPoint(*args, kept.get("floquet"))
 
 
 class TrackedBranch(Branch):

@@ -10,6 +10,7 @@ import numpy as np
 
 from suboctave.analysis.branch import BranchPoint
 from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
+from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
@@ -17,6 +18,9 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.coupled import reads
 from suboctave.stability import FloquetResult, StabilityMethod, method_of
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
+
+#: the kinds that shooting locates by themselves
+_LOCATED = ("LP", "BP", "PD", "NS")
 
 
 def stability(
@@ -99,7 +103,7 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else stability(motion)
     start = motion.start()
     touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
-    kind = what.kind if isinstance(what, Bifurcation) and what.kind in KINDS and not touches else None
+    kind = what.kind if isinstance(what, Bifurcation) and what.kind in _LOCATED else None
     try:
         if kind is None:
             solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
@@ -128,11 +132,12 @@ def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1
     if not distance <= tolerance:
         other = "a motion that does not graze" if touches else "another motion"
         return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
-    if floquet.stable != solution.stable:
+    # at an extremum or a point of codimension two a multiplier is critical: no verdict to compare
+    if floquet.stable != solution.stable and not isinstance(what, TrackedEvent):
         doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"
         other = "stable" if solution.stable else "unstable"
         return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite{doubt}")
-    return verdict(True, "The same motion, the same verdict")
+    return verdict(True, "The same motion" if isinstance(what, TrackedEvent) else "The same motion, the same verdict")
 
 
 def _missed(what: Bifurcation, solution: PeriodicSolution) -> float:

@@ -17,11 +17,13 @@ the units of single DOFs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
@@ -77,8 +79,7 @@ class Bordered:
     @property
     def vectors(self) -> NullVectors:
         """Bordering vectors for the next iteration: the present null vectors, weighted and of unit length."""
-        v, u = self.right / self.scale, self.left / self.scale
-        return _complete(self.state, self.kind, v / np.linalg.norm(v), u / np.linalg.norm(u))
+        return _complete(self.state, self.kind, _unit(self.right / self.scale), _unit(self.left / self.scale))
 
     @property
     def relative(self) -> float:
@@ -89,8 +90,12 @@ class Bordered:
 def weighted_operator(state: BalanceState, kind: Kind, kappa: float) -> tuple[np.ndarray, np.ndarray]:
     """J_kappa with rows and columns weighted by 1/sqrt(mass), and these weights."""
     matrix = operator(state, kind, kappa)
-    scale = np.tile(state.balance.scales()[1], matrix.shape[0] // state.balance.size)
-    return matrix * np.multiply.outer(scale, scale), scale
+    scale = state.balance.row_weights(matrix.shape[0])
+    return kernels.scaled_transposed(matrix, scale, scale, 0).T, scale
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / math.sqrt(np.vdot(vector, vector).real)
 
 
 def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations: int = 4) -> NullVectors:
@@ -104,11 +109,11 @@ def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations
     left = (np.cos(np.arange(n) * 1.7 + 0.3) / (1.0 + np.arange(n) / 8.0)).astype(matrix.dtype)
     right = left
     for _ in range(iterations):
-        right = factor.solve(left / np.linalg.norm(left))
-        left = factor.solve(right / np.linalg.norm(right), adjoint=True)
+        right = factor.solve(_unit(left))
+        left = factor.solve(_unit(right), adjoint=True)
     if not (np.isfinite(left).all() and np.isfinite(right).all()):
         return _complete(state, kind, *_by_svd(matrix))
-    return _complete(state, kind, right / np.linalg.norm(right), left / np.linalg.norm(left))
+    return _complete(state, kind, _unit(right), _unit(left))
 
 
 def _by_svd(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -132,17 +137,15 @@ def of_equations(state: BalanceState, kind: Kind, vector: np.ndarray) -> np.ndar
 
 def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:
     """Evaluate g and the vectors of its gradient, bordered by `borders` (b = left, c = right)."""
-    matrix, scale = weighted_operator(state, kind, kappa)
+    matrix = operator(state, kind, kappa)
     n = matrix.shape[0]
-    extended = np.zeros((n + 1, n + 1), dtype=matrix.dtype, order="F")
-    extended[:n, :n] = matrix
-    extended[:n, n] = of_equations(state, kind, borders.left)
-    extended[n, :n] = of_equations(state, kind, borders.right).conj()
+    scale = state.balance.row_weights(n)
+    extended = kernels.scaled_transposed(matrix, scale, scale, 1).T
     # the operator's own size balances the bordering rows
     size = state.omega**2
-    extended[:n, n] *= size
-    extended[n, :n] *= size
-    factor = Factor.of(extended)
+    extended[:n, n] = size * of_equations(state, kind, borders.left)
+    extended[n, :n] = size * of_equations(state, kind, borders.right).conj()
+    factor = Factor.of(extended, overwrite=True)
     rhs = np.zeros(n + 1, dtype=matrix.dtype)
     rhs[n] = size
     v = factor.solve(rhs)
@@ -160,4 +163,4 @@ def at_values(values: Mapping[str, float], name: str, value: float, omega: float
 
 def residual_scale(state: BalanceState) -> Array:
     """Weights of residual entries, shape (dimension,): 1/sqrt(mass) per DOF."""
-    return state.balance.per_unknown(state.balance.scales()[1])
+    return state.balance.row_weights(state.balance.dimension)

@@ -13,15 +13,14 @@ import numpy as np
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.grazing_instants import extrema
 from suboctave.harmonic.local_force import LocalMotion
-from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.coupled import CoupledElement, as_coupled, reads
 from suboctave.model.element import BaseElement
-from suboctave.model.sampling import CornerSampling, PiecewiseLinear, Sampling, SharpSampling
+from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpSampling, told_levels
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class GapExtrema:
     """One gap and the extrema of the relative displacement there, ascending in tau.
 
@@ -39,35 +38,23 @@ class GapExtrema:
 
 def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     """Every gap of every element on a motion."""
-    coefficients, kinds, _ = state.balance.coefficients(state.values)
+    grid = state.balance.grid
     found = []
-    for group, motion in zip(state.balance.groups, state.motions, strict=True):
-        turns = None
-        for i in group.members:
-            for index, level in enumerate(told_levels(kinds[i], coefficients[i])):
-                if turns is None:
-                    grid = search_grid(motion.shape[0] - 1)
-                    turns = extrema(motion, grid.zr, grid.zi)
-                found.append(GapExtrema(i, index, level, *turns))
+    for law, motion in zip(state.balance.coefficients(state.values)[2], state.motions, strict=True):
+        if law.levels:
+            turns = extrema(motion, grid[0], grid[1])
+            found += [GapExtrema(element, place, level, *turns) for element, place, level in law.levels]
     for nodal in state.nodal:
         places = told_levels(nodal.kind, nodal.c)
         if places:
-            grid = search_grid(nodal.motions[0].shape[0] - 1)
-            turns = extrema(nodal.motions[0], grid.zr, grid.zi)
-            found += [GapExtrema(nodal.own.index, index, level, *turns) for index, level in enumerate(places)]
+            turns = extrema(nodal.motions[0], grid[0], grid[1])
+            found += [GapExtrema(nodal.own.index, place, level, *turns) for place, level in enumerate(places)]
     return tuple(found)
 
 
 def levels(local: LocalMotion) -> tuple[float, ...]:
     """Displacements at which an element's law has a corner, or is sharp."""
     return told_levels(local.kind, local.coefficients)
-
-
-def told_levels(kind: Sampling, coefficients: Array) -> tuple[float, ...]:
-    """`levels`, from what an element tells of its law at these coefficients."""
-    if isinstance(kind, PiecewiseLinear):
-        return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
-    return kind.points if isinstance(kind, SharpSampling | CornerSampling) else ()
 
 
 def level_rate(state: BalanceState, element: int, index: int, name: str) -> float:

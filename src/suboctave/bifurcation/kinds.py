@@ -13,6 +13,7 @@ neighbours, where in between, how to solve for it, and whether a solution is one
 from __future__ import annotations
 
 import cmath
+import weakref
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -52,7 +53,8 @@ class Sample:
     @lazy
     def half_sign(self) -> float:
         """Sign of det J_half."""
-        return Factor.of(self.state.half_jacobian).sign
+        # the transpose has the same determinant, and lies in memory as LAPACK wants it
+        return Factor.of(self.state.half_jacobian.T).sign
 
     @lazy
     def gaps(self) -> tuple[GapExtrema, ...]:
@@ -231,14 +233,19 @@ def solved_by(formulation: Formulation) -> dict[str, BifurcationKind]:
     return {kind.name: kind for kind in kinds}
 
 
-def changes(a: Sample, b: Sample) -> list[BifurcationKind]:
+def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     """The kinds whose tests have changed between two neighbours, in the order in which they are looked for."""
+    # several ask this of the same two
+    known = b.__dict__.get("_changes")
+    if known is not None and known[0]() is a:
+        return known[1]
     found: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
     # one multiplier passes +1 at a limit point or a branch point, or at both in one
     accounted = len(found) - (len(found) > 1 and found[1] is LIMIT_POINT)
     if NEIMARK_SACKER.beyond(a, b, accounted):
         found.append(NEIMARK_SACKER)
-    return found
+    result = b.__dict__["_changes"] = (weakref.ref(a), tuple(found))
+    return result[1]
 
 
 def _zero(a: float, b: float) -> float:

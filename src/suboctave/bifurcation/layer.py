@@ -212,7 +212,7 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
 
 def _weights(state: BalanceState, guess: Guess) -> Array:
     """Scaled arclength: coefficients in units of the motion, the free parameter in units of its range."""
-    weight = state.balance.per_unknown(state.balance.scales()[0])
+    weight = state.balance.column_weights
     return np.append(weight / max(motion_size(state), np.finfo(float).tiny), 1.0 / guess.span)
 
 

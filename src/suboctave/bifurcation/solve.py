@@ -6,6 +6,7 @@ convergence means the same in any units.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -13,7 +14,8 @@ from functools import cache
 import numpy as np
 
 from suboctave.bifurcation.bordered import Bordered, NullVectors, at_values, bordered, null_vectors, residual_scale
-from suboctave.continuation.linear import Factor
+from suboctave.continuation import kernels
+from suboctave.continuation.linear import Factor, length
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import Array
@@ -138,7 +140,7 @@ def newton(
     """
     balance, n = guess.balance, guess.balance.dimension
     x, parameter, extra = balance.packed(guess.x).copy(), guess.parameter, unknowns.astype(float).copy()
-    weight = balance.per_unknown(balance.scales()[0])
+    weight = balance.column_weights
     state = guess.state() if start is None else start
     rows = residual_scale(state)
     # a motion that shrinks to rest keeps the scales of its neighbourhood
@@ -157,9 +159,9 @@ def newton(
             raise ConvergenceError("nothing moves here")
         residual = state.residual if addition is None else state.residual + addition
         force = max(state.force_scale(), least[1], NOTHING)
-        error = float(np.linalg.norm(residual * rows)) / force
+        error = length(residual * rows) / force
         error = max([error] + [abs(e.value) / e.size for e in equations])
-        if not np.isfinite(error):
+        if not math.isfinite(error):
             raise ConvergenceError("the bordered system is not finite")
         settled = previous <= _STEP or (previous <= 1e-5 and error <= 1e-3 * _TOLERANCE)
         if error <= _TOLERANCE and settled:
@@ -177,21 +179,21 @@ def newton(
         rhs[:n] = residual * scale_rows
         rhs[n:] = [e.value / e_size for e, e_size in zip(equations, sizes, strict=True)]
         step = factor.solve(rhs)
-        length = float(np.linalg.norm(step))
-        contraction = length / previous
-        if not np.isfinite(length):
+        moved = length(step)
+        contraction = moved / previous
+        if not math.isfinite(moved):
             raise ConvergenceError("the bordered system is singular")
-        if iteration > 0 and length > _AWAY:
+        if iteration > 0 and moved > _AWAY:
             raise ConvergenceError("the bordered system leads away from its start")
-        if iteration > 3 and length > 0.5 * previous and previous > 1e-6:
+        if iteration > 3 and moved > 0.5 * previous and previous > 1e-6:
             raise ConvergenceError("the bordered system does not contract")
-        damp = min(1.0, 0.5 / length) if length > 0.0 else 1.0
+        damp = min(1.0, 0.5 / moved) if moved > 0.0 else 1.0
         x -= damp * step[:n] * scale_x
         parameter -= damp * step[n] * guess.span
         extra -= damp * step[n + 1 :] * spans
-        if length <= 1e-12 and error <= _TOLERANCE:
+        if moved <= 1e-12 and error <= _TOLERANCE:
             return state, extra, error, iteration
-        previous = length
+        previous = moved
     if nearest is not None:
         return nearest
     raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
@@ -213,10 +215,10 @@ def _linearised(
     steepest equation changes at most with its unknowns.
     """
     n, q = len(rows), len(spans)
-    matrix = np.zeros((n + 1 + q, n + 1 + q), order="F")
     scale_x = max(motion_size(state), least, NOTHING) / weight
     scale_rows = rows / force
-    matrix[:n, :n] = state.jacobian * scale_rows[:, None] * scale_x
+    packed = kernels.scaled_transposed(state.jacobian, scale_rows, scale_x, 1 + q)
+    matrix = packed.T
     matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span
     for j, column in enumerate(columns):
         matrix[:n, n + 1 + j] = column * scale_rows * spans[j]
@@ -226,7 +228,7 @@ def _linearised(
         matrix[n + i, n] = by_parameter * guess.span / e.size
         for j, value in enumerate(by_unknowns):
             matrix[n + i, n + 1 + j] = value * spans[j] / e.size
-    steepest = float(np.abs(matrix).sum(axis=1).max())
+    steepest = float(kernels.longest_column(packed))
     factor = Factor.of(matrix, overwrite=True)
     if factor.singular:
         raise ConvergenceError("the bordered system is singular")

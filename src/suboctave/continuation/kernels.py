@@ -23,6 +23,32 @@ def bordered_transposed(jacobian, row, weights):
 
 
 @kernel()
+def scaled_transposed(matrix, rows, columns, more):
+    """Transpose of a matrix with factors for its rows and columns, and `more` rows and columns of zeros."""
+    m, n = matrix.shape
+    out = np.zeros((n + more, m + more), dtype=matrix.dtype)
+    for j in range(n):
+        for i in range(m):
+            out[j, i] = matrix[i, j] * rows[i] * columns[j]
+    return out
+
+
+@kernel()
+def longest_column(matrix):
+    """Largest sum of moduli over a column."""
+    sums = np.zeros(matrix.shape[1])
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            sums[j] += abs(matrix[i, j])
+    largest = 0.0
+    for j in range(matrix.shape[1]):
+        # not a number stays
+        if not sums[j] <= largest:
+            largest = sums[j]
+    return largest
+
+
+@kernel()
 def right_hand_side(residual, row, weights, u, guess):
     """`[F; row . (weights (u - guess))]`, shape (N + 1,)."""
     n = u.shape[0]

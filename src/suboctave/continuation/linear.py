@@ -38,7 +38,7 @@ def length(vector: Array) -> float:
     return math.sqrt(flat.dot(flat))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, slots=True)
 class Factor:
     """LU factors of a square real or complex matrix (`lapack.?getrf`)."""
 
@@ -49,13 +49,13 @@ class Factor:
     @classmethod
     def of(cls, matrix: NDArray[Any], overwrite: bool = False) -> Factor:
         """Factorise; an exactly singular matrix is marked, not refused."""
-        getrf = lapack.zgetrf if np.iscomplexobj(matrix) else lapack.dgetrf
+        getrf = lapack.zgetrf if matrix.dtype.kind == "c" else lapack.dgetrf
         lu, pivots, info = getrf(matrix, overwrite_a=overwrite)
         return cls(lu, pivots, info > 0)
 
     def solve(self, rhs: NDArray[Any], adjoint: bool = False) -> NDArray[Any]:
         """Solve with the matrix, or with its conjugate transpose."""
-        if np.iscomplexobj(self.lu):
+        if self.lu.dtype.kind == "c":
             return lapack.zgetrs(self.lu, self.pivots, rhs, trans=2 if adjoint else 0)[0]
         return lapack.dgetrs(self.lu, self.pivots, rhs, trans=1 if adjoint else 0)[0]
 

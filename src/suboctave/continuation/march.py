@@ -59,7 +59,7 @@ class SteppingOptions:
             raise InputError(f"SteppingOptions out of range: {self}")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, slots=True)
 class CurvePoint:
     """A point of a curve with its tangent (in u, unit length in scaled arclength)."""
 
@@ -163,6 +163,8 @@ class March:
         self.closed = False
         self.ended = "not started"
         self._direction = direction
+        #: the start and its images in the discretisation of the last point
+        self._images: tuple[Curve, list[Array]] | None = None
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Points in order, the start first."""
@@ -342,7 +344,9 @@ class March:
         w = new.weights
         step = kernels.distance(new.u, point.u, w)
         index = new.curve.parameter
-        images = new.curve.images(new.curve.transfer(first.u, first.curve))
+        if self._images is None or self._images[0] is not new.curve:
+            self._images = (new.curve, new.curve.images(new.curve.transfer(first.u, first.curve)))
+        images = self._images[1]
         if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
             return None
         heading = new.curve.transfer(first.tangent, first.curve)

@@ -47,7 +47,7 @@ class NewtonOptions:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, slots=True)
 class Solved:
     """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`."""
 
@@ -62,7 +62,10 @@ class Solved:
 
 def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
     """Factorise `[F_u; row]` with columns scaled to arclength."""
-    return Factor.of(kernels.bordered_transposed(evaluation.jacobian, row, weights).T, overwrite=True)
+    filled = getattr(evaluation, "bordered_transposed", None)
+    if filled is None:
+        return Factor.of(kernels.bordered_transposed(evaluation.jacobian, row, weights).T, overwrite=True)
+    return Factor.of(filled(row, weights).T, overwrite=True)
 
 
 def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions) -> Solved:

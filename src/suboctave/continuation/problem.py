@@ -16,7 +16,11 @@ Array = NDArray[np.float64]
 
 
 class Evaluation(Protocol):
-    """The equations at one u."""
+    """The equations at one u.
+
+    It may have a method `bordered_transposed(row, weights)` too, for the transpose of `[jacobian / weights; row]` at
+    once.
+    """
 
     @property
     def residual(self) -> Array:

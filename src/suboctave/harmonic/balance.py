@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.group_force import Group, GroupLaw
+from suboctave.harmonic.group_force import Group, GroupLaw, PackedLaws
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.nodal import own_elements
-from suboctave.harmonic.quadrature import samples_for
+from suboctave.harmonic.quadrature import on_circle, samples_for, search_count
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 from suboctave.model.element import Element
@@ -89,12 +89,17 @@ class HarmonicBalance:
         self.moving = np.array(
             [any(system.elements[i].depends_on_velocity for i in g.members) for g in self.groups], dtype=bool
         )
+        self.any_moving = bool(self.moving.any())
         shapes = [self.linear.retain(c.direction) for c in system.load_components()]
         self.loads = LoadSpectrum(system, basis, shapes)
         self._load_cache: tuple[tuple, Array] | None = None
         self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
         self._load_order = sorted(self.load_names)
+        #: whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X
+        self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
         self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
+        self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
+        self._row_weights: dict[int, Array] = {}
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -166,7 +171,7 @@ class HarmonicBalance:
 
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
         """These equations with sample counts chosen for a motion and frozen from here on."""
-        if self._settled:
+        if self.settled:
             return self
         state = self.at(x, omega, values)
         samples = tuple(
@@ -176,7 +181,7 @@ class HarmonicBalance:
         return self.with_samples(samples + tuple(force.settled() for force in state.nodal))
 
     @lazy
-    def _settled(self) -> bool:
+    def settled(self) -> bool:
         """True if no element needs a number of samples."""
         kinds = self.coefficients(self.values)[1]
         blind = AdaptiveSampling | CornerSampling
@@ -211,6 +216,19 @@ class HarmonicBalance:
         kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
 
+    def packed_laws(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
+        """The groups' laws at parameter values, as arrays, and points on the circle for their polynomials, (2, N)."""
+        laws = self.coefficients(values)[2]
+        if self._packed is None or self._packed[0] is not laws:
+            found = PackedLaws.of(laws)
+            self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
+        return self._packed[1]
+
+    @lazy
+    def grid(self) -> Array:
+        """Points on the circle for searches along a motion: cosines and sines, (2, N)."""
+        return on_circle(search_count(self.basis.harmonics))
+
     @lazy
     def _own_coefficients(self) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
         return self._sorted_coefficients(self.values)
@@ -228,6 +246,23 @@ class HarmonicBalance:
             raise InputError("every unknown DOF needs a mass behind it")
         weight = 1.0 / np.sqrt(mobility)
         return weight, 1.0 / weight
+
+    def row_weights(self, rows: int) -> Array:
+        """The weights of residual entries (`scales`) for as many rows of an operator."""
+        found = self._row_weights.get(rows)
+        if found is None:
+            found = self._row_weights[rows] = np.tile(self.scales()[1], rows // self.size)
+        return found
+
+    @lazy
+    def column_weights(self) -> Array:
+        """The weights of displacements (`scales`) for all coefficients, shape (dimension,)."""
+        return self.per_unknown(self.scales()[0])
+
+    @lazy
+    def beyond(self) -> Array:
+        """The harmonics H + 1 .. 2 H + 1 in units of omega, shape (H + 1,)."""
+        return np.arange(self.basis.harmonics + 1, self.top + 1) / self.basis.nu
 
     def scales(self) -> tuple[Array, Array]:
         """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_i)` and its inverse.

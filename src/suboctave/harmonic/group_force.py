@@ -1,15 +1,18 @@
 """The force of all elements that act along one direction, on a motion: one displacement, one set of spectra.
 
-Piecewise-linear laws and polynomials are summed in one compiled call each; sharp laws share one set of graded
-nodes, other laws one uniform grid, so that the motion is evaluated once however many elements there are.
+Piecewise-linear laws and polynomials are packed for one compiled call (`evaluation`); sharp laws share one set of
+graded nodes, other laws one uniform grid, so that the motion is evaluated once however many elements there are.
 `local_force` has the same for a single element, and the derivatives that only located bifurcations need.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels, kernels
@@ -21,6 +24,7 @@ from suboctave.harmonic.quadrature import (
     even,
     graded_motion,
     graded_nodes,
+    on_circle,
     search_grid,
     singularities,
     uniform_nodes,
@@ -31,6 +35,7 @@ from suboctave.model.sampling import (
     PolynomialSampling,
     Sampling,
     SharpSampling,
+    told_levels,
 )
 
 _NONE = np.zeros(0)
@@ -64,6 +69,8 @@ class GroupLaw:
         The elements (index, coefficients) that these belong to.
     degree
         Highest degree of polynomials that need samples.
+    levels
+        Displacements at which a law has a corner, or is sharp: element, which of its own, displacement.
     """
 
     pieces: Array
@@ -76,6 +83,12 @@ class GroupLaw:
     line: Array
     told: tuple[tuple[int, Array], ...]
     degree: int
+    levels: tuple[tuple[int, int, float], ...] = ()
+
+    @cached_property
+    def told_places(self) -> tuple[Array, Array]:
+        """Gaps and widths of the arctan steps, (S,) each."""
+        return self.smooth_steps[:, 0].copy(), self.smooth_steps[:, 1].copy()
 
     @classmethod
     def of(cls, group: Group, numbers: list[Array], kinds: list[Sampling]) -> GroupLaw:
@@ -87,9 +100,11 @@ class GroupLaw:
         line = np.zeros(2)
         points: list[Array] = []
         widths: list[Array] = []
+        levels: list[tuple[int, int, float]] = []
         degree = 0
         for i in group.members:
             kind, c = kinds[i], numbers[i]
+            levels += [(i, place, level) for place, level in enumerate(told_levels(kind, c))]
             if isinstance(kind, PiecewiseLinear):
                 pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
             elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
@@ -122,10 +137,60 @@ class GroupLaw:
             line,
             tuple(told),
             degree,
+            tuple(levels),
         )
 
 
-def add_spectra(
+class PackedLaws(NamedTuple):
+    """The laws of all directions that are known in closed form, as arrays.
+
+    pieces, owner, first
+        Stiffness, gap, side of the pieces of piecewise-linear laws (P, 3), direction by direction; the direction of
+        each, (P,); where each direction's begin, (G + 1,).
+    polynomial
+        Coefficients of u^0, u^1, ... along every direction (G, D).
+    steps, step_owner, line
+        Gap, width, stiffness of arctan steps (S, 3) and their directions (S,); constant and slope of the laws that they
+        belong to, (G, 2).
+    sampled
+        Whether any direction has laws that need nodes of their own, arctan steps among them.
+    """
+
+    pieces: Array
+    owner: NDArray[np.int64]
+    first: NDArray[np.int64]
+    polynomial: Array
+    steps: Array
+    step_owner: NDArray[np.int64]
+    line: Array
+    sampled: bool
+
+    @classmethod
+    def of(cls, laws: list[GroupLaw]) -> PackedLaws:
+        """Pack the laws of all directions."""
+        number = np.arange(len(laws))
+        polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
+        for g, law in enumerate(laws):
+            polynomial[g, : len(law.polynomial)] = law.polynomial
+        counts = [len(law.pieces) for law in laws]
+        return cls(
+            np.concatenate([np.zeros((0, 3))] + [law.pieces for law in laws]),
+            np.repeat(number, counts),
+            np.cumsum([0, *counts]),
+            polynomial,
+            np.concatenate([np.zeros((0, 3))] + [law.smooth_steps for law in laws]),
+            np.repeat(number, [len(law.smooth_steps) for law in laws]),
+            np.array([law.line for law in laws]).reshape(-1, 2),
+            any(law.told or law.sharp or law.uniform for law in laws),
+        )
+
+    def nodes(self, high: int, top: int) -> Array:
+        """Points on the circle for the polynomials, enough for their tangents: cosines and sines, (2, N)."""
+        degree = self.polynomial.shape[1] - 1
+        return on_circle(even(degree * high + top + 1)) if degree >= 0 else on_circle(0)
+
+
+def add_sampled_spectra(
     law: GroupLaw,
     elements: tuple[Element, ...],
     samples: tuple[int | None, ...],
@@ -133,7 +198,8 @@ def add_spectra(
     rate: float,
     out: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> None:
-    """Add the Fourier coefficients of a group's force, stiffness and damping, (top + 1,) each, to `out`.
+    """Add the Fourier coefficients of force, stiffness and damping, (top + 1,) each, of a group's laws that need nodes
+    of their own to `out`; pieces and polynomials are `evaluation.evaluate`'s.
 
     Parameters
     ----------
@@ -143,15 +209,8 @@ def add_spectra(
         Complex coefficients of the relative displacement (H + 1,), base frequency.
     """
     top, high = out[0].shape[0] - 1, motion.shape[0] - 1
-    if law.pieces.shape[0]:
-        grid = search_grid(high)
-        group_kernels.add_pieces(motion, law.pieces, grid.zr, grid.zi, out[0], out[1])
-    if law.polynomial.shape[0]:
-        nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
-        group_kernels.add_polynomial(motion, law.polynomial, nodes.zr, nodes.zi, out[0], out[1])
     if law.told:
-        points, widths = law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy()
-        sampled = graded_motion(motion, points, widths, top)
+        sampled = graded_motion(motion, *law.told_places, top)
         group_kernels.add_smooth_steps(sampled, law.smooth_steps, law.line, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
@@ -211,12 +270,12 @@ def curvature_of(
     if law.polynomial.shape[0] > 2:
         nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
         u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
-        second = np.polynomial.polynomial.polyder(law.polynomial, 2)
-        parts.append(
-            Curvature(nodes.zr, nodes.zi, nodes.weights * np.polynomial.polynomial.polyval(u, second), None, None)
-        )
+        bend = np.zeros_like(u)
+        for p in range(len(law.polynomial) - 1, 1, -1):
+            bend = bend * u + p * (p - 1) * law.polynomial[p]
+        parts.append(Curvature(nodes.zr, nodes.zi, nodes.weights * bend, None, None))
     for members, points, widths in (
-        (law.told, law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy()),
+        (law.told, *law.told_places),
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),
     ):
@@ -259,4 +318,4 @@ def uniform_count(law: GroupLaw, samples: tuple[int | None, ...], high: int, top
     return max(count, even(law.degree * high + top + 1)) if law.degree else count
 
 
-__all__ = ["Group", "GroupLaw", "add_spectra", "curvature_of"]
+__all__ = ["Group", "GroupLaw", "PackedLaws", "add_sampled_spectra", "curvature_of"]

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import QUICK, kernel
+from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
@@ -119,31 +120,36 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         f[j] = line[0] + line[1] * u[j]
         f_u[j] = line[1]
     for s in range(steps.shape[0]):
-        point, width, factor = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
-        for j in range(n):
-            y = u[j] - point
-            ratio = y / width
-            angle = math.atan(ratio)
-            f[j] += factor * (y * angle - 0.5 * width * math.log1p(ratio * ratio))
-            f_u[j] += factor * angle
+        add_step(u, steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, f, f_u)
     scale = 1.0 / (2.0 * math.pi)
     pr = np.empty(n)
     pi = np.empty(n)
     for j in range(n):
         pr[j] = weights[j] * scale
         pi[j] = 0.0
-    for q in range(force.shape[0]):
+    # two harmonics at a time: the arrays are read once for both
+    for q in range(0, force.shape[0], 2):
         fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
+        gr, gi, tr, ti = 0.0, 0.0, 0.0, 0.0
         for j in range(n):
-            fr += f[j] * pr[j]
-            fi += f[j] * pi[j]
-            sr += f_u[j] * pr[j]
-            si += f_u[j] * pi[j]
-            t = pr[j] * zr[j] - pi[j] * zi[j]
-            pi[j] = pr[j] * zi[j] + pi[j] * zr[j]
-            pr[j] = t
+            a, b, c, d = pr[j], pi[j], zr[j], zi[j]
+            fr += f[j] * a
+            fi += f[j] * b
+            sr += f_u[j] * a
+            si += f_u[j] * b
+            e = a * c - b * d
+            b = a * d + b * c
+            gr += f[j] * e
+            gi += f[j] * b
+            tr += f_u[j] * e
+            ti += f_u[j] * b
+            pr[j] = e * c - b * d
+            pi[j] = e * d + b * c
         force[q] += complex(fr, -fi)
         stiffness[q] += complex(sr, -si)
+        if q + 1 < force.shape[0]:
+            force[q + 1] += complex(gr, -gi)
+            stiffness[q + 1] += complex(tr, -ti)
 
 
 @kernel()
@@ -170,25 +176,17 @@ def contact_comb(c, pieces, grid_r, grid_i):
 
 
 @kernel()
-def finite(table):
-    """Whether the zeroth coefficients of all spectra (R, G, top + 1) are finite."""
-    for r in range(table.shape[0]):
-        for g in range(table.shape[1]):
-            if not (math.isfinite(table[r, g, 0].real) and math.isfinite(table[r, g, 0].imag)):
-                return False
-    return True
-
-
-@kernel()
-def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
-    """A X, F and `R = A X + F - P`, (3, 2 H + 1, n), and the sizes |R|, |A X|, |F|, |P|.
+def balance_residual(x, blocks, force, load, starts, dofs, shape, weight, parts, sizes):
+    """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n), and |R|, |A X|, |F|, |P| into `sizes` (4,).
 
     blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions, whose non-zero
     entries are `shape[starts[g] : starts[g + 1]]` at `dofs`. Sizes are weighted by `weight` per DOF.
     """
     rows, n = x.shape
-    parts = np.zeros((3, rows, n))
     linear, forces, residual = parts[0], parts[1], parts[2]
+    for r in range(rows):
+        for i in range(n):
+            forces[r, i] = 0.0
     for h in range(blocks.shape[0]):
         for i in range(n):
             re = 0.0
@@ -213,7 +211,8 @@ def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
             for h in range(1, blocks.shape[0]):
                 forces[2 * h - 1, i] += 2.0 * d * force[g, h].real
                 forces[2 * h, i] -= 2.0 * d * force[g, h].imag
-    sizes = np.zeros(4)
+    for k in range(4):
+        sizes[k] = 0.0
     for r in range(rows):
         for i in range(n):
             residual[r, i] = linear[r, i] + forces[r, i] - load[r, i]
@@ -224,7 +223,6 @@ def balance_residual(x, blocks, force, load, starts, dofs, shape, weight):
             sizes[3] += w * load[r, i] * load[r, i]
     for k in range(4):
         sizes[k] = math.sqrt(sizes[k])
-    return parts, sizes
 
 
 @kernel()
@@ -319,24 +317,6 @@ def dynamic_stiffness(mass, damping, stiffness, frequency, order):
                     out[f, i, j] = complex(-2.0 * om * mass[i, j], damping[i, j])
                 else:
                     out[f, i, j] = complex(-2.0 * mass[i, j], 0.0)
-    return out
-
-
-@kernel()
-def local_amplitudes(x, dofs, shape):
-    """Complex coefficients (H + 1,) of the displacement along a direction with entries `shape` at `dofs`."""
-    high = x.shape[0] // 2
-    out = np.empty(high + 1, dtype=np.complex128)
-    for h in range(high + 1):
-        re = 0.0
-        im = 0.0
-        for s in range(dofs.shape[0]):
-            if h == 0:
-                re += shape[s] * x[0, dofs[s]]
-            else:
-                re += shape[s] * x[2 * h - 1, dofs[s]]
-                im -= shape[s] * x[2 * h, dofs[s]]
-        out[h] = complex(re, im)
     return out
 
 

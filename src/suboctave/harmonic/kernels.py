@@ -105,21 +105,37 @@ def contact_spectrum(tau, above, side, top):
     return out
 
 
-@kernel(patience=QUICK)
+@kernel(patience=QUICK, fastmath=_FAST)
 def product_spectrum(c, shift, chi, top):
     """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
     H.
     """
-    out = np.empty(top + 1, dtype=np.complex128)
     high = c.shape[0] - 1
+    # chi_q for q = -H .. top + H, negative ones by conjugation
+    xr = np.empty(top + 2 * high + 1)
+    xi = np.empty(top + 2 * high + 1)
+    for q in range(-high, top + high + 1):
+        xr[q + high] = chi[q].real if q >= 0 else chi[-q].real
+        xi[q + high] = chi[q].imag if q >= 0 else -chi[-q].imag
+    re = np.empty(top + 1)
+    im = np.empty(top + 1)
+    mean = c[0].real - shift
     for k in range(top + 1):
-        s = (c[0].real - shift) * chi[k]
-        for m in range(1, high + 1):
-            # x_m = c_m / 2 and x_-m its conjugate
-            low = k - m
-            left = chi[low] if low >= 0 else chi[-low].conjugate()
-            s += 0.5 * (c[m] * left + c[m].conjugate() * chi[k + m])
-        out[k] = s
+        re[k] = mean * xr[k + high]
+        im[k] = mean * xi[k + high]
+    for m in range(1, high + 1):
+        # x_m = c_m / 2 and x_-m its conjugate
+        a = 0.5 * c[m].real
+        b = 0.5 * c[m].imag
+        # views, whose indices the compiler knows to be positive
+        pr, pi = xr[high - m : high - m + top + 1], xi[high - m : high - m + top + 1]
+        qr, qi = xr[high + m : high + m + top + 1], xi[high + m : high + m + top + 1]
+        for k in range(top + 1):
+            re[k] += a * (pr[k] + qr[k]) + b * (qi[k] - pi[k])
+            im[k] += a * (pi[k] + qi[k]) + b * (pr[k] - qr[k])
+    out = np.empty(top + 1, dtype=np.complex128)
+    for k in range(top + 1):
+        out[k] = complex(re[k], im[k])
     return out
 
 

@@ -68,9 +68,11 @@ class StructuralMatrices:
         self.system = system
         self.values = dict(system.parameters if values is None else values)
         self.size = system.n
-        self._mass, self._damping, self._stiffness = (
-            np.ascontiguousarray(matrix, dtype=float) for matrix in system.matrices(self.values)
-        )
+        #: M, C, K, shape (3, n, n)
+        self.matrices = np.array(system.matrices(self.values), dtype=float)
+        self._mass, self._damping, self._stiffness = self.matrices
+        #: the same of one DOF
+        self.scalars = tuple(float(matrix[0, 0]) for matrix in self.matrices)
 
     def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
         """The same structure at other parameter values."""

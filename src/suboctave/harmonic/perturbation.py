@@ -19,7 +19,7 @@ from enum import Enum
 
 import numpy as np
 
-from suboctave.harmonic import kernels, nodal_second
+from suboctave.harmonic import kernels, nodal_second, real_form
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
 from suboctave.harmonic.rates import coefficient_rates
@@ -118,6 +118,9 @@ def bilinear_gradient(
     names
         "omega" and parameters to differentiate by. For Kind.HALF the shift follows omega; for Kind.FREE kappa is kept.
     """
+    if kind is not Kind.FREE and real_form.applies(state, names):
+        by_x, slope_omega, slope_kappa = real_form.real_gradient(state, kind is Kind.INTEGER, left, right)
+        return Gradient(by_x, {name: complex(slope_omega) for name in names}, slope_kappa)
     size, basis = state.balance.size, state.basis
     if kind is Kind.INTEGER:
         left, right = state.balance.spread(left), state.balance.spread(right)

@@ -54,8 +54,15 @@ class Nodes:
 @lru_cache(maxsize=64)
 def uniform_nodes(count: int) -> Nodes:
     """`count` equidistant instants from tau = 0."""
-    tau = 2.0 * math.pi * np.arange(count) / count
-    return Nodes(np.cos(tau), np.sin(tau), np.full(count, 2.0 * math.pi / count))
+    tau = 2.0 * math.pi * np.arange(count) / max(1, count)
+    return Nodes(np.cos(tau), np.sin(tau), np.full(count, 2.0 * math.pi / max(1, count)))
+
+
+@lru_cache(maxsize=64)
+def on_circle(count: int) -> Array:
+    """The same instants as cosines and sines, (2, count)."""
+    nodes = uniform_nodes(count)
+    return np.array((nodes.zr, nodes.zi))
 
 
 @lru_cache(maxsize=256)
@@ -101,7 +108,12 @@ def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int) 
 
 def search_grid(high: int) -> Nodes:
     """Equidistant instants, close enough for searches along a motion of harmonics up to `high`."""
-    return uniform_nodes(1 << math.ceil(math.log2(8 * high + 8)))
+    return uniform_nodes(search_count(high))
+
+
+def search_count(high: int) -> int:
+    """Number of these instants."""
+    return 8 * high + 8
 
 
 @lru_cache(maxsize=1)

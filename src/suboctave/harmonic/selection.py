@@ -26,11 +26,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.harmonic import group_kernels
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
 from suboctave.lazy import lazy
@@ -86,24 +86,30 @@ def motion_size(state: BalanceState) -> float:
 
 def truncation(state: BalanceState) -> float:
     """Estimated size of the neglected harmonics relative to the motion."""
-    weight = state.balance.scales()[0]
-    tail, size = group_kernels.tails(state.x, state.neglected, weight)
+    tail, size = state.tails
     if size == 0.0:
         return 0.0
     beyond = float(tail[state.basis.harmonics])
-    return beyond if state.basis.kept is None else math.hypot(beyond, _modulus(state.left_out * weight) / size)
+    if state.basis.kept is None:
+        return beyond
+    return math.hypot(beyond, _modulus(state.left_out * state.balance.scales()[0]) / size)
 
 
 def _modulus(amplitudes: ComplexArray) -> float:
     return float(np.linalg.norm(amplitudes))
 
 
-def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> list[int]:
+def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, ...]:
     """Numbers of harmonics of omega to choose from."""
-    nu, high = state.basis.nu, state.basis.harmonics
-    lowest = max(options.minimum, state.balance.highest_load)
-    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-    return [h for h in _LADDER if lowest <= h <= most] or [max(lowest, high // nu)]
+    basis = state.basis
+    return _rungs(options, basis.harmonics, basis.nu, state.balance.size, state.balance.highest_load)
+
+
+@lru_cache(maxsize=256)
+def _rungs(options: AdaptiveHarmonics, high: int, nu: int, size: int, highest_load: int) -> tuple[int, ...]:
+    lowest = max(options.minimum, highest_load)
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / size - 1) / (2 * nu)))
+    return tuple(h for h in _LADDER if lowest <= h <= most) or (max(lowest, high // nu),)
 
 
 def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
@@ -143,7 +149,7 @@ def choose_harmonics(
     if basis.nu > 1:
         return _Classes(state, options).chosen(tolerance, dropping)
     nu, high = basis.nu, basis.harmonics
-    tail, size = group_kernels.tails(state.x, state.neglected, state.balance.scales()[0])
+    tail, size = state.tails
     if size == 0.0:
         return basis
     ladder = _ladder(options, state)
@@ -162,6 +168,43 @@ def choose_harmonics(
     return HarmonicBasis(wanted * nu, nu) if wanted * nu < high else basis
 
 
+@dataclass(frozen=True)
+class _Parts:
+    """The harmonics k = 0 .. 2 H + 1 of a basis by gcd(k, nu): nu for the mean and the harmonics of the load.
+
+    masks
+        Which belong to each divisor, (divisors, 2 H + 2), as 0 and 1.
+    ends
+        Where each class ends: before the first of its harmonics that is missing.
+    cut
+        Whether a class misses harmonics below the highest, (divisors,).
+    """
+
+    divisors: tuple[int, ...]
+    masks: Array
+    ends: tuple[int, ...]
+    cut: np.ndarray
+
+
+@lru_cache(maxsize=256)
+def _parts_of(basis: HarmonicBasis) -> _Parts:
+    nu, high = basis.nu, basis.harmonics
+    divisor = np.gcd(np.arange(2 * high + 2), nu)
+    divisors = tuple(d for d in range(1, nu + 1) if nu % d == 0)
+    masks = np.array([divisor == d for d in divisors])
+    missing = np.arange(2 * high + 2) > high
+    missing[basis.left_out] = True
+    ends = tuple(int(np.flatnonzero(missing & mask)[0]) - 1 for mask in masks)
+    cut = np.array([mask[basis.left_out].any() for mask in masks])
+    return _Parts(divisors, masks.astype(float), ends, cut)
+
+
+@lru_cache(maxsize=256)
+def _fine_rungs(nu: int, lowest: float, most: float) -> tuple[int, ...]:
+    rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
+    return tuple(r for r in rungs if lowest <= r <= most)
+
+
 class _Classes:
     """The harmonics of a sub-harmonic motion by gcd(k, nu), with what is left of each class beyond every harmonic."""
 
@@ -171,22 +214,18 @@ class _Classes:
         weighted = state.completed.x * state.balance.scales()[0]
         squares = np.sum(weighted * weighted, axis=1)
         squares = np.append(squares[0], squares[1::2] + squares[2::2])
-        #: gcd(k, nu), k = 0 .. 2 H + 1: nu for the mean and the harmonics of the load
-        self.divisor = np.gcd(np.arange(len(squares)), nu)
-        self.divisors = [d for d in range(1, nu + 1) if nu % d == 0]
+        parts = _parts_of(basis)
+        self.divisors, self.ends, self.cut = parts.divisors, parts.ends, parts.cut
         self.size = math.sqrt(float(squares[: high + 1].sum()))
         shares = squares / self.size**2 if self.size > 0.0 else squares
         #: size of each class, and of what it has beyond k, relative to the motion
-        self.whole = np.array([math.sqrt(float(shares[self.divisor == d].sum())) for d in self.divisors])
-        self.beyond = np.array([_beyond(np.where(self.divisor == d, shares, 0.0)) for d in self.divisors])
+        each = parts.masks * shares
+        sums = np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
+        self.whole = np.sqrt(sums[:, 0])
+        self.beyond = np.sqrt(np.concatenate((sums[:, 1:], np.zeros((len(sums), 1))), axis=1))
         lowest = max(options.minimum, state.balance.highest_load)
         most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-        rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
-        self.rungs = [r for r in rungs if lowest * nu <= r <= most * nu] or [max(lowest * nu, high)]
-        #: where each class ends now: before the first of its harmonics that is missing
-        missing = np.arange(len(squares)) > high
-        missing[basis.left_out] = True
-        self.ends = [int(np.flatnonzero(missing & (self.divisor == d))[0]) - 1 for d in self.divisors]
+        self.rungs = _fine_rungs(nu, lowest * nu, most * nu) or (max(lowest * nu, high),)
 
     def chosen(self, tolerance: float, dropping: bool) -> HarmonicBasis:
         """See `choose_harmonics`."""
@@ -206,8 +245,7 @@ class _Classes:
             return True
         if self.basis.kept is None:
             return False
-        cut = np.isin(self.divisors, self.divisor[self.basis.left_out])
-        return self._youngest < _YOUNG or bool(np.any(cut & (lacking > 2.0 * _OF_ITSELF * self.whole)))
+        return self._youngest < _YOUNG or bool(np.any(self.cut & (lacking > 2.0 * _OF_ITSELF * self.whole)))
 
     def _needed(self, bound: float) -> list[int]:
         """Where each class has to end for less than `bound` to be neglected in all."""
@@ -252,11 +290,6 @@ class _Classes:
         end[nu] = max(end[nu], self.rungs[0])
         kept = [k for k in range(high + 1) if k <= end[math.gcd(k, nu)]]
         return HarmonicBasis(kept[-1], nu, tuple(kept))
-
-
-def _beyond(shares: Array) -> Array:
-    """What is left of squares beyond every index, as a size."""
-    return np.sqrt(np.append(np.cumsum(shares[:0:-1])[::-1], 0.0))
 
 
 def _is_prime(number: int) -> bool:

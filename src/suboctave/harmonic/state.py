@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from suboctave.errors import ConvergenceError
-from suboctave.harmonic import group_kernels, kernels
+from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
-from suboctave.harmonic.group_force import Group, add_spectra, curvature_of
-from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.group_force import Group, curvature_of
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
-from suboctave.harmonic.quadrature import uniform_nodes
 from suboctave.harmonic.rates import coefficient_rates
 from suboctave.lazy import lazy
 
@@ -58,12 +56,16 @@ class BalanceState:
     @lazy
     def compliance(self) -> ComplexArray | None:
         """B at the harmonics, None for the identity."""
+        if isinstance(self.linear, StructuralMatrices):
+            return None
         return self.linear.compliance(self.frequencies)
 
     @lazy
-    def motions(self) -> list[ComplexArray]:
-        """Complex coefficients (H + 1,) of the displacement along each group's direction."""
-        return [group_kernels.local_amplitudes(self.x, g.dofs, g.values) for g in self.balance.groups]
+    def motions(self) -> ComplexArray:
+        """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
+        found = np.empty((len(self.balance.groups), self.basis.harmonics + 1), dtype=complex)
+        evaluation.along_directions(self.x, *self.balance.directions, found)
+        return found
 
     @lazy
     def local_motions(self) -> list[LocalMotion]:
@@ -109,29 +111,12 @@ class BalanceState:
     @lazy
     def spectra_table(self) -> ComplexArray:
         """Fourier coefficients 0 .. top of force, stiffness, damping along each group's direction, (3, G, top + 1)."""
-        balance = self.balance
-        table = np.zeros((3, len(balance.groups), balance.top + 1), dtype=complex)
-        laws = balance.coefficients(self.values)[2]
-        for g, (law, motion) in enumerate(zip(laws, self.motions, strict=True)):
-            add_spectra(
-                law, balance.elements, balance.samples, motion, self.rate, (table[0, g], table[1, g], table[2, g])
-            )
-        # a number that is not finite at any instant is in all coefficients
-        if not group_kernels.finite(table):
-            self._refuse()
-        return table
+        return self._evaluated[0]
 
-    def _refuse(self) -> None:
-        for local in self.local_motions:
-            nodes = uniform_nodes(64) if local.pieces is not None else local.nodes()
-            u, du = kernels.motion(local.motion, nodes.zr, nodes.zi)
-            parts = local.element.tangent(u, self.rate * du, local.coefficients)
-            if not all(np.isfinite(part).all() for part in parts if part is not None):
-                raise ConvergenceError(
-                    f"{local.element.label} returned a force that is not finite at omega = {self.omega:.6g} "
-                    f"(largest coefficient of the motion {np.abs(self.x).max():.3g})"
-                )
-        raise ConvergenceError(f"the element forces are not finite at omega = {self.omega:.6g}")
+    @lazy
+    def _evaluated(self) -> tuple[ComplexArray, Array, Array]:
+        """`spectra_table` and both of `_parts` without elements that have nodes of their own."""
+        return evaluation.evaluated(self)
 
     @lazy
     def spectra(self) -> list[tuple[Group, ComplexArray, ComplexArray, ComplexArray]]:
@@ -145,17 +130,10 @@ class BalanceState:
     @lazy
     def _parts(self) -> tuple[Array, Array]:
         """A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P with residual weights."""
-        balance = self.balance
-        parts: tuple[Array, Array] = group_kernels.balance_residual(
-            self.x,
-            self.blocks,
-            self.spectra_table[0],
-            balance.load(self.values, self.omega),
-            *balance.directions,
-            balance.scales()[1],
-        )
-        parts = self._with_nodal(*parts) if self.nodal else parts
-        return parts if self.basis.kept is None else self._kept_only(*parts)
+        _, parts, sizes = self._evaluated
+        if self.nodal:
+            parts, sizes = self._with_nodal(parts, sizes)
+        return (parts, sizes) if self.basis.kept is None else self._kept_only(parts, sizes)
 
     def _with_nodal(self, parts: Array, sizes: Array) -> tuple[Array, Array]:
         """The same with the elements that have nodes of their own."""
@@ -201,13 +179,11 @@ class BalanceState:
         """dF/dX for all harmonics up to H, square, with size (2 H + 1) rows."""
         return self._tangent_matrix(mean=True)
 
-    def _tangent_matrix(self, mean: bool, columns: int = 0) -> Array:
-        """Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis, and further columns of
-        zeros.
-        """
+    def _tangent_matrix(self, mean: bool) -> Array:
+        """Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis."""
         balance, table = self.balance, self.spectra_table
         rows = balance.size * (2 * self.basis.harmonics + (1 if mean else 2))
-        out = np.zeros((rows, rows + columns))
+        out = np.zeros((rows, rows))
         group_kernels.tangent_matrix(
             out, table[1], table[2], balance.moving, self.rate, mean, *balance.directions, balance.size
         )
@@ -217,6 +193,8 @@ class BalanceState:
     @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
+        if isinstance(self.linear, StructuralMatrices):
+            return self._restricted(evaluation.structural_jacobian(self, self.linear.matrices, mean=True))
         return self._restricted(
             self._with_linear(self._tangent_matrix(mean=True), self.blocks, self.compliance, mean=True)
         )
@@ -228,17 +206,24 @@ class BalanceState:
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
-        if self.compliance is None and self.basis.kept is None:
-            out = self._tangent_matrix(mean=True, columns=1)
-            kernels.add_linear(out, self.blocks, True)
-        else:
+        if not isinstance(self.linear, StructuralMatrices) or self.basis.kept is not None:
             out = np.column_stack((self.jacobian, np.zeros(self.balance.dimension)))
-        out[:, -1] = self.residual_by(name)
+            out[:, -1] = self.residual_by(name)
+            return out
+        out = evaluation.structural_jacobian(self, self.linear.matrices, mean=True, columns=1)
+        if name != "omega":
+            out[:, -1] = self.residual_by(name)
+        elif not self.balance.steady:
+            change = self.unbalanced_by(name)
+            if change is not None:
+                out[:, -1] += change.ravel()
         return out
 
     @lazy
     def half_jacobian(self) -> Array:
         """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
+        if isinstance(self.linear, StructuralMatrices):
+            return evaluation.structural_jacobian(self, self.linear.matrices, mean=False)
         frequencies = self.basis.half_multiples * self.omega
         return self._with_linear(
             self._tangent_matrix(mean=False),
@@ -330,6 +315,13 @@ class BalanceState:
 
         To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
         """
+        balance, linear = self.balance, self.linear
+        if balance.size == 1 and isinstance(linear, StructuralMatrices) and not self.nodal:
+            found = np.empty((self.basis.harmonics + 1, 1), dtype=complex)
+            evaluation.neglected_of_one(
+                self.spectra_table[0], balance.directions[2], balance.beyond, self.omega, linear.matrices, found
+            )
+            return found
         return self._excited(np.arange(self.basis.harmonics + 1, self.balance.top + 1))
 
     @lazy
@@ -354,6 +346,12 @@ class BalanceState:
         return -motion.astype(complex, copy=False)
 
     @lazy
+    def tails(self) -> tuple[Array, float]:
+        """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
+        tail, size = group_kernels.tails(self.x, self.neglected, self.balance.scales()[0])
+        return tail, float(size)
+
+    @lazy
     def completed(self) -> BalanceState:
         """The motion together with the harmonics it neglects, in the basis of 2 H + 1 harmonics.
 
@@ -372,7 +370,8 @@ class BalanceState:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
         sizes = self._parts[1]
         if self.compliance is None:
-            return float(sizes[1] + sizes[2] + sizes[3])
+            _, linear, force, load = sizes.tolist()
+            return float(linear + force + load)
         weight = self.balance.scales()[1]
         load = self.balance.load(self.values, self.omega)
         return float(sizes[1]) + sum(

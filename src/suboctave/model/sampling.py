@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from suboctave.errors import InputError
 
 __all__ = [
@@ -16,6 +19,7 @@ __all__ = [
     "Sampling",
     "SharpSampling",
     "SharpVelocitySampling",
+    "told_levels",
 ]
 
 
@@ -118,3 +122,10 @@ class SharpVelocitySampling:
 Sampling: TypeAlias = (
     PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling | CornerSampling | SharpVelocitySampling
 )
+
+
+def told_levels(kind: Sampling, coefficients: NDArray[np.float64]) -> tuple[float, ...]:
+    """Displacements at which a law has a corner, or is sharp, at these coefficients."""
+    if isinstance(kind, PiecewiseLinear):
+        return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
+    return kind.points if isinstance(kind, SharpSampling | CornerSampling) else ()

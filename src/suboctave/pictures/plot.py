@@ -35,6 +35,9 @@ def plot(
     unit: str | None = None,
     xlabel: str | None = None,
     ylabel: str | None = None,
+    xlim: Sequence[float] | None = None,
+    ylim: Sequence[float] | None = None,
+    marks: Sequence[str] | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: str | tuple[float, float] = (6.4, 4.2),
@@ -47,8 +50,8 @@ def plot(
     Parameters
     ----------
     curves
-        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a sequence of these, or what has
-        `branches`, such as the results of a study.
+        A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a bifurcation diagram (all its branches),
+        a sequence of these, or the results of a study.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
     quantity
@@ -71,6 +74,10 @@ def plot(
         the one that is no frequency.
     xlabel, ylabel, labels, title
         Texts of the axes, names of the curves in the legend, title.
+    xlim, ylim
+        Part of the axes that is shown, (from, to).
+    marks
+        Kinds of bifurcations that get markers: ["PD", "LP"]. Default all; of a diagram all but grazing contacts.
     size
         "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
 
@@ -82,7 +89,13 @@ def plot(
     projected = quantity is not None or harmonic is not None
     if quantity is None:
         quantity = "amplitude" if harmonic is None else "harmonic"
-    view = View(quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel)
+    given = _several(curves)
+    if len(given) == 1:  # a diagram says how it is drawn
+        labels = getattr(given[0], "legend", None) if labels is None else labels
+        marks = getattr(given[0], "marks", None) if marks is None else marks
+    view = View(
+        quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel, xlim, ylim, marks
+    )
     datasets = datasets_of(curves, view)
     tracked = [is_boundary(dataset) for dataset in datasets]
     if tracked and all(tracked):
@@ -101,21 +114,24 @@ def plot(
 
 def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
     """The datasets of what `plot` takes, with the quantity that is drawn."""
-    several = getattr(curves, "branches", curves)
-    if isinstance(several, Mapping) and several is not curves:
-        several = list(several.values())
-    given = list(several) if isinstance(several, list | tuple) else [several]
-    return [_dataset(item, view) for item in given]
+    return [dataset for item in _several(curves) for dataset in _datasets(item, view)]
 
 
-def _dataset(item: Any, view: View) -> xarray.Dataset:
+def _several(curves: Any) -> list[Any]:
+    """The branches and diagrams of what is given."""
+    named = getattr(curves, "branches", None)
+    if isinstance(named, Mapping):  # results of a study
+        return [*named.values(), *getattr(curves, "diagrams", {}).values()]
+    return list(curves) if isinstance(curves, list | tuple) else [curves]
+
+
+def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
+    """The dataset of a branch, those of all branches of a diagram."""
     import xarray
 
     if isinstance(item, xarray.Dataset):
-        return item
+        return [item]
     if not hasattr(item, "to_xarray"):
-        raise InputError(f"plot draws branches and their datasets, not {type(item).__name__}")
-    dataset: xarray.Dataset = (
-        item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
-    )
-    return dataset
+        raise InputError(f"plot draws branches, diagrams and their datasets, not {type(item).__name__}")
+    found = item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
+    return list(found.values()) if isinstance(found, dict) else [found]

@@ -12,6 +12,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,8 +51,8 @@ def write_report(
     Parameters
     ----------
     results
-        Names of analyses and their curves: datasets (`to_xarray`), or branches. Datasets on the dimension `row` are
-        shown as tables.
+        Names of analyses and their curves: datasets (`to_xarray`), branches, or bifurcation diagrams. Datasets on the
+        dimension `row` are shown as tables.
     path
         A file ending in .html or .htm; written beside its place and renamed.
     title
@@ -65,52 +66,88 @@ def write_report(
         If there is nothing to show, or the file exists and is not to be replaced, or cannot be written there.
     """
     target = free_place(path, overwrite, (".html", ".htm"))
-    datasets = {str(name): _dataset(str(name), item) for name, item in results.items()}
-    if not datasets:
+    parts = {str(name): _part(str(name), item) for name, item in results.items()}
+    if not parts:
         raise InputError("a report needs at least one result")
-    text = _page(datasets, str(title))
+    text = _page(parts, str(title))
     replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
     return target
 
 
-def _dataset(name: str, item: Any) -> xarray.Dataset:
+@dataclass(frozen=True)
+class _Diagram:
+    """A bifurcation diagram: its tree as text, and its curves by number and label."""
+
+    text: str
+    curves: dict[str, xarray.Dataset]
+    legend: list[str] | None
+
+
+def _part(name: str, item: Any) -> xarray.Dataset | _Diagram:
     import xarray
 
-    dataset: Any = item.to_xarray() if hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset) else item
+    given: Any = item.to_xarray() if hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset) else item
+    if isinstance(given, dict) and given:
+        curves = {str(label): _dataset(name, dataset) for label, dataset in given.items()}
+        return _Diagram(str(item), curves, getattr(item, "legend", None))
+    return _dataset(name, given)
+
+
+def _dataset(name: str, dataset: Any) -> xarray.Dataset:
+    import xarray
+
     if not isinstance(dataset, xarray.Dataset):
-        raise InputError(f"{name}: expected a dataset of a curve, got {type(item).__name__}; a branch has to_xarray()")
+        raise InputError(
+            f"{name}: expected a dataset of a curve, got {type(dataset).__name__}; a branch has to_xarray()"
+        )
     if "row" not in dataset.sizes or "point" in dataset.sizes:
         check_layout(dataset)
     return dataset
 
 
-def _page(datasets: Mapping[str, xarray.Dataset], title: str) -> str:
+def _page(parts: Mapping[str, xarray.Dataset | _Diagram], title: str) -> str:
+    datasets = {name: part for name, part in parts.items() if not isinstance(part, _Diagram)}
+    diagrams = {name: part for name, part in parts.items() if isinstance(part, _Diagram)}
     curves = {name: data for name, data in datasets.items() if data.sizes.get("point", 0)}
-    anchors = {name: f"part-{index}" for index, name in enumerate(datasets)}
-    parts = [f"<h1>{_safe(title)}</h1>", _summary(datasets)]
-    if len(datasets) > 1:
-        links = [f'<a href="#{anchors[name]}">{_safe(name)}</a>' for name in datasets]
-        parts.append(f"<nav>{''.join(links)}</nav>")
-        parts += _overviews(curves)
-    for name, dataset in datasets.items():
-        parts.append(f'<section id="{anchors[name]}"><h2>{_safe(name)}</h2>')
-        parts.append(_curve(name, dataset) if name in curves else _table_of(dataset))
-        parts.append("</section>")
-    packed = f'<script type="text/plain" id="plotly-packed">{plotly_source()}</script>' if curves else ""
+    everything = [*datasets.values(), *(data for diagram in diagrams.values() for data in diagram.curves.values())]
+    anchors = {name: f"part-{index}" for index, name in enumerate(parts)}
+    sections = [f"<h1>{_safe(title)}</h1>", _summary(everything)]
+    if len(parts) > 1:
+        links = [f'<a href="#{anchors[name]}">{_safe(name)}</a>' for name in parts]
+        sections.append(f"<nav>{''.join(links)}</nav>")
+        sections += _overviews(curves)
+    for name in parts:
+        sections.append(f'<section id="{anchors[name]}"><h2>{_safe(name)}</h2>')
+        if name in diagrams:
+            sections.append(_diagram(name, diagrams[name]))
+        else:
+            sections.append(_curve(name, datasets[name]) if name in curves else _table_of(datasets[name]))
+        sections.append("</section>")
+    drawn = curves or diagrams
+    packed = f'<script type="text/plain" id="plotly-packed">{plotly_source()}</script>' if drawn else ""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         f'<meta name="generator" content="suboctave {_safe(__version__)}">\n'
         f"<title>{_safe(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(parts)
+        + "\n".join(sections)
         + f"\n{packed}\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
     )
 
 
-def _summary(datasets: Mapping[str, xarray.Dataset]) -> str:
-    versions = sorted({str(data.attrs["suboctave"]) for data in datasets.values() if "suboctave" in data.attrs})
-    systems = dict.fromkeys(str(data.attrs["system"]) for data in datasets.values() if data.attrs.get("system"))
+def _diagram(name: str, diagram: _Diagram) -> str:
+    """All curves in one figure, the tree, and each branch by itself."""
+    free = str(next(iter(diagram.curves.values())).attrs["free"])
+    each = "".join(
+        f"<h2>{_safe(name)}, branch {_safe(label)}</h2>{_curve(label, data)}" for label, data in diagram.curves.items()
+    )
+    return f"{_figure(diagram.curves, free, diagram.legend)}<pre>{_safe(diagram.text)}</pre>{each}"
+
+
+def _summary(datasets: Sequence[xarray.Dataset]) -> str:
+    versions = sorted({str(data.attrs["suboctave"]) for data in datasets if "suboctave" in data.attrs})
+    systems = dict.fromkeys(str(data.attrs["system"]) for data in datasets if data.attrs.get("system"))
     words = [f"suboctave {', '.join(versions) or __version__}", *systems]
     hint = "Hover over a curve for its values, drag to zoom, click in the legend to hide."
     return f'<p class="soft">{_safe(" · ".join(words))}</p><p class="soft hint">{hint}</p>'
@@ -126,7 +163,7 @@ def _overviews(curves: Mapping[str, xarray.Dataset]) -> list[str]:
         groups.setdefault(key, {})[name] = data
     several = [(key[0], group) for key, group in groups.items() if len(group) > 1]
     parts = [
-        f"<section><h2>All curves over {_safe(_spelt(free))}</h2>{_figure(group, free)}</section>"
+        f"<section><h2>All curves over {_safe(_spelt(free))}</h2>{_figure(group, free, list(group))}</section>"
         for free, group in several
     ]
     for members, what in boundary_overviews(curves):
@@ -172,8 +209,7 @@ def _file_name(curves: Mapping[str, xarray.Dataset]) -> str:
     return re.sub(r"[^\w-]+", "_", "_".join(curves))[:60] or "figure"
 
 
-def _figure(curves: Mapping[str, xarray.Dataset], free: str) -> str:
-    labels = list(curves) if len(curves) > 1 else None
+def _figure(curves: Mapping[str, xarray.Dataset], free: str, labels: Sequence[str] | None = None) -> str:
     still = plot_response(list(curves.values()), x=free, labels=labels, size=(6.4, 4.2))
     words = f"Amplitude over {_spelt(free)}: {', '.join(curves)}"
     return _framed(Shown("", figure_data(curves, free, _file_name(curves)), still, words))

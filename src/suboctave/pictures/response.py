@@ -144,7 +144,7 @@ def draw_response(
         legend |= _draw_line(axes, pieces, shown.factors(horizontal), styles[index], look, name, periods)
     for index in order:  # markers after all lines: none is crossed out by another curve
         edge = styles[index].colour if several or periods else style.INK
-        legend |= _draw_events(axes, group[index], shown.values(group[index], horizontal)[0], edge, look, several)
+        legend |= _draw_events(axes, group[index], shown, horizontal, edge, look, several)
     dress(axes, *shown.labels(group[0], horizontal), look)
     return legend
 
@@ -201,14 +201,18 @@ def _draw_line(
 
 
 def _draw_events(
-    axes: Axes, dataset: xarray.Dataset, positions: np.ndarray, edge: str, look: style.Look, several: bool
+    axes: Axes, dataset: xarray.Dataset, view: View, horizontal: str, edge: str, look: style.Look, several: bool
 ) -> dict[str, Line2D]:
     """Markers: the shape tells the kind, the filling the criticality; the edge the curve, where there are several."""
     from matplotlib.lines import Line2D
 
     legend: dict[str, Line2D] = {}
     smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
+    positions, seen = view.values(dataset, horizontal)[0], view.marked(dataset, horizontal)
     for kind, mark, which in style.marks(dataset):
+        chosen = positions[[i for i in which if seen[i]]]
+        if not len(chosen):
+            continue
         drawing: dict[str, Any] = {
             "linestyle": "none",
             "marker": mark.marker,
@@ -217,7 +221,6 @@ def _draw_events(
             "markeredgecolor": edge,
             "markeredgewidth": look.edge * (1.5 if several else 1.0),
         }
-        chosen = positions[which]
         axes.plot(
             chosen[:, 0],
             chosen[:, 1],
@@ -246,8 +249,11 @@ def _set_limits(
     frames: Sequence[Axes], groups: Sequence[Sequence[xarray.Dataset]], horizontal: str, view: View
 ) -> None:
     every = np.concatenate([part for group in groups for data in group for part in view.values(data, horizontal)])
+    if view.xlim is not None:
+        every = every[(every[:, 0] >= view.xlim[0]) & (every[:, 0] <= view.xlim[1])]
     xs, ys = (column[np.isfinite(column)] for column in every.T)
     if xs.size == 0 or ys.size == 0:
+        _clip(frames, view)
         return
     spread = np.ptp(xs) or abs(xs[0]) or 1.0
     frames[0].set_xlim(xs.min() - 0.02 * spread, xs.max() + 0.02 * spread)
@@ -258,6 +264,15 @@ def _set_limits(
         frames[0].set_ylim(ys.min() - 0.06 * height, ys.max() + 0.06 * height)
     if view.quantity == "phase" and view.scale is None and np.ptp(ys) > 60.0:
         frames[0].yaxis.set_major_locator(_degrees())
+    _clip(frames, view)
+
+
+def _clip(frames: Sequence[Axes], view: View) -> None:
+    """The part of the axes that was asked for."""
+    if view.xlim is not None:
+        frames[0].set_xlim(*view.xlim)
+    if view.ylim is not None:
+        frames[0].set_ylim(*view.ylim)
 
 
 def _degrees() -> Any:

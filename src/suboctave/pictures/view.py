@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,10 @@ class View:
         `scale=1/0.02` for a displacement in units of 0.02. Phases are in degrees unless scaled.
     xlabel, ylabel
         Instead of the labels that follow from the above.
+    xlim, ylim
+        Part of the axes that is shown, in the units that they show; default everything.
+    marks
+        Kinds of bifurcations and names of events that get markers; default all.
     """
 
     quantity: str = "amplitude"
@@ -70,6 +75,9 @@ class View:
     unit: str | None = None
     xlabel: str | None = None
     ylabel: str | None = None
+    xlim: Sequence[float] | None = None
+    ylim: Sequence[float] | None = None
+    marks: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
@@ -83,6 +91,11 @@ class View:
         if self.dof is not None and self.quantity not in _OF_A_DOF:
             raise InputError(f"the quantity {self.quantity!r} is not one of a degree of freedom: leave dof= out")
         check_units(self.frequency, self.omega_reference, self.scale)
+        for name, limits in (("xlim", self.xlim), ("ylim", self.ylim)):
+            if limits is not None:
+                _check_limits(name, limits)
+        if isinstance(self.marks, str):
+            raise InputError(f'marks is a list of kinds: marks=["{self.marks}"]')
 
     @property
     def variable(self) -> str:
@@ -115,6 +128,16 @@ class View:
         scale = np.array([across, upwards])
         return np.column_stack([event_x, event_y]) * scale, np.column_stack([x, y]) * scale
 
+    def marked(self, dataset: xarray.Dataset, horizontal: str) -> np.ndarray:
+        """Which of the events get a marker, shape (events,), bool."""
+        kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
+        chosen = np.array([self.marks is None or kind in self.marks for kind in kinds], dtype=bool)
+        places = self.values(dataset, horizontal)[0]
+        for column, limits in zip(places.T, (self.xlim, self.ylim), strict=True):
+            if limits is not None:
+                chosen &= (column >= limits[0]) & (column <= limits[1])
+        return chosen
+
     def labels(self, dataset: xarray.Dataset, horizontal: str) -> tuple[str, str]:
         """What the two axes say."""
         if horizontal != "omega":
@@ -134,6 +157,15 @@ class View:
         if unit:
             upwards += f" ({unit})"
         return self.xlabel or across, self.ylabel or upwards
+
+
+def _check_limits(name: str, limits: Any) -> None:
+    try:
+        first, last = (float(value) for value in limits)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}={limits!r}: give two numbers, (from, to)") from None
+    if not (math.isfinite(first) and math.isfinite(last) and first < last):
+        raise InputError(f"{name}=({first:g}, {last:g}): two finite numbers, the smaller one first")
 
 
 def check_units(frequency: Any, omega_reference: Any, scale: Any) -> None:

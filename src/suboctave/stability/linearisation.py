@@ -8,13 +8,10 @@ exceeds the law's width the new ones lie between the nodes; the linear form has 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.group_force import GroupLaw
+from suboctave.harmonic.group_force import PackedLaws
 from suboctave.harmonic.quadrature import FEWEST, search_grid
 from suboctave.harmonic.sharp_nodes import singular_instants
 from suboctave.harmonic.state import BalanceState
@@ -25,7 +22,7 @@ from suboctave.stability.panels import closed_changes, lay_out, longest_panel
 
 #: a law that tells nothing of itself and needs this many samples per period is smooth over one radian
 _BLIND = 48.0
-_NO_PIECES, _NONE = np.zeros((0, 3)), np.zeros((2, 0))
+_NONE = np.zeros((2, 0))
 
 
 class Linearisation:
@@ -55,7 +52,7 @@ class Linearisation:
         self.acting = self.directions[: len(laws)] + own.left
         self.moving = True in balance.moving or any(nodal.own.moving for nodal in state.nodal)
         laws = laws + own.laws
-        self._laws = _gathered(laws)
+        self._laws = PackedLaws.of(laws) if own.laws else balance.packed_laws(state.values)[0]
         degree, finest = max(own.degree, self._laws.polynomial.shape[1] - 2), own.finest
         self.blind = own.blind
         for law in laws:
@@ -67,7 +64,6 @@ class Linearisation:
                     self.blind = True
                     finest = min(finest, _BLIND / (balance.samples[i] or FEWEST))
         self.varying = degree > 0
-        motions = state.motions + own.motions
         forces = np.concatenate((state.spectra_table[0], own.forces)) if own.forces else state.spectra_table[0]
         if state.basis.kept is not None:
             # the force at harmonics that are left out is unbalanced, like that beyond the highest
@@ -75,7 +71,7 @@ class Linearisation:
             forces[:, state.basis.left_out] = 0.0
         high = state.basis.harmonics
         grid = search_grid(high)
-        c = motions[0][None] if len(motions) == 1 else np.array(motions, dtype=complex).reshape(-1, high + 1)
+        motions = c = np.concatenate((state.motions, own.motions)) if own.motions else state.motions
         longest = min(longest_panel(c, degree), finest)
         passed = _NONE
         # singularities further away than that do not disturb a panel
@@ -85,9 +81,7 @@ class Linearisation:
             if len(law.points)
         ]
         found += [
-            singular_instants(
-                motion, law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy(), longest, grid.zr, grid.zi
-            )
+            singular_instants(motion, *law.told_places, longest, grid.zr, grid.zi)
             for law, motion in zip(laws, motions, strict=True)
             if len(law.smooth_steps)
         ]
@@ -162,35 +156,3 @@ class Linearisation:
                 law[g, 1] += f_v
         self._own.changed(self.path, change, law, self.stretch)
         return law, kick
-
-
-class _Laws(NamedTuple):
-    """The laws of all directions as arrays: what `panels.lay_out` is told of them."""
-
-    pieces: Array
-    owner: NDArray[np.int64]
-    polynomial: Array
-    steps: Array
-    step_owner: NDArray[np.int64]
-    line: Array
-
-
-def _gathered(laws: list[GroupLaw]) -> _Laws:
-    if len(laws) == 1:
-        law = laws[0]
-        owners = (np.zeros(len(part), dtype=np.int64) for part in (law.pieces, law.smooth_steps))
-        return _Laws(law.pieces, next(owners), law.polynomial[None], law.smooth_steps, next(owners), law.line[None])
-    polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
-    line = np.zeros((len(laws), 2))
-    for g, law in enumerate(laws):
-        polynomial[g, : len(law.polynomial)] = law.polynomial
-        line[g] = law.line
-    number = np.arange(len(laws))
-    return _Laws(
-        np.concatenate([_NO_PIECES] + [law.pieces for law in laws]),
-        np.repeat(number, [len(law.pieces) for law in laws]),
-        polynomial,
-        np.concatenate([_NO_PIECES] + [law.smooth_steps for law in laws]),
-        np.repeat(number, [len(law.smooth_steps) for law in laws]),
-        line,
-    )

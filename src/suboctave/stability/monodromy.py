@@ -28,6 +28,7 @@ from scipy.linalg import lapack
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState, length
+from suboctave.stability.closed import ClosedSingle
 from suboctave.stability.linearisation import Linearisation
 from suboctave.stability.magnus import BETWEEN, STEPS
 from suboctave.stability.nodes import NODES
@@ -51,25 +52,35 @@ def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetR
     corrected
         False: along the motion as it stands, as if it were exact; errors are then those of the propagation alone.
     """
+    motion = _linearised(state, corrected)
+    mu, shift, share = motion.multipliers(1.0)
+    sizes = np.abs(mu)
+    largest = max(1.0, float(sizes[0]))
+    distances = np.abs(1.0 - mu)
+    nearest = int(distances.argmin())
+    moved = float(shift[nearest]) / share if share > 0.0 else math.inf
+    if moved > _DOUBTFUL * distances[nearest]:
+        mu, shift, share = _beside_fold(motion, moved, shift)
+    # where the correction had to be cut, the motion is not near enough to a true one to say much
+    cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
+    least = (_PANELS if motion.varying else 0.0) + cut
+    return FloquetResult(mu, shift * (1.0 + cut) + least * largest)
+
+
+def _linearised(state: BalanceState, corrected: bool) -> _Motion:
+    if ClosedSingle.applies(state):
+        return ClosedSingle(state, not corrected, _LARGEST)
     along = Linearisation(state)
     if not corrected:
         along.law[:, 0] = 0.0
     mass, damping, stiffness = state.linear.equation_of_motion()
     parts = (mass, damping, stiffness)
-    motion = _Single(along, *parts) if len(mass) == 1 else _Several(along, *parts)
-    mu, shift, share = motion.multipliers(1.0)
-    largest = max(1.0, abs(mu[0]))
-    nearest = min(range(len(mu)), key=lambda i: abs(1.0 - mu[i]))
-    moved = shift[nearest] / share if share > 0.0 else math.inf
-    if moved > _DOUBTFUL * abs(1.0 - mu[nearest]):
-        mu, shift, share = _beside_fold(motion, moved, shift)
-    # where the correction had to be cut, the motion is not near enough to a true one to say much
-    cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
-    least = (_PANELS if along.varying else 0.0) + cut
-    return FloquetResult(mu, shift * (1.0 + cut) + least * largest)
+    return _Single(along, *parts) if len(mass) == 1 else _Several(along, *parts)
 
 
-def _beside_fold(motion: _Single | _Several, moved: float, shift: Array) -> tuple[ComplexArray, Array, float]:
+def _beside_fold(
+    motion: ClosedSingle | _Single | _Several, moved: float, shift: Array
+) -> tuple[ComplexArray, Array, float]:
     """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
 
     moved: shift of the multiplier nearest to +1 by the whole correction.
@@ -85,7 +96,7 @@ class _Single:
     """One degree of freedom: the multipliers are the roots of `mu^2 - trace mu + exp(-int c dt)`."""
 
     def __init__(self, along: Linearisation, mass: Array, damping: Array, stiffness: Array) -> None:
-        self.along = along
+        self.along, self.varying = along, along.varying
         linear = along.state.linear
         self.shape = np.array([linear.expand(direction)[0] for direction in along.directions], dtype=float)
         self.scale = 1.0 / along.state.rate
@@ -116,7 +127,7 @@ class _Several:
     """Several degrees of freedom."""
 
     def __init__(self, along: Linearisation, mass: Array, damping: Array, stiffness: Array) -> None:
-        self.along = along
+        self.along, self.varying = along, along.varying
         n, linear = len(mass), along.state.linear
         shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
         acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float).reshape(-1, n)
@@ -209,6 +220,9 @@ class _Several:
     def gap(self) -> float:
         """Distance to +1 of the nearest multiplier of the motion as it stands."""
         return float(np.abs(1.0 - np.linalg.eigvals(self.before)).min())
+
+
+_Motion = ClosedSingle | _Single | _Several
 
 
 def _vectors(matrix: Array) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.compiled import QUICK, kernel
+from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.stability.passages import depths, events_along, grown
 
@@ -270,13 +271,7 @@ def _filled(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, pane
             law[g, 3, j] = line[g, 1]
     for s in range(steps.shape[0]):
         g = step_owner[s]
-        point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
-        for j in range(total):
-            y = path[g, 0, j] - point
-            ratio = y / width
-            angle = math.atan(ratio)
-            law[g, 0, j] += k * (y * angle - 0.5 * width * math.log1p(ratio * ratio))
-            law[g, 3, j] += k * angle
+        add_step(path[g, 0], steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, law[g, 0], law[g, 3])
     for g in range(groups):
         for j in range(total):
             law[g, 1, j] += law[g, 3, j]

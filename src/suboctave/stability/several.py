@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.basis import Array
 from suboctave.stability.nodes import NODES, ORDER
 from suboctave.stability.series import FAST, PAST, TERMS, evaluate, growth, norm, series, shifted, through
@@ -143,7 +143,7 @@ def add(out, powers, j, value):
         out[i] += powers[i, j] * value
 
 
-@kernel(at_once=True)
+@kernel(QUICK)
 def march(
     stretch, scale, damping, left, right, base, kick, nodes, poly, matrices, steps, moving, forced,
     total, alone, rows, terms, plain,

@@ -1,7 +1,8 @@
 """Results as NetCDF files: written beside their place, synced and renamed; read back only if nothing has changed.
 
-One curve is the file's root group; a study has a group for each analysis. Every group carries a digest of its content
-in the attribute `digest`, so that damage is noticed even where HDF5 itself does not.
+One curve is the file's root group; a study has a group for each analysis, a diagram one inside it for each branch.
+Every group carries a digest of its content in the attribute `digest`, so that damage is noticed even where HDF5 itself
+does not.
 """
 
 from __future__ import annotations
@@ -145,7 +146,8 @@ def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
             )
         if found < 1:
             raise InputError(f"{source} states the unknown layout {found}: {_AGAIN}")
-        names = [name for name, item in file.items() if isinstance(item, h5py.Group)]
+        names: list[str] = []
+        file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Group) else None)
     groups = {}
     for name in ["", *names]:
         with xarray.open_dataset(source, group=name or None, engine="h5netcdf") as dataset:

@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.bifurcation.gaps import told_levels
 from suboctave.errors import InputError
 from suboctave.harmonic.element_force import force_along
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.coupled import reads
+from suboctave.model.sampling import told_levels
 from suboctave.store.layout import LAYOUT
 from suboctave.version import __version__
 

@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 from contextlib import AbstractContextManager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from suboctave.analysis import Branch, Results, Table, load
+from suboctave.analysis import BifurcationDiagram, Results, Table, load
+from suboctave.analysis.results import Result
 from suboctave.errors import InputError, suggest
 from suboctave.store import files
 from suboctave.study.file import Study, read_study
-from suboctave.study.runner import JOURNAL, Finished, Outcome, recovered, run_study
-from suboctave.study.screen import bar, console, print_branch, print_table, print_texts
+from suboctave.study.keeping import recovered
+from suboctave.study.runner import JOURNAL, Finished, Outcome, run_study
+from suboctave.study.screen import bar, console, print_result, print_texts
 from suboctave.study.steps import Step
 
 __all__ = ["check", "examples", "new", "run", "show"]
@@ -103,10 +106,8 @@ def _status(outcome: Outcome) -> int:
 
 def _print_finished(screen: Any, item: Finished) -> None:
     note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
-    if isinstance(item.result, Branch):
-        print_branch(screen, item.step.name, item.result, note)
-    elif item.result is not None:
-        print_table(screen, item.step.name, item.result, note)
+    if item.result is not None:
+        print_result(screen, item.step.name, item.result, note)
     else:
         screen.print(f"\n{item.step.name}", style="bold", markup=False, end="")
         screen.print(f": failed. {item.failure}", markup=False)
@@ -159,10 +160,7 @@ def show(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, as_jso
     for name, item in results.items():
         seconds = results.details.get(name, {}).get("seconds")
         note = f" in {seconds:.2f} s" if seconds is not None else ""
-        if isinstance(item, Branch):
-            print_branch(screen, name, item, note)
-        else:
-            print_table(screen, name, item, note)
+        print_result(screen, name, item, note)
     for file in written:
         screen.print(f"written: {file}", markup=False, soft_wrap=True)
 
@@ -180,13 +178,8 @@ def _csv(results: Results, folder: Path, overwrite: bool) -> list[Path]:
     jobs: list[tuple[Path, Any]] = []
     for name, item in results.items():
         jobs.append((folder / f"{name}.csv", item.to_csv))
-        if isinstance(item, Branch):
-            bifurcations = item
-
-            def events(path: Path, overwrite: bool, branch: Branch = bifurcations) -> Path:
-                return branch.to_csv(path, "bifurcations", overwrite)
-
-            jobs.append((folder / f"{name}_bifurcations.csv", events))
+        if not isinstance(item, Table):
+            jobs.append((folder / f"{name}_bifurcations.csv", partial(item.to_csv, what="bifurcations")))
     for path, _ in jobs:
         files.free_place(path, overwrite)
     return [write(path, overwrite=overwrite) for path, write in jobs]
@@ -232,8 +225,11 @@ def _show_journal(path: Path, as_json: bool) -> None:
         return
     screen = console()
     screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
-    rows = [[item.name, item.state, str(item.points), str(item.bifurcations)] for item in found]
-    print_texts(screen, ("analysis", "state", "points", "bifurcations"), rows, left=("analysis", "state"))
+    rows = [
+        [item.name, item.state, str(item.points), str(item.bifurcations), str(item.branches or "")] for item in found
+    ]
+    names = ("analysis", "state", "points", "bifurcations", "branches")
+    print_texts(screen, names, rows, left=("analysis", "state"))
     for item in found:
         if item.events:
             screen.print(f"{item.name}, so far", style="bold", markup=False)
@@ -243,7 +239,16 @@ def _show_journal(path: Path, as_json: bool) -> None:
         screen.print("its last record is torn and is left out", markup=False)
 
 
-def _result(item: Branch | Table) -> dict[str, Any]:
+def _result(item: Result) -> dict[str, Any]:
+    if isinstance(item, BifurcationDiagram):
+        branches = []
+        for node in item:
+            parent = item.parent(node)
+            place: dict[str, Any] = {"branch": node.number, "label": node.label, "depth": node.depth}
+            place |= {"period": node.branch.nu, "parent": None if parent is None else parent.number}
+            place["not_followed"] = [{"kind": b.kind, "omega": b.omega, "reason": why} for b, why in node.failures]
+            branches.append(place | _result(node.branch))
+        return {"stopped": item.stopped, "branches": branches}
     if isinstance(item, Table):
         return {"title": item.title, "rows": len(item), "columns": {n: _listed(c) for n, c in item.columns.items()}}
     events = item.bifurcations_frame().to_dict("records")

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.analysis import Branch
+from suboctave.analysis import BifurcationDiagram, Branch
 from suboctave.analysis.contacts import check_element, gapped_elements
-from suboctave.analysis.tracked_branch import TrackedBranch
+from suboctave.analysis.junction import period_name
+from suboctave.analysis.results import Result
+from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_response, plot_space
 from suboctave.pictures.style import size_in_inches
 from suboctave.study.steps.base import Complaint
 
-__all__ = ["CURVE_FIGURES", "BoundaryFigure", "CurveFigure", "FigureSection", "SpaceFigure"]
+__all__ = ["CURVE_FIGURES", "BoundaryFigure", "CurveFigure", "FigureSection", "SpaceFigure", "branches_of"]
 
 #: the curves that a study gives, by name, with the two parameters in which bifurcations were tracked, else None
 Drawable = Mapping[str, tuple[str, str] | None]
@@ -49,7 +51,7 @@ class CurveFigure(BaseModel):
     @property
     def view(self) -> View:
         """Quantity and units; InputError where they do not go together."""
-        return View(**{field.name: getattr(self, field.name) for field in fields(View)})
+        return View(**{field.name: getattr(self, field.name, None) for field in fields(View)})
 
     @property
     def texts(self) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -64,7 +66,7 @@ class CurveFigure(BaseModel):
         """The analyses that it shows."""
         return self.analyses or list(names)
 
-    def check(self, curves: Drawable, system: System | None) -> Iterator[Complaint]:
+    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
         for i, name in enumerate(self.analyses):
             if name not in curves:
@@ -83,6 +85,10 @@ class CurveFigure(BaseModel):
             size_in_inches(self.size)
         except InputError as error:
             yield ("size",), str(error)
+        known = [*KINDS, *events]
+        for i, kind in enumerate(getattr(self, "marks", None) or ()):
+            if kind not in known:
+                yield ("marks", i), f"neither a kind nor an event{suggest(kind, known)}"
         try:
             view = self.view
         except InputError as error:
@@ -90,22 +96,50 @@ class CurveFigure(BaseModel):
         else:
             yield from _not_in(view, system)
 
-    def draw(self, curves: Mapping[str, Branch], path: Path) -> bool:
+    def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where no analysis that it shows gave anything."""
-        planes = {name: branch.names if isinstance(branch, TrackedBranch) else None for name, branch in curves.items()}
+        curves = {name: found for name, item in results.items() if (found := branches_of(item))}
+        planes = {name: getattr(item, "names", None) for name, item in results.items() if _is_curve(item)}
         every = self.drawn(planes)
-        there = [name for name in every if name in curves and len(curves[name])]
+        there = [name for name in every if name in curves]
         if not there:
             return False
-        readings = [] if self.view.variable == "amplitude" else [self.view.variable]
-        labels = getattr(self, "labels", None)
-        named = None if labels is None else [labels[every.index(name)] for name in there]
-        self.drawing([curves[name].to_xarray(readings=readings) for name in there], path, named)
+        view = self.view
+        readings = [] if view.variable == "amplitude" else [view.variable]
+        labels: Sequence[str] | None = None
+        alone = results[there[0]] if len(there) == 1 else None
+        if getattr(self, "labels", None) is not None:
+            told = {name: self.labels[every.index(name)] for name in there}
+            labels = [label for name in there for label in _labels(results[name], curves[name], told[name])]
+        elif isinstance(alone, BifurcationDiagram):
+            labels = alone.legend
+        if isinstance(alone, BifurcationDiagram) and view.marks is None:
+            view = replace(view, marks=alone.marks)
+        datasets = [branch.to_xarray(readings=readings) for name in there for branch in curves[name]]
+        self.drawing(datasets, path, labels, view)
         return True
 
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None) -> None:
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """Draw the datasets of its curves."""
         raise TypeError(f"{type(self).__name__} does not say how it is drawn")
+
+
+def branches_of(item: Result) -> list[Branch]:
+    """The branches of a result that can be drawn."""
+    if isinstance(item, BifurcationDiagram):
+        return [branch for branch in item.branches if len(branch)]
+    return [item] if isinstance(item, Branch) and len(item) else []
+
+
+def _is_curve(item: Result) -> bool:
+    return isinstance(item, Branch | BifurcationDiagram)
+
+
+def _labels(item: Result, branches: Sequence[Branch], label: str) -> list[str]:
+    """The label of a curve; those of a diagram's branches tell their periods, too."""
+    if isinstance(item, BifurcationDiagram):
+        return [f"{label}, {period_name(branch.nu)}" for branch in branches]
+    return [label]
 
 
 class FigureSection(CurveFigure):
@@ -113,21 +147,24 @@ class FigureSection(CurveFigure):
 
     kind: str = "response"
     labels: list[str] | None = None
+    xlim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    ylim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    marks: list[str] | None = None
 
     def drawn(self, names: Drawable) -> list[str]:
         """The analyses that it shows: all that are no curves of bifurcations, unless told."""
         return self.analyses or [name for name, plane in names.items() if plane is None] or list(names)
 
-    def check(self, curves: Drawable, system: System | None) -> Iterator[Complaint]:
+    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from super().check(curves, system)
+        yield from super().check(curves, system, events)
         for i, name in enumerate(self.analyses):
             if curves.get(name) is not None and self.x is None:
                 yield ("analyses", i), f'{name!r} is a curve of bifurcations: kind = "boundary" draws it, or give x'
 
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None) -> None:
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """See `CurveFigure.drawing`."""
-        plot_response(datasets, path, x=self.x, labels=labels, title=self.title, size=self.size, view=self.view)
+        plot_response(datasets, path, x=self.x, labels=labels, title=self.title, size=self.size, view=view)
 
 
 class BoundaryFigure(CurveFigure):
@@ -136,6 +173,9 @@ class BoundaryFigure(CurveFigure):
     kind: Literal["boundary"]
     y: str | None = None
     labels: list[str] | None = None
+    xlim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    ylim: list[float] | None = Field(default=None, min_length=2, max_length=2)
+    marks: list[str] | None = None
 
     @property
     def projected(self) -> bool:
@@ -146,9 +186,9 @@ class BoundaryFigure(CurveFigure):
         """The analyses that it shows: all curves of bifurcations, unless told."""
         return self.analyses or [name for name, plane in names.items() if plane is not None]
 
-    def check(self, curves: Drawable, system: System | None) -> Iterator[Complaint]:
+    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from super().check(curves, system)
+        yield from super().check(curves, system, events)
         tracked = [name for name, plane in curves.items() if plane is not None]
         if curves and not tracked:
             yield (), "there is no analysis of the type 'track', whose curves it would show"
@@ -167,10 +207,10 @@ class BoundaryFigure(CurveFigure):
             if plane is not None and given not in plane:
                 yield (key,), f"is not free on these curves{suggest(str(given), plane)}; else give x and y"
 
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None) -> None:
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """See `CurveFigure.drawing`."""
         axes: dict[str, Any] = {"x": self.x, "y": self.y, "projected": self.projected}
-        plot_boundaries(datasets, path, **axes, labels=labels, title=self.title, size=self.size, view=self.view)
+        plot_boundaries(datasets, path, **axes, labels=labels, title=self.title, size=self.size, view=view)
 
 
 class SpaceFigure(CurveFigure):
@@ -183,9 +223,9 @@ class SpaceFigure(CurveFigure):
     elevation: float = 24.0
     azimuth: float = -58.0
 
-    def check(self, curves: Drawable, system: System | None) -> Iterator[Complaint]:
+    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from super().check(curves, system)
+        yield from super().check(curves, system, events)
         planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
         yield from _same(self.x, self.y)
         if self.x is not None and self.y is not None:
@@ -195,10 +235,17 @@ class SpaceFigure(CurveFigure):
         elif curves and not planes and self.y is None:
             yield ("y",), "is missing: the parameter into the depth, which no tracked curve tells here"
 
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None) -> None:
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """See `CurveFigure.drawing`."""
         own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
-        plot_space(datasets, path, **own, **{field.name: getattr(self, field.name) for field in fields(View)})
+        plot_space(
+            datasets,
+            path,
+            **own,
+            **{
+                field.name: getattr(view, field.name) for field in fields(View) if field.name in type(self).model_fields
+            },
+        )
 
 
 def _same(x: str | None, y: str | None) -> Iterator[Complaint]:

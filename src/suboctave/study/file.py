@@ -21,7 +21,7 @@ from suboctave.study.lines import Lines
 from suboctave.study.mistakes import Mistake, Mistakes, StudyError
 from suboctave.study.motion_figures import MOTION_FIGURES, MotionFigure
 from suboctave.study.outputs import Outputs, check_outputs
-from suboctave.study.steps import STEPS, Step, Surroundings
+from suboctave.study.steps import STEPS, Known, Step, Surroundings
 from suboctave.study.system import SystemSection, make_system, overridden
 from suboctave.version import __version__
 
@@ -189,6 +189,7 @@ def _steps(
 ) -> list[Step | None]:
     steps: list[Step | None] = []
     before: dict[str, type[Step]] = {}
+    known: dict[str, Known] = {}
     names: set[str] = set()
     for index, given in enumerate(analyses):
         place = ("analyses", index)
@@ -204,8 +205,13 @@ def _steps(
             step = _validated(STEPS[kind], named, place, mistakes)
             steps.append(step)
             if step is not None and system is not None:
-                for where, text in _checked(step, system, before, mistakes, place, allow_code):
+                around = _around(step, system, before, known, mistakes, place, allow_code)
+                wrong = list(_checked(step, around)) if around is not None else []
+                for where, text in wrong:
                     mistakes.add((*place, *(p for p in where if p != "")), text)
+                told = step.known(around) if around is not None and not wrong else None
+                if told is not None:
+                    known[step.name] = told
         name = given.get("name", kind)
         if not isinstance(name, str):
             continue
@@ -221,19 +227,22 @@ def _steps(
     return steps
 
 
-def _checked(
+def _around(
     step: Step,
     system: System,
     before: Mapping[str, type[Step]],
+    known: Mapping[str, Known],
     mistakes: Mistakes,
     place: tuple[str | int, ...],
     allow_code: bool,
-) -> Iterator[tuple[tuple[str | int, ...], str]]:
+) -> Surroundings | None:
     here = overridden(system, step.parameters, (*place, "parameters"), mistakes)
-    if here is None:
-        return
+    return None if here is None else Surroundings(here, before, allow_code, known)
+
+
+def _checked(step: Step, around: Surroundings) -> Iterator[tuple[tuple[str | int, ...], str]]:
     try:
-        yield from step.check(Surroundings(here, before, allow_code))
+        yield from step.check(around)
     except InputError as error:
         yield (), str(error)
 

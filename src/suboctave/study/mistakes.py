@@ -142,7 +142,8 @@ def _in_words(item: Any, known: list[str]) -> str:
         bound = "at least" if kind == "too_short" else "at most"
         return f"must have {bound} {wanted} item{'s' * (wanted != 1)}, not {about['actual_length']}"
     if kind == "union_tag_not_found":
-        return f"must be a text, a table or a list, not {given!r}"
+        ways = "a text or a table" if "name_or_table" in str(item["ctx"]) else "a text, a table or a list"
+        return f"must be {ways}, not {given!r}"
     if kind == "string_too_short":
         return "must not be empty"
     said = _WORDS.get(kind, said)

@@ -8,25 +8,31 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from suboctave.analysis import Branch
+from suboctave.analysis import BifurcationDiagram, Branch
 from suboctave.analysis.contacts import check_element
+from suboctave.analysis.results import Result
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 from suboctave.pictures import plot_history, plot_phase, plot_spectrum
 from suboctave.pictures.motions import DERIVATIVES, MotionView
 from suboctave.pictures.style import size_in_inches
 from suboctave.store.motions import motion_datasets
-from suboctave.study.steps.base import Complaint, Context, Motion, Surroundings, check_motion, chosen
+from suboctave.study.steps.base import (
+    Complaint,
+    Motion,
+    Step,
+    Surroundings,
+    check_branch,
+    check_motion,
+    chosen,
+    chosen_branch,
+    name_or_table,
+)
 
 __all__ = ["MOTION_FIGURES", "MotionFigure"]
 
 
-def _way(given: Any) -> str | None:
-    """Which way a motion is given, so that a mistake in it is told once, as one in that way."""
-    return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Motion) else None
-
-
-_Motion = Annotated[Annotated[str, Tag("name")] | Annotated[Motion, Tag("table")], Discriminator(_way)]
+_Motion = Annotated[Annotated[str, Tag("name")] | Annotated[Motion, Tag("table")], Discriminator(name_or_table)]
 #: keys of a figure that are no options of what draws it
 _OWN = {"kind", "file", "motions"}
 
@@ -67,14 +73,18 @@ class MotionFigure(BaseModel):
         for i, label in enumerate(self.labels or ()):
             yield ("labels", i), label
 
-    def check(self, curves: Sequence[str], system: System | None) -> Iterator[Complaint]:
+    def check(self, steps: Mapping[str, type[Step]], system: System | None) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
+        curves = [name for name, step in steps.items() if step.gives_branch or step.gives_diagram]
         for i, motion in enumerate(self.chosen):
             key: tuple[str | int, ...] = ("motions", i)
             if motion.analysis not in curves:
                 yield key, f"no analysis {motion.analysis!r} gives a curve{suggest(motion.analysis, curves)}"
+            elif system is not None:
+                named = key if isinstance(self.motions[i], str) else (*key, "analysis")
+                yield from check_branch(motion, named, Surroundings(system, steps))
             if system is not None:
-                yield from check_motion(motion, key, Surroundings(system, {}))
+                yield from check_motion(motion, key, Surroundings(system, steps))
         if self.labels is not None and len(self.labels) != len(self.motions):
             yield ("labels",), f"{len(self.labels)} labels for {len(self.motions)} motions"
         if self.size is not None:
@@ -99,20 +109,21 @@ class MotionFigure(BaseModel):
             except InputError as error:
                 yield ("element",), str(error)
 
-    def draw(self, curves: Mapping[str, Branch], path: Path) -> bool:
+    def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where an analysis that it shows gave nothing, or was interrupted before the motion.
 
         Raises InputError where a finished branch has no such motion.
         """
         found = []
         for motion in self.chosen:
-            branch = curves.get(motion.analysis)
-            if branch is None or not len(branch):
+            result = results.get(motion.analysis)
+            if result is None or not len(result):
                 return False
             try:
-                item = chosen(motion, Context(branch.system, curves))
+                branch = chosen_branch(motion, results)
+                item = chosen(motion, results)
             except InputError:
-                if branch.ended.startswith("interrupted"):
+                if _interrupted(result):
                     return False
                 raise
             element = getattr(self, "element", None)
@@ -121,6 +132,12 @@ class MotionFigure(BaseModel):
         options = {name: getattr(self, name) for name in type(self).model_fields if name not in _OWN | {"dof"}}
         type(self).plot(found, path, **options)
         return True
+
+
+def _interrupted(result: Result) -> bool:
+    if isinstance(result, BifurcationDiagram):
+        return result.interrupted
+    return isinstance(result, Branch) and result.ended.startswith("interrupted")
 
 
 class PhaseFigure(MotionFigure):

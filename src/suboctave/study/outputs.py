@@ -10,13 +10,14 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.analysis import Branch, Results, Table
+from suboctave.analysis import BifurcationDiagram, Branch, Results
+from suboctave.analysis.results import Result
 from suboctave.errors import InputError
 from suboctave.model.system import System
 from suboctave.pictures.saving import SUFFIXES
 from suboctave.pictures.style import check_text
 from suboctave.store import files
-from suboctave.study.curve_figures import CurveFigure, FigureSection
+from suboctave.study.curve_figures import CurveFigure, FigureSection, branches_of
 from suboctave.study.motion_figures import MotionFigure
 from suboctave.study.steps import Step
 
@@ -44,8 +45,9 @@ def check_outputs(
     outputs: Outputs, steps: Sequence[Step], system: System | None
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """What is wrong with the outputs, before any work: key and message."""
-    drawable = {step.name: step.plane for step in steps if step.gives_branch}
-    curves = list(drawable)
+    drawable = {step.name: step.plane for step in steps if step.gives_branch or step.gives_diagram}
+    events = [event.name for step in steps for event in getattr(step, "events", ())]
+    kinds = {step.name: type(step) for step in steps}
     names: list[tuple[tuple[str | int, ...], str]] = [(("results",), outputs.results)]
     yield from _wrong_suffix(("results",), outputs.results, (".nc",))
     if outputs.html is not None:
@@ -59,9 +61,9 @@ def check_outputs(
         yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
         yield from _wrong_texts(figure, key)
         if isinstance(figure, MotionFigure):
-            yield from (((*key, *where), text) for where, text in figure.check(curves, system))
+            yield from (((*key, *where), text) for where, text in figure.check(kinds, system))
             continue
-        yield from (((*key, *where), text) for where, text in figure.check(drawable, system))
+        yield from (((*key, *where), text) for where, text in figure.check(drawable, system, events))
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
@@ -105,7 +107,7 @@ def csv_names(steps: Sequence[Step]) -> list[str]:
     names = []
     for step in steps:
         names.append(f"{step.name}.csv")
-        if step.gives_branch:
+        if step.gives_branch or step.gives_diagram:
             names.append(f"{step.name}_bifurcations.csv")
     return names
 
@@ -127,37 +129,33 @@ def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) 
     if outputs.csv:
         for name, item in results.items():
             yield from _tables(name, item, folder)
-    curves = results.branches
     missing = []
     for index, figure in enumerate(outputs.figures):
-        if isinstance(figure, MotionFigure):
-            try:
-                if figure.draw(curves, folder / figure.file):
-                    yield folder / figure.file
-            except InputError as error:
-                missing.append(f"outputs.figures[{index}] is not drawn: {error}")
-            continue
+        path = folder / figure.file
         try:
-            if figure.draw(curves, folder / figure.file):
-                yield folder / figure.file
+            if figure.draw(results, path):
+                yield path
         except InputError as error:
             missing.append(f"outputs.figures[{index}] is not drawn: {error}")
-    if outputs.html is not None and curves:
+    if outputs.html is not None and any(branches_of(item) for item in results.values()):
         path = folder / outputs.html
         report: Any = importlib.import_module(_REPORT)
-        datasets: Mapping[str, Any] = {
-            name: item.to_xarray().assign_attrs(seconds=results.details.get(name, {}).get("seconds", float("nan")))
-            for name, item in results.items()
-            if len(item)
-        }
-        report.write_report(datasets, path, title=title or "Study", overwrite=True)
+        shown = {name: _shown(item, results.details.get(name, {})) for name, item in results.items() if len(item)}
+        report.write_report(shown, path, title=title or "Study", overwrite=True)
         yield path
     if missing:
         rest = "everything else is written; change the figure, and go on with --resume"
         raise InputError("; ".join([*missing, rest]))
 
 
-def _tables(name: str, item: Branch | Table, folder: Path) -> Iterator[Path]:
+def _shown(item: Result, details: Mapping[str, Any]) -> Any:
+    """What the report page is told of a result."""
+    if isinstance(item, BifurcationDiagram):
+        return item
+    return item.to_xarray().assign_attrs(seconds=details.get("seconds", float("nan")))
+
+
+def _tables(name: str, item: Result, folder: Path) -> Iterator[Path]:
     yield item.to_csv(files.free_place(folder / f"{name}.csv", True), overwrite=True)
-    if isinstance(item, Branch):
+    if isinstance(item, Branch | BifurcationDiagram):
         yield item.to_csv(folder / f"{name}_bifurcations.csv", "bifurcations", overwrite=True)

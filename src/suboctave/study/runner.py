@@ -7,26 +7,25 @@ over only if version, system, its arguments and those of the analyses it starts 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from suboctave.analysis import Branch, Results, Table
-from suboctave.analysis.results import from_dataset, to_dataset
+from suboctave.analysis import BifurcationDiagram, Branch, Results
+from suboctave.analysis.results import Result
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.store.journal import Journal, Record, read_journal
+from suboctave.store.journal import Journal, read_journal
 from suboctave.study.file import Study
+from suboctave.study.keeping import BranchKeeper, Noting, finished, keep
 from suboctave.study.outputs import places, write_outputs
 from suboctave.study.steps import Context, Step
 
-__all__ = ["JOURNAL", "Finished", "Outcome", "Recovered", "recovered", "run_study"]
+__all__ = ["JOURNAL", "Finished", "Outcome", "run_study"]
 
 JOURNAL = "unfinished.journal"
-#: seconds between records of points of an analysis that is under way
-_OFTEN = 1.0
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Finished:
     """An analysis that is over: its result (None if it has none), the seconds it took, and what is to be said of it."""
 
     step: Step
-    result: Branch | Table | None
+    result: Result | None
     seconds: float
     reused: bool = False
     failure: str = ""
@@ -159,13 +158,12 @@ def _run(
     watch: Watch | None,
     said: Callable[[Finished], None] | None,
 ) -> Outcome:
-    kept = {r.said["key"]: r for r in journal.records if r.kind == "analysis"}
     journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
     outcome = Outcome()
-    results: dict[str, Branch | Table] = {}
+    results: dict[str, Result] = {}
     details: dict[str, dict[str, Any]] = {}
     for step in study.steps:
-        done, interrupted = _one(study, step, results, kept, journal, watch)
+        done, interrupted = _one(study, step, results, journal, watch)
         if done is not None:
             outcome.finished.append(done)
             if done.result is not None:
@@ -197,27 +195,29 @@ def _run(
 def _one(
     study: Study,
     step: Step,
-    results: dict[str, Branch | Table],
-    kept: dict[str, Record],
+    results: dict[str, Result],
     journal: Journal,
     watch: Watch | None,
 ) -> tuple[Finished | None, bool]:
     """One analysis: what came of it, and whether the user stopped it."""
     key = study.key_of(step)
-    if key in kept:
-        result, said = from_dataset(kept[key].dataset, study.allow_code)
+    kept = finished(journal.records, key, study.allow_code)
+    if kept is not None:
+        result, said = kept
         return Finished(step, result, float(said.get("seconds", 0.0)), reused=True), False
     missing = [name for _, name in step.needs() if name not in results]
     if missing:
         return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), False
     begin = perf_counter()
     interrupted = False
-    outcome: Branch | Table | None = None
+    outcome: Result | None = None
     failure, wrong = "", False
-    with (watch or _silent)(step) as progress, _noting(journal, step, progress) as noted:
+    with (watch or _silent)(step) as progress:
         try:
             system = study.system_of(step)
-            outcome = step.run(Context(system, results, noted, study.allow_code))
+            keeper = BranchKeeper(journal, step, key, study.allow_code)
+            noted = Noting(journal, step, progress)
+            outcome = step.run(Context(system, results, noted, study.allow_code, keeper))
         except KeyboardInterrupt:
             interrupted = True
         except ConvergenceError as error:
@@ -229,8 +229,10 @@ def _one(
     seconds = perf_counter() - begin
     if isinstance(outcome, Branch) and outcome.ended.startswith("interrupted"):
         interrupted = True
+    if isinstance(outcome, BifurcationDiagram) and outcome.interrupted:
+        interrupted = True
     if outcome is not None and not interrupted:
-        journal.append("analysis", {"name": step.name, "key": key}, to_dataset(outcome, {"seconds": seconds}))
+        keep(journal, step.name, key, outcome, seconds)
     if outcome is None and interrupted:
         return None, True
     return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interrupted
@@ -238,71 +240,3 @@ def _one(
 
 def _silent(step: Step) -> AbstractContextManager[Any]:
     return nullcontext(None)
-
-
-@contextmanager
-def _noting(journal: Journal, step: Step, progress: Any) -> Iterator[Any]:
-    """A `progress=` that passes reports on and writes what has been found to the journal now and then."""
-    yield _Noting(journal, step, progress)
-
-
-class _Noting:
-    def __init__(self, journal: Journal, step: Step, progress: Any) -> None:
-        self.journal, self.step, self.progress = journal, step, progress
-        self.since = perf_counter()
-        self.points = self.events = 0
-
-    def __call__(self, share: float, where: str) -> None:
-        if self.progress is not None:
-            self.progress(share, where)
-
-    def found(self, trace: Any) -> None:
-        """Called at each point of a curve with what has been found on it so far."""
-        now = perf_counter()
-        events = len(trace.bifurcations)
-        if now - self.since < _OFTEN and events == self.events:
-            return
-        self.since = now
-        points, located = trace.points[self.points :], trace.bifurcations[self.events :]
-        said = {
-            "name": self.step.name,
-            "from": self.points,
-            "omega": [point.orbit.omega for point in points],
-            "values": [dict(point.orbit.values) for point in points],
-            "coefficients": [point.orbit.coefficients.tolist() for point in points],
-            "stable": [bool(point.floquet.stable) for point in points],
-            "bifurcations": [[b.kind, b.omega, dict(b.parameters), b.amplitude] for b in located],
-        }
-        self.points, self.events = len(trace.points), events
-        self.journal.append("points", said, sync=False)
-
-
-@dataclass
-class Recovered:
-    """What a journal holds of one analysis; `events` are (kind, omega, amplitude) of one that had not finished."""
-
-    name: str
-    state: str = "begun"
-    points: int = 0
-    bifurcations: int = 0
-    events: list[tuple[str, float, float]] = field(default_factory=list)
-
-
-def recovered(path: str | Path) -> tuple[list[Recovered], bool]:
-    """What a journal holds, analysis by analysis, and whether its end was torn."""
-    records, _, torn = read_journal(path)
-    found: dict[str, Recovered] = {}
-    for record in records:
-        name = str(record.said.get("name", ""))
-        if record.kind == "points":
-            if not record.said["from"]:
-                found[name] = Recovered(name)
-            item = found.setdefault(name, Recovered(name))
-            item.points += len(record.said["omega"])
-            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.said["bifurcations"]]
-            item.bifurcations = len(item.events)
-        elif record.kind == "analysis":
-            sizes = record.dataset.sizes
-            count = int(sizes.get("point", sizes.get("row", 0)))
-            found[name] = Recovered(name, "finished", count, int(sizes.get("event", 0)))
-    return list(found.values()), torn

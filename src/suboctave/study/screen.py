@@ -8,16 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.analysis import Branch, Table
+from suboctave.analysis import BifurcationDiagram, Branch, Table
+from suboctave.analysis.results import Result
+from suboctave.analysis.tree_text import tree_text
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS
 from suboctave.store.layout import branch_dataset
 from suboctave.study.demo import event_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["bar", "console", "print_branch", "print_events", "print_table", "print_texts"]
+__all__ = [
+    "bar",
+    "console",
+    "print_branch",
+    "print_diagram",
+    "print_events",
+    "print_result",
+    "print_table",
+    "print_texts",
+]
 
 WIDTH = 80
+#: bifurcations of a diagram up to which all of them are listed below its tree
+_LISTED = 40
 
 
 def console(quiet: bool = False) -> Console:
@@ -83,6 +97,16 @@ def print_texts(out: Console, names: Sequence[str], lines: Sequence[Sequence[str
     out.print(table)
 
 
+def print_result(out: Console, name: str, result: Result, note: str = "") -> None:
+    """A branch, a diagram or a table, each in its way."""
+    if isinstance(result, Branch):
+        print_branch(out, name, result, note)
+    elif isinstance(result, BifurcationDiagram):
+        print_diagram(out, name, result, note)
+    else:
+        print_table(out, name, result, note)
+
+
 def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> None:
     """A branch: its bifurcations, how many points, why it ended, what is to be said."""
     out.print(f"\n{name}", style="bold", markup=False, end="")
@@ -102,6 +126,29 @@ def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> Non
     out.print(f"{len(branch)} points, {unstable} unstable{note}; {branch.ended}.", markup=False)
     for warning in branch.warnings:
         out.print(f"note: {warning}", markup=False)
+
+
+def print_diagram(out: Console, name: str, diagram: BifurcationDiagram, note: str = "") -> None:
+    """A diagram: the tree of its branches, and their bifurcations as a table where these are not too many."""
+    out.print(f"\n{name}", style="bold", markup=False, end="")
+    count = f"{len(diagram)} branch{'es' * (len(diagram) != 1)}"
+    out.print(f": along {diagram.root.branch.name}, {count}{note}\n", markup=False)
+    out.print(tree_text(diagram, out.width, head=False), markup=False, soft_wrap=True)
+    lines = [
+        (str(node.number), *line)
+        for node in diagram
+        if len(node.branch)
+        for line in event_lines(branch_dataset(node.branch))
+        if line[0] not in CONTACT_KINDS
+    ]
+    if len(lines) > _LISTED:
+        out.print(f"{len(lines)} bifurcations: --csv, or csv = true in [outputs], writes them all", markup=False)
+    elif lines:
+        names = ("branch", "kind", "omega", "max |x|", "multiplier", "residual")
+        print_texts(out, names, lines, left=("kind",))
+    for node in diagram:
+        for warning in node.branch.warnings:
+            out.print(f"note on branch {node.number}: {warning}", markup=False)
 
 
 def print_table(out: Console, name: str, table: Table, note: str = "") -> None:

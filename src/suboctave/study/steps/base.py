@@ -11,14 +11,33 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from suboctave.analysis import Branch, Table
+from suboctave.analysis import BifurcationDiagram, Branch
+from suboctave.analysis.diagram import Keeper
+from suboctave.analysis.results import Result
 from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 
-__all__ = ["STEPS", "Context", "Range", "Step", "Surroundings", "chosen", "chosen_branch"]
+__all__ = [
+    "STEPS",
+    "Context",
+    "Curve",
+    "Known",
+    "Motion",
+    "Named",
+    "Range",
+    "Step",
+    "Surroundings",
+    "as_curve",
+    "check_branch",
+    "check_motion",
+    "chosen",
+    "chosen_branch",
+    "key_of_curve",
+    "name_or_table",
+]
 
 #: the kinds of steps, by name
 STEPS: dict[str, type[Step]] = {}
@@ -29,23 +48,38 @@ Complaint = tuple[tuple[str | int, ...], str]
 
 
 @dataclass(frozen=True)
+class Known:
+    """What is known of the motions of an analysis before it runs: their free parameter, the values of the others."""
+
+    free: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Surroundings:
-    """What is known before a study runs: the system as this step sees it, and the kinds of the steps before it."""
+    """What is known before a study runs: the system as this step sees it, and the kinds of the steps before it.
+
+    `known` has an entry for each of these steps that follows a curve and is in order.
+    """
 
     system: System
     before: Mapping[str, type[Step]]
     allow_code: bool = False
+    known: Mapping[str, Known] = field(default_factory=dict)
 
 
 @dataclass
 class Context:
-    """What a step finds when it runs: its system, the results of the steps before it, somebody to report to."""
+    """What a step finds when it runs: its system, the results of the steps before it, somebody to report to.
+
+    `keeper` keeps the branches of a diagram as they are found.
+    """
 
     system: System
-    results: Mapping[str, Branch | Table]
+    results: Mapping[str, Result]
     progress: Any = None
     allow_code: bool = False
-    notes: list[str] = field(default_factory=list)
+    keeper: Keeper | None = None
 
 
 class Step(BaseModel):
@@ -55,6 +89,7 @@ class Step(BaseModel):
 
     kind: ClassVar[str] = ""
     gives_branch: ClassVar[bool] = False
+    gives_diagram: ClassVar[bool] = False
 
     name: str = Field(min_length=1)
     type: str
@@ -79,7 +114,11 @@ class Step(BaseModel):
         """What is wrong with the arguments, before any work."""
         yield from ()
 
-    def run(self, context: Context) -> Branch | Table:
+    def known(self, around: Surroundings) -> Known | None:
+        """What is known of its motions before it runs; None where that is nothing, or they are none."""
+        return None
+
+    def run(self, context: Context) -> Result:
         """The result. Raises InputError or ConvergenceError; on Ctrl-C what was computed comes back, or nothing."""
         raise TypeError(f"{type(self).__name__} does not say how it runs")
 
@@ -101,16 +140,49 @@ def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:
 
 
 # ------------------------------------------------------------------------------------------------- motions of a branch
-class Motion(BaseModel):
-    """One motion of an earlier branch: a point, a bifurcation of a kind, or the point nearest to given values."""
+class Curve(BaseModel):
+    """A branch of an earlier analysis; of a diagram one of its branches, by number or by how its label begins."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     analysis: str
+    branch: int | None = Field(default=None, ge=0)
+    label: str | None = Field(default=None, min_length=1)
+
+    @property
+    def said(self) -> str:
+        """How messages and titles name it."""
+        if self.label is not None:
+            return f"{self.analysis}, branch {self.label!r}"
+        return self.analysis if self.branch is None else f"{self.analysis}, branch {self.branch}"
+
+
+class Motion(Curve):
+    """One motion of an earlier branch: a point, a bifurcation of a kind, or the point nearest to given values."""
+
     point: int | None = None
     bifurcation: str | None = None
     index: int = 0
     nearest: dict[str, float] | None = None
+
+
+def name_or_table(given: Any) -> str | None:
+    """Which way a branch or a motion is given, so that a mistake in it is told once, as one in that way."""
+    return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Curve) else None
+
+
+#: a branch as a step names it: the name of an analysis alone, or with one of a diagram's branches
+Named = Annotated[Annotated[str, Tag("name")] | Annotated[Curve, Tag("table")], Discriminator(name_or_table)]
+
+
+def as_curve(given: str | Curve) -> Curve:
+    """A branch by name."""
+    return Curve(analysis=given) if isinstance(given, str) else given
+
+
+def key_of_curve(given: str | Curve, key: str) -> tuple[str | int, ...]:
+    """The key at which the name of the analysis stands."""
+    return (key,) if isinstance(given, str) else (key, "analysis")
 
 
 def check_motion(motion: Motion, key: tuple[str | int, ...], around: Surroundings) -> Iterator[Complaint]:
@@ -127,32 +199,56 @@ def check_motion(motion: Motion, key: tuple[str | int, ...], around: Surrounding
             yield (*key, "nearest", name), f"neither omega, amplitude nor a parameter{suggest(name, known)}"
 
 
-def check_branch(name: str, key: tuple[str | int, ...], around: Surroundings) -> Iterator[Complaint]:
-    """Refuse the name of an analysis that is not there, not before this one, or gives no branch."""
+def check_branch(curve: Curve, key: tuple[str | int, ...], around: Surroundings) -> Iterator[Complaint]:
+    """Refuse an analysis that is not there, not before this one, or gives no branch, and a choice that says too little.
+
+    `key` is that of the name of the analysis.
+    """
+    name = curve.analysis
     if name not in around.before:
         yield key, f"there is no analysis {name!r} before this one{suggest(name, around.before)}"
-    elif not around.before[name].gives_branch:
+        return
+    step = around.before[name]
+    choice = curve.branch is not None, curve.label is not None
+    if step.gives_diagram:
+        if all(choice):
+            yield key, "choose a branch of the diagram by its number or by its label, not by both"
+        elif not any(choice):
+            yield (
+                key,
+                f"the analysis {name!r} gives a diagram: say which of its branches, "
+                f'{{ analysis = "{name}", branch = 0 }} (the response) or label = "2T"',
+            )
+    elif not step.gives_branch:
         yield key, f"the analysis {name!r} gives no branch to start from"
+    elif any(choice):
+        given = "branch" if choice[0] else "label"
+        yield (*key[:-1], given), f"the analysis {name!r} gives one branch, not a diagram: leave {given} out"
 
 
-def chosen_branch(name: str, context: Context) -> Branch:
-    """The branch that an earlier analysis gave."""
-    branch = context.results.get(name)
-    if not isinstance(branch, Branch):
-        raise InputError(f"the analysis {name!r} gave no branch")
-    return branch
+def chosen_branch(curve: Curve, results: Mapping[str, Result]) -> Branch:
+    """The branch that an earlier analysis gave, or one of those of a diagram; InputError where there is none."""
+    result = results.get(curve.analysis)
+    if isinstance(result, BifurcationDiagram):
+        try:
+            return result[curve.branch if curve.label is None else curve.label].branch  # type: ignore[index]
+        except InputError as error:
+            raise InputError(f"{curve.analysis!r}: {error}") from None
+    if not isinstance(result, Branch):
+        raise InputError(f"the analysis {curve.analysis!r} gave no branch")
+    return result
 
 
-def chosen(motion: Motion, context: Context) -> Any:
+def chosen(motion: Motion, results: Mapping[str, Result]) -> Any:
     """The point or bifurcation of an earlier branch; InputError where there is none."""
-    branch = chosen_branch(motion.analysis, context)
+    branch = chosen_branch(motion, results)
+    said = repr(motion.analysis) if motion.said == motion.analysis else motion.said
     if motion.bifurcation is not None:
         found = branch.bifurcations[motion.bifurcation]
         if not -len(found) <= motion.index < len(found):
             count = "no" if not found else f"only {len(found)}"
-            raise InputError(
-                f"{motion.analysis!r} has {count} {motion.bifurcation}, so that there is none with index {motion.index}"
-            )
+            kind = motion.bifurcation
+            raise InputError(f"{said} has {count} {kind}, so that there is none with index {motion.index}")
         return found[motion.index]
     if motion.nearest is not None:
         distance = np.zeros(len(branch))
@@ -162,5 +258,5 @@ def chosen(motion: Motion, context: Context) -> Any:
         return branch.points[int(np.argmin(distance))]
     point = -1 if motion.point is None else motion.point
     if not -len(branch) <= point < len(branch):
-        raise InputError(f"{motion.analysis!r} has {len(branch)} points, so that there is no point {point}")
+        raise InputError(f"{said} has {len(branch)} points, so that there is no point {point}")
     return branch.points[point]

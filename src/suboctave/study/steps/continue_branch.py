@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from suboctave.analysis import Branch, continue_branch
 from suboctave.analysis.checks import check_bounds, check_parameter, check_system, is_number
-from suboctave.study.steps.base import Complaint, Context, Range, Surroundings, tried
+from suboctave.study.steps.base import Complaint, Context, Known, Range, Surroundings, tried
 from suboctave.study.steps.curves import CurveStep
 
 
@@ -37,6 +37,16 @@ class ContinueBranch(CurveStep):
             yield ("omega",), f"must be positive, in rad per unit time, not {self.omega:g}"
         if self.parameter in self.parameters:
             yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
+        else:
+            yield from self.differing(around)
+
+    def known(self, around: Surroundings) -> Known | None:
+        """See `Step.known`."""
+        source = self.inherited(around)
+        if self.motion is not None and source is None:
+            return None
+        values = around.system.parameters if source is None else source.values
+        return Known(self.parameter, {name: value for name, value in values.items() if name != self.parameter})
 
     def run(self, context: Context) -> Branch:
         """See `Step.run`."""

@@ -15,6 +15,7 @@ from suboctave.study.options import as_formulation, as_harmonics, as_newton, as_
 from suboctave.study.steps.base import (
     Complaint,
     Context,
+    Known,
     Motion,
     Step,
     Surroundings,
@@ -100,8 +101,8 @@ class CurveStep(Step):
                 f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics",
             )
         if self.motion is not None:
-            for key, name in self.needs():
-                yield from check_branch(name, key, around)
+            for key, _ in self.needs():
+                yield from check_branch(self.motion, key, around)
             yield from check_motion(self.motion, ("start",), around)
 
     def _settings(self, around: Surroundings) -> Iterator[Complaint]:
@@ -138,7 +139,7 @@ class CurveStep(Step):
     def started(self, context: Context) -> Any:
         """What the curve starts from: a motion of an earlier branch, numbers, or None."""
         if self.motion is not None:
-            found = chosen(self.motion, context)
+            found = chosen(self.motion, context.results)
             return self._moved(found.orbit, context)
         return self.start
 
@@ -149,6 +150,22 @@ class CurveStep(Step):
             names = ", ".join(changed)
             raise InputError(f"the motion it starts from has other values of {names}: leave them out of parameters")
         return orbit
+
+    def known(self, around: Surroundings) -> Known | None:
+        """See `Step.known`: the frequency varies, the parameters are those of the system."""
+        return Known("omega", dict(around.system.parameters))
+
+    def inherited(self, around: Surroundings) -> Known | None:
+        """What is known of the analysis that it starts from."""
+        return None if self.motion is None else around.known.get(self.motion.analysis)
+
+    def differing(self, around: Surroundings) -> Iterator[Complaint]:
+        """Parameters that the motion it starts from is known to have other values of."""
+        source = self.inherited(around)
+        for name, value in self.parameters.items():
+            there = value if source is None else source.values.get(name, value)
+            if there != value:
+                yield ("parameters", name), f"the motion that it starts from has {name} = {there:g}: leave it out"
 
 
 _READ: dict[str, Callable[[Any], Any]] = {

@@ -14,11 +14,15 @@ from suboctave.study.steps.base import (
     Complaint,
     Context,
     Motion,
+    Named,
     Step,
     Surroundings,
+    as_curve,
     as_table,
     check_branch,
     check_motion,
+    chosen_branch,
+    key_of_curve,
     tried,
 )
 from suboctave.study.steps.base import chosen as chosen_motion
@@ -29,7 +33,7 @@ class Stability(Step):
 
     kind: ClassVar[str] = "stability"
 
-    branch: str
+    branch: Named
     points: list[int] | None = None
     bifurcations: list[str] = Field(default_factory=list)
     nearest: dict[str, float] | None = None
@@ -37,17 +41,21 @@ class Stability(Step):
 
     def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
         """See `Step.needs`."""
-        return [(("branch",), self.branch)]
+        return [(key_of_curve(self.branch, "branch"), as_curve(self.branch).analysis)]
+
+    def _motion(self, **choice: Any) -> Motion:
+        curve = as_curve(self.branch)
+        return Motion(analysis=curve.analysis, branch=curve.branch, label=curve.label, **choice)
 
     def check(self, around: Surroundings) -> Iterator[Complaint]:
         """See `Step.check`."""
-        yield from check_branch(self.branch, ("branch",), around)
+        yield from check_branch(as_curve(self.branch), key_of_curve(self.branch, "branch"), around)
         if self.points is None and not self.bifurcations and self.nearest is None:
             yield (), "choose motions: points = [...], bifurcations = [...] or nearest = {omega = ...}"
         for i, kind in enumerate(self.bifurcations):
-            for key, text in check_motion(Motion(analysis=self.branch, bifurcation=kind), (), around):
+            for key, text in check_motion(self._motion(bifurcation=kind), (), around):
                 yield ("bifurcations", i) if "bifurcation" in key else key, text
-        yield from check_motion(Motion(analysis=self.branch, nearest=self.nearest), (), around)
+        yield from check_motion(self._motion(nearest=self.nearest), (), around)
         for method in self.methods or []:
             yield from tried("methods", lambda method=method: as_stability(method))  # type: ignore[misc]
         if self.parameters:
@@ -57,12 +65,12 @@ class Stability(Step):
         """See `Step.run`."""
         motions: list[tuple[str, Any]] = []
         for point in self.points or []:
-            motions.append((f"point {point}", chosen_motion(Motion(analysis=self.branch, point=point), context)))
-        branch = context.results[self.branch]
+            motions.append((f"point {point}", chosen_motion(self._motion(point=point), context.results)))
+        branch = chosen_branch(as_curve(self.branch), context.results)
         for kind in self.bifurcations:
-            motions += [(kind, item) for item in branch.bifurcations[kind]]  # type: ignore[union-attr]
+            motions += [(kind, item) for item in branch.bifurcations[kind]]
         if self.nearest is not None:
-            motions.append(("nearest", chosen_motion(Motion(analysis=self.branch, nearest=self.nearest), context)))
+            motions.append(("nearest", chosen_motion(self._motion(nearest=self.nearest), context.results)))
         rows, multipliers, errors = [], [], []
         for name, motion in motions:
             for method in self.methods or [None]:
@@ -76,4 +84,4 @@ class Stability(Step):
         for i in range(max((len(mu) for mu in multipliers), default=0)):
             for name, lists, sort in (("multiplier", multipliers, complex), ("error", errors, float)):
                 columns[f"{name}_{i}"] = np.array([row[i] if i < len(row) else np.nan for row in lists], dtype=sort)
-        return Table(columns, f"multipliers of {self.branch}")
+        return Table(columns, f"multipliers of {as_curve(self.branch).said}")

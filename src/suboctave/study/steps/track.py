@@ -10,7 +10,7 @@ from suboctave.analysis import Branch, track
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range
 from suboctave.bifurcation.tracked import TRACKED_KINDS
 from suboctave.errors import suggest
-from suboctave.study.steps.base import Complaint, Context, Range, Surroundings, chosen, tried
+from suboctave.study.steps.base import Complaint, Context, Known, Range, Surroundings, chosen, tried
 from suboctave.study.steps.curves import CurveStep
 
 
@@ -60,11 +60,15 @@ class Track(CurveStep):
         elif kind not in TRACKED_KINDS:
             yield ("start", "bifurcation"), f"{kind} cannot be tracked{suggest(kind, TRACKED_KINDS)}"
 
+    def known(self, around: Surroundings) -> Known | None:
+        """See `Step.known`: what varies along it are parameters, too."""
+        return None
+
     def run(self, context: Context) -> Branch:
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         assert self.motion is not None
-        start = chosen(self.motion, context)
+        start = chosen(self.motion, context.results)
         self._moved(start.orbit, context)
         if self.omega is not None:
             options["omega"] = (self.omega[0], self.omega[1])

@@ -8,7 +8,18 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from suboctave.analysis import Table, verify
-from suboctave.study.steps.base import Complaint, Context, Step, Surroundings, as_table, check_branch, chosen_branch
+from suboctave.study.steps.base import (
+    Complaint,
+    Context,
+    Named,
+    Step,
+    Surroundings,
+    as_curve,
+    as_table,
+    check_branch,
+    chosen_branch,
+    key_of_curve,
+)
 
 
 class Verify(Step):
@@ -16,24 +27,25 @@ class Verify(Step):
 
     kind: ClassVar[str] = "verify"
 
-    branch: str
+    branch: Named
     what: Literal["points", "bifurcations", "both"] = "both"
     every: int = Field(default=10, ge=1)
     tolerance: float = Field(default=1e-3, gt=0.0, lt=1.0)
 
     def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
         """See `Step.needs`."""
-        return [(("branch",), self.branch)]
+        return [(key_of_curve(self.branch, "branch"), as_curve(self.branch).analysis)]
 
     def check(self, around: Surroundings) -> Iterator[Complaint]:
         """See `Step.check`."""
-        yield from check_branch(self.branch, ("branch",), around)
+        yield from check_branch(as_curve(self.branch), key_of_curve(self.branch, "branch"), around)
         if self.parameters:
             yield ("parameters",), "a branch is verified at the parameters that it was computed with: leave them out"
 
     def run(self, context: Context) -> Table:
         """See `Step.run`."""
-        branch = chosen_branch(self.branch, context)
+        curve = as_curve(self.branch)
+        branch = chosen_branch(curve, context.results)
         things: list[tuple[str, Any]] = []
         if self.what != "bifurcations":
             things += [(f"point {i}", branch.points[i]) for i in range(0, len(branch), self.every)]
@@ -50,4 +62,4 @@ class Verify(Step):
             )
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "reason")
         kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str)
-        return Table(as_table(names, kinds, rows), f"{self.branch}, held against shooting")
+        return Table(as_table(names, kinds, rows), f"{curve.said}, held against shooting")

@@ -1,0 +1,233 @@
+"""A response with the branches that bifurcate from it, as a tree: what `bifurcation_diagram` gives."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.junction import period_name
+from suboctave.bifurcation import Bifurcation
+from suboctave.errors import InputError, suggest
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["BifurcationDiagram", "DiagramBranch"]
+
+
+@dataclass(eq=False, repr=False)
+class DiagramBranch:
+    """A branch of a diagram with those that leave it.
+
+    Attributes
+    ----------
+    branch
+        The curve.
+    origin
+        The bifurcation of the parent that it leaves at; None for the response itself.
+    depth
+        0 for the response, 1 for what leaves it, ...
+    number
+        Its number in the diagram: 0 for the response, then in the order in which they were found.
+    children
+        The branches that leave it, in the order in which it meets them.
+    failures
+        Bifurcations whose other branch could not be followed, and why.
+    left
+        Bifurcations that were not switched at, since the depth or the budget was reached.
+    met
+        The parent's branch points, some of which it may pass through.
+    """
+
+    branch: Branch
+    origin: Bifurcation | None = None
+    depth: int = 0
+    number: int = 0
+    children: list[DiagramBranch] = field(default_factory=list)
+    failures: list[tuple[Bifurcation, str]] = field(default_factory=list)
+    left: list[Bifurcation] = field(default_factory=list)
+    met: list[Bifurcation] = field(default_factory=list)
+
+    def __iter__(self) -> Iterator[DiagramBranch]:
+        """This one and all below it, in the order in which they were found."""
+        waiting = deque([self])
+        while waiting:
+            node = waiting.popleft()
+            waiting.extend(node.children)
+            yield node
+
+    @property
+    def label(self) -> str:
+        """Its period and where it begins and ends: "2T, PD 3.993452 to PD 2.303153"."""
+        branch = self.branch
+        text = period_name(branch.nu)
+        name = branch.name
+        if not len(branch):
+            return f"{text}, empty"
+        if branch.closed:
+            origin = self.origin
+            through = "" if origin is None else f" through {origin.kind} {origin.parameter(name):.7g}"
+            return f"{text}, closed{through}"
+        ends = [
+            f"{j.kind} {j.parameter:.7g}" if j is not None else f"{name} {branch.parameter(name)[i]:.7g}"
+            for j, i in ((branch.departs, 0), (branch.arrives, -1))
+        ]
+        return f"{text}, {ends[0]} to {ends[1]}"
+
+    def __repr__(self) -> str:
+        count = len(self.children)
+        return f"<branch {self.number}: {self.label}, {len(self.branch)} points, {count} branches leave it>"
+
+
+class BifurcationDiagram:
+    """A response and the branches that bifurcate from it, as a tree; print it to see all of it.
+
+    `diagram[2]` is the place of branch 2 in the tree, `diagram["4T"]` that of the one branch whose label begins so;
+    `diagram[2].branch` the curve.
+
+    Attributes
+    ----------
+    root
+        The response, with `children` at every level (`DiagramBranch`).
+    stopped
+        Why not all branches were followed, in words; empty if they were.
+    seconds
+        How long it took.
+    """
+
+    def __init__(self, root: DiagramBranch, stopped: str = "") -> None:
+        self.root = root
+        self.stopped = stopped
+        self.seconds = float("nan")
+        for number, node in enumerate(root):
+            node.number = number
+
+    def __iter__(self) -> Iterator[DiagramBranch]:
+        """Every branch with its place in the tree, by number: the response, what leaves it, what leaves that, ..."""
+        return iter(self.root)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __getitem__(self, which: int | str) -> DiagramBranch:
+        nodes = list(self)
+        if isinstance(which, str):
+            found = [node for node in nodes if node.label.startswith(which)]
+            if len(found) == 1:
+                return found[0]
+            labels = [node.label for node in nodes]
+            if not found:
+                raise InputError(f"no branch of the diagram has a label that begins with {which!r}{_listed(labels)}")
+            several = "; ".join(f"{node.number}: {node.label}" for node in found)
+            raise InputError(f"{len(found)} branches have a label that begins with {which!r}: {several}")
+        if isinstance(which, bool) or not isinstance(which, int | np.integer):
+            raise InputError(f"a branch of a diagram is chosen by its number or its label, not by {which!r}")
+        if not -len(nodes) <= which < len(nodes):
+            raise InputError(f"the diagram has {len(nodes)} branches, numbered from 0, so that there is no {which}")
+        return nodes[which]
+
+    @property
+    def branches(self) -> list[Branch]:
+        """All curves, by number."""
+        return [node.branch for node in self]
+
+    @property
+    def bifurcations(self) -> list[Bifurcation]:
+        """All located bifurcations, branch by branch."""
+        return [item for branch in self.branches for item in branch.bifurcations]
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether its user stopped it."""
+        return self.stopped.startswith("interrupted")
+
+    def of_period(self, nu: int) -> list[Branch]:
+        """The branches of motions of `nu` load periods."""
+        return [branch for branch in self.branches if branch.nu == nu]
+
+    def parent(self, node: DiagramBranch) -> DiagramBranch | None:
+        """The branch that one leaves; None for the response."""
+        return next((other for other in self if any(child is node for child in other.children)), None)
+
+    @property
+    def legend(self) -> list[str] | None:
+        """What a figure calls its curves (those with points); None where their periods tell them apart."""
+        drawn = [node for node in self if len(node.branch)]
+        if len({node.branch.nu for node in drawn}) > 1:
+            return None
+        return [
+            "response"
+            if node.origin is None
+            else f"from {node.origin.kind} {node.origin.parameter(node.branch.name):.4g}"
+            for node in drawn
+        ]
+
+    @property
+    def marks(self) -> list[str]:
+        """What a figure marks: everything that its branches meet but contacts, which would hide the rest."""
+        met = (item for branch in self.branches for item in (*branch.bifurcations, *branch.events))
+        return list(dict.fromkeys(item.kind for item in met))
+
+    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+        """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has."""
+        return self._joined([node.branch.to_dataframe(readings) for node in self])
+
+    def bifurcations_frame(self) -> pandas.DataFrame:
+        """One row per bifurcation: the number, period and depth of its branch, kind, place, amplitude."""
+        return self._joined([node.branch.bifurcations_frame() for node in self])
+
+    def _joined(self, frames: list[pandas.DataFrame]) -> pandas.DataFrame:
+        import pandas as pd
+
+        for node, frame in zip(self, frames, strict=True):
+            for name, value in (("depth", node.depth), ("nu", node.branch.nu), ("branch", node.number)):
+                frame.insert(0, name, value, allow_duplicates=True)  # a parameter may bear one of these names
+        return pd.concat([f for f in frames if len(f)] or frames[:1], ignore_index=True)
+
+    def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
+        """The points, or the "bifurcations", of all branches as comma-separated text (.csv)."""
+        from suboctave.analysis.results import write_csv
+
+        frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
+        if what not in frames:
+            raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
+        return write_csv(frames[what](), path, overwrite)
+
+    def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
+        """The datasets of all branches (`Branch.to_xarray`) by number and label: "1: 2T, PD 3.99 to PD 2.30"."""
+        return {f"{node.number}: {node.label}": node.branch.to_xarray(readings) for node in self if len(node.branch)}
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """All of it as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
+
+        Raises
+        ------
+        InputError
+            If the file exists and `overwrite` is not given, or cannot be written there.
+        """
+        from suboctave.analysis.results import save
+
+        return save(self, path, overwrite)
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Draw all branches, periods in their own colours; options are those of `suboctave.plot`."""
+        from suboctave.pictures import plot
+
+        return plot(self, path, **options)
+
+    def __repr__(self) -> str:
+        from suboctave.analysis.tree_text import tree_text
+
+        return tree_text(self)
+
+
+def _listed(labels: list[str]) -> str:
+    shown = "; ".join(f"{number}: {label}" for number, label in enumerate(labels[:12]))
+    return f" ({shown}{'; ...' if len(labels) > 12 else ''})"

@@ -1,0 +1,116 @@
+"""The adjoint gradient of `left^T J right` for the two real kinds of operator, compiled.
+
+In the basis of cosines and sines, integer or half-odd, both vectors are real functions of time. With
+`L = l_0 + 2 sum (l_c cos + l_s sin)` and `r = r_0 + sum (r_c cos + r_s sin)` along a direction (in the half-odd basis
+without the means),
+
+    d (left^T J right) / d X_k = 1/(2 pi) int f_uu L r phi_k dtau,    phi_k = 1, cos k tau, sin k tau,
+
+and the linear part depends on omega through its blocks alone. The general case is `perturbation.bilinear_gradient`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from suboctave.compiled import kernel
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.kernels import polynomial, spectra
+from suboctave.harmonic.linear_part import StructuralMatrices
+from suboctave.harmonic.state import BalanceState
+
+
+@kernel()
+def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
+    """Add the gradient of one direction's force, given as weights `uu` at the points z, to `gx` (2 H + 1, n)."""
+    high = gx.shape[0] // 2
+    count = left.shape[0] // 2 + (1 if mean else 0)
+    waves = np.zeros((2, count), dtype=np.complex128)
+    for s in range(dofs.shape[0]):
+        d = dofs[s]
+        for k in range(count):
+            if mean and k == 0:
+                waves[0, 0] += shape[s] * left[0, d]
+                waves[1, 0] += shape[s] * right[0, d]
+                continue
+            at = 2 * k - 1 if mean else 2 * k
+            waves[0, k] += 2.0 * shape[s] * complex(left[at, d], -left[at + 1, d])
+            waves[1, k] += shape[s] * complex(right[at, d], -right[at + 1, d])
+    values = polynomial(waves, zr, zi)
+    n = zr.shape[0]
+    product = np.empty((1, n))
+    for j in range(n):
+        cosine, sine = 1.0, 0.0
+        if not mean:
+            # exp(i tau / 2) up to a sign, which both functions share
+            if zr[j] > 0.0:
+                cosine = math.sqrt(0.5 * (1.0 + zr[j]))
+                sine = 0.5 * zi[j] / cosine
+            else:
+                sine = math.sqrt(0.5 * (1.0 - zr[j]))
+                cosine = 0.5 * zi[j] / sine
+        u = values[0, j].real * cosine - values[0, j].imag * sine
+        v = values[1, j].real * cosine - values[1, j].imag * sine
+        product[0, j] = u * v * uu[j]
+    found = spectra(product, zr, zi, high)
+    for s in range(dofs.shape[0]):
+        gx[0, dofs[s]] += shape[s] * found[0, 0].real
+        for k in range(1, high + 1):
+            gx[2 * k - 1, dofs[s]] += shape[s] * found[0, k].real
+            gx[2 * k, dofs[s]] -= shape[s] * found[0, k].imag
+
+
+@kernel()
+def _linear_rates(left, right, mean, multiples, omega, matrices):
+    """Derivatives of the linear part of the form by omega, and by kappa (its imaginary part, the real one is zero)."""
+    n = left.shape[1]
+    by_omega = by_kappa = 0.0
+    for h in range(multiples.shape[0]):
+        m = multiples[h]
+        om = m * omega
+        if mean and h == 0:
+            for i in range(n):
+                for j in range(n):
+                    by_kappa += left[0, i] * matrices[1, i, j] * right[0, j]
+            continue
+        at = 2 * h - 1 if mean else 2 * h
+        for i in range(n):
+            a, b = left[at, i], left[at + 1, i]
+            for j in range(n):
+                c, d = right[at, j], right[at + 1, j]
+                p, q = -2.0 * om * matrices[0, i, j], matrices[1, i, j]
+                even = a * c + b * d
+                odd = a * d - b * c
+                by_omega += m * (p * even + q * odd)
+                by_kappa += q * even - p * odd
+    return by_omega, by_kappa
+
+
+def applies(state: BalanceState, names: tuple[str, ...]) -> bool:
+    """Whether the forces depend on displacements alone, and the linear part is the structure's own."""
+    balance = state.balance
+    plain = balance.basis.kept is None and not balance.own and not balance.any_moving and names in ((), ("omega",))
+    return plain and isinstance(state.linear, StructuralMatrices)
+
+
+def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) -> tuple[Array, float, complex]:
+    """Derivative of `left^T J right` by the coefficients (2 H + 1, size), by omega, by kappa, where it `applies`.
+
+    mean: integer basis, else half-odd.
+    """
+    balance, basis, linear = state.balance, state.basis, state.linear
+    assert isinstance(linear, StructuralMatrices)
+    u = np.ascontiguousarray(left).reshape(-1, balance.size)
+    v = np.ascontiguousarray(right).reshape(-1, balance.size)
+    gx = np.zeros((basis.size, balance.size))
+    for group, bend in zip(balance.groups, state.curvatures, strict=True):
+        if bend.zr.size:
+            _add_group(u, v, mean, group.dofs, group.values, bend.zr, bend.zi, bend.uu, gx)
+    multiples = basis.multiples if mean else basis.half_multiples
+    by_omega, by_kappa = _linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
+    return gx, by_omega, 1j * by_kappa
+
+
+__all__ = ["applies", "real_gradient"]
