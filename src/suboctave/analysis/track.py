@@ -23,6 +23,8 @@ from suboctave.bifurcation.augmented import (
     GrazingContactEquations,
     SingularOperator,
 )
+from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
+from suboctave.bifurcation.formulation import Alcorta2019, ExtendedSystem, Formulation, written
 from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TRACKED_KINDS
 from suboctave.compiled import computation_begins
@@ -60,6 +62,7 @@ def track(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
 ) -> TrackedBranch:
     """The curve of a bifurcation in two parameters, in both directions, from end to end or closed.
 
@@ -78,6 +81,10 @@ def track(
     max_step
         Largest distance between neighbours in scaled arclength: each parameter in units of its range (omega without a
         range in units of its value at the start), the motion in units of its own size.
+
+    formulation
+        As in `frequency_response`: with "extended" the null vector is among the unknowns, with "alcorta2019" period
+        doublings are those of the published system.
 
     Other parameters as `frequency_response`.
 
@@ -102,7 +109,9 @@ def track(
     names, ranges = _free(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit
     system = orbit.system
-    settings = make_settings(system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability)
+    settings = make_settings(
+        system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
+    )
     basis = orbit.basis
     wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     adaptive, basis = _discretisation(basis, wanted)
@@ -123,6 +132,7 @@ def track(
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
         "stability": settings.stability.name,
+        "formulation": written(settings.formulation),
         "observe": settings.observe,
     }
     context = {"system": system, "parameter": names[1], **options}
@@ -206,7 +216,9 @@ def _linear_part(item: Bifurcation) -> LinearPart | None:
     return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
 
 
-def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, str]) -> tuple[Augmentation, np.ndarray]:
+def _augmentation(
+    item: Bifurcation, state: BalanceState, names: tuple[str, str], formulation: Formulation
+) -> tuple[Augmentation, np.ndarray]:
     """What singles the bifurcation out, and the start of its extra unknowns."""
     if item.kind == "grazing":
         assert item.contact is not None
@@ -221,7 +233,12 @@ def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, str]
     if kind is Kind.FREE:
         kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
         extra = np.array([kappa])
-    return SingularOperator.of(state, kind, float(extra.sum())), extra
+    kappa = float(extra.sum())
+    if isinstance(formulation, Alcorta2019) and kind is Kind.HALF:
+        return PublishedDoubling.started(state, names), extra
+    if isinstance(formulation, ExtendedSystem) or (isinstance(formulation, Alcorta2019) and kind is Kind.INTEGER):
+        return ExtendedOperator.started(state, kind, kappa)
+    return SingularOperator.of(state, kind, kappa), extra
 
 
 def _start(
@@ -237,7 +254,7 @@ def _start(
     x = orbit.basis.resized(orbit.coefficients, balance.basis)
     balance = balance.settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
-    augmentation, extra = _augmentation(item, state, names)
+    augmentation, extra = _augmentation(item, state, names, settings.formulation)
     values = np.array([item.parameter(name) for name in names])
     for i, ends in enumerate((box.first, box.second)):
         if ends is not None:

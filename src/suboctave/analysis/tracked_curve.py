@@ -221,7 +221,8 @@ class TrackedCurve:
             return u
         n = origin.balance.dimension
         x = u[:n].reshape(basis.size, -1)
-        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), u[n:]))
+        extra = origin.augmentation.carried(u[n:-2], self.balance.basis, self.balance.size)
+        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), extra, u[-2:]))
 
     def images(self, u: Array) -> list[Array]:
         """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""

@@ -87,6 +87,10 @@ class Augmentation(ABC):
         """Extra unknowns of the motion shifted in time, `x(tau + angle)`."""
         return extra
 
+    def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
+        """Extra unknowns in a basis with other harmonics."""
+        return extra
+
 
 @dataclass(frozen=True)
 class SingularOperator(Augmentation):
