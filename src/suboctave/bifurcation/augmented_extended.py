@@ -67,11 +67,11 @@ class ExtendedOperator(SingularOperator):
         """See `Augmentation.at`."""
         return ExtendedEquations(self, state, extra, names)
 
-    def spans(self, state: BalanceState) -> Array:
+    def spans(self, rate: float) -> Array:
         """See `Augmentation.spans`."""
         spans = np.full(self.extras, _SPAN)
         if self.kind is Kind.FREE:
-            spans[0] = state.rate
+            spans[0] = rate
         return spans
 
     def resized(self, basis: HarmonicBasis, size: int) -> ExtendedOperator:
