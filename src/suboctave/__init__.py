@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         find_subharmonics,
         frequency_response,
         load,
+        locate_extremum,
         periodic_orbit,
         stability,
         switch_branch,
@@ -64,7 +65,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
-    from suboctave.pictures import plot, plot_history, plot_phase, plot_spectrum, write_report
+    from suboctave.pictures import plot, plot_history, plot_phase, plot_space, plot_spectrum, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -115,12 +116,14 @@ _HOME = {
     "Hill": "suboctave.stability",
     "KoopmanHill": "suboctave.stability",
     "track": "suboctave.analysis",
+    "locate_extremum": "suboctave.analysis",
     "verify": "suboctave.analysis",
     "load": "suboctave.analysis",
     "Results": "suboctave.analysis",
     "plot": "suboctave.pictures",
     "plot_history": "suboctave.pictures",
     "plot_phase": "suboctave.pictures",
+    "plot_space": "suboctave.pictures",
     "plot_spectrum": "suboctave.pictures",
     "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
@@ -177,10 +180,12 @@ __all__ = [
     "frequency_response",
     "library",
     "load",
+    "locate_extremum",
     "periodic_orbit",
     "plot",
     "plot_history",
     "plot_phase",
+    "plot_space",
     "plot_spectrum",
     "stability",
     "switch_branch",

@@ -37,14 +37,14 @@ def test_three_lines_of_the_new_file_are_changed(suboctave, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     assert suboctave("new", "study.toml")[0] == 0
     before = Path("study.toml").read_text(encoding="utf-8").splitlines()
-    (after,) = blocks("toml")
+    after, _ = blocks("toml")
     changed = [a for a, b in zip(before, after.splitlines(), strict=True) if a != b]
     assert [line.split(" = ")[0] for line in changed] == ["title", "parameters", "omega"]
 
 
 def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (text,) = blocks("toml")
+    text, _ = blocks("toml")
     Path("study.toml").write_text(text, encoding="utf-8")
     checked, ran = blocks("console")
     assert suboctave("check", "study.toml")[1] == checked.split("\n", 1)[1]
@@ -53,7 +53,7 @@ def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
     assert numbers(out) == numbers(ran)  # the table is what the program prints
     assert len(numbers(out)) == 6
 
-    script, again = blocks("python")
+    script, again, _ = blocks("python")
     scope = {}
     exec(compile(script + again, "docs/tutorial.md", "exec"), scope)
     said = capsys.readouterr().out
@@ -113,12 +113,37 @@ def test_its_isolated_subharmonic(capsys):
 
 def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (text,) = blocks("toml")
+    text, _ = blocks("toml")
     text = text.replace("alpha = 0.0", "alpa = 0.0").replace("omega = [2.5, 0.5]", "omega = [2.5]")
     Path("study.toml").write_text(text, encoding="utf-8")
     status, _, err = suboctave("check", "study.toml")
     assert status == 2
     assert err == blocks("text")[0]
+
+
+def test_its_boundaries(suboctave, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text, more = blocks("toml")
+    script, _, chapter = blocks("python")
+    scope = {}
+    exec(compile(script, "docs/tutorial.md", "exec"), scope)
+    capsys.readouterr()
+    exec(compile(chapter, "docs/tutorial.md", "exec"), scope)
+    said = capsys.readouterr().out
+    assert said == blocks("text")[2]
+    assert Path("boundaries.png").stat().st_size > 0
+    # the limit points of a response computed at one of these gaps
+    curve = so.frequency_response(scope["system"].with_parameters({"j": 0.2}), omega=(2.5, 0.5))
+    assert [f"{point.omega:.4f}" for point in curve.bifurcations["LP"]] == re.findall(r"j = 0.2: omega = (.*)", said)
+    (figure,) = re.findall(r"`(\{ kind = .*? \})`", TUTORIAL)
+    whole = text.replace('{ file = "response.png" }', '{ file = "response.png" }, ' + figure) + more
+    assert figure in whole
+    Path("study.toml").write_text(whole, encoding="utf-8")
+    status, _, err = suboctave("run", "study.toml")
+    assert status == 0, err
+    found = so.load("study_results/results.nc")["falls"]
+    assert np.abs(found.omega - scope["limits"][1].omega).max() < 1e-9
+    assert Path("study_results/falls.png").stat().st_size > 0
 
 
 def test_every_command_it_names_is_there(suboctave):

@@ -55,7 +55,7 @@ class End:
 
 def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
     """The end of a curve between two neighbours, None if it goes on."""
-    augmentation = b.curve.augmentation
+    augmentation = b.curve.augmentation.own
     if isinstance(augmentation, BranchPointUnfolded):
         beta = float(b.evaluation.extra[0])
         if abs(beta) > _UNFOLDING:
@@ -86,6 +86,8 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
 def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""
     name, operator, words = ("R2", Kind.HALF, "1:2") if double else ("R1", Kind.INTEGER, "1:1")
+    if a.curve.augmentation.turning:
+        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)}")
     try:
         found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(name), newton, _AROUND)
     except ConvergenceError as failure:
@@ -96,7 +98,7 @@ def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
 def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
     """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
     basis = a.curve.balance.basis
-    if a.curve.augmentation.name != "LP" or basis.nu % 2:
+    if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
         return None
     parent = HarmonicBasis(max(1, basis.harmonics // 2), basis.nu // 2)
     x = np.zeros((parent.size, a.curve.balance.size))

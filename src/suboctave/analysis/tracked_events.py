@@ -24,8 +24,11 @@ from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
-from suboctave.bifurcation.augmented import SingularOperator
+from suboctave.bifurcation.augmented import GrazingEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.extremum import extremal_of
+from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, make_point, point_between
@@ -40,6 +43,10 @@ from suboctave.stability import StabilityMethod
 _BESIDE = 0.05
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
+#: component of the tangent in scaled arclength that may be rounding at both ends of a step
+_LEVEL = 1e-9
+#: share of a step within which events coincide
+_SAME = 1e-5
 
 
 class CurveTest(ABC):
@@ -67,7 +74,14 @@ class Extremum(CurveTest):
         """See `CurveTest.value`."""
         slope = float(sample.point.tangent[sample.curve.index(self.name)])
         # at a cusp both change sign
-        return slope / sample.bend if sample.curve.augmentation.name == "LP" and sample.bend != 0.0 else slope
+        plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
+        return slope / sample.bend if plane and sample.bend != 0.0 else slope
+
+    def level(self, *samples: TrackedSample) -> bool:
+        """Whether the parameter stays as it is but for rounding."""
+        indices = [sample.curve.index(self.name) for sample in samples]
+        points = [sample.point for sample in samples]
+        return all(abs(p.tangent[i] * p.weights[i]) < _LEVEL for p, i in zip(points, indices, strict=True))
 
 
 @dataclass(frozen=True)
@@ -143,7 +157,7 @@ class FoldFlip(CurveTest):
 def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns = tuple(Extremum(name) for name in curve.names)
-    augmentation = curve.augmentation
+    augmentation = curve.augmentation.own
     if not isinstance(augmentation, SingularOperator):
         return turns
     own: dict[Kind, tuple[CurveTest, ...]] = {
@@ -182,13 +196,35 @@ def events_between(
                 found.append(Found(test, sample, _extreme(test, low), stretch if finer else None))
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
+    if b.curve.augmentation.turning:
+        found = _without_consequences(found, b.curve, _SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
+    """Events along a curve of extrema without those that others bring about.
+
+    Where the third parameter turns the extreme one does so too: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M.
+    At a cusp a symmetry may have both turn, which makes no extremum of either.
+    """
+    extreme, last = curve.augmentation.turning, curve.names[-1]
+
+    def beside(item: Found, others: list[Found]) -> bool:
+        return any(abs(item.sample.point.arclength - o.sample.point.arclength) <= near for o in others)
+
+    turns = {name: [i for i in found if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
+    cusps = [item for item in found if isinstance(item.test, Cusp)]
+    both = [item for item in turns[extreme] if beside(item, turns[last])]
+    dropped = both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
+    return [item for item in found if not any(item is d for d in dropped)]
 
 
 def _brackets(
     test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
 ) -> list[tuple[TrackedSample, TrackedSample]]:
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    if isinstance(test, Extremum) and test.level(a, b):
+        return []
     first, last = test.value(a), test.value(b)
     if first * last < 0.0 or (last == 0.0 and first != 0.0):
         return [(a, b)]
@@ -327,7 +363,34 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
         curve=curve.augmentation.name,
         names=curve.names,
         extreme=found.extreme,
+        contact=_contact(sample),
+        isola=_isola(found),
+        turning=curve.augmentation.turning,
     )
+
+
+def _contact(sample: TrackedSample) -> GrazingContact | None:
+    """What grazes along a curve of grazings."""
+    equations = sample.evaluation.equations.own
+    if not isinstance(equations, GrazingEquations):
+        return None
+    state, of = sample.state, equations.of
+    local = state.local(of.element)
+    time = sample.instant_or_frequency / state.rate
+    value = float(sample.point.u[-1])
+    return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
+
+
+def _isola(found: Found) -> str:
+    """What happens to branches at an extremum along a curve of limit points."""
+    curve, sample = found.sample.curve, found.sample
+    if not isinstance(found.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
+        return ""
+    (beside,) = set(curve.names) - {found.test.name}
+    sizes = dict(zip(curve.names, curve.spans, strict=True))
+    extremal = extremal_of(curve.augmentation, sample.state, sample.evaluation.extra, beside, found.test.name, sizes)
+    equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
+    return equations.isola
 
 
 __all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]

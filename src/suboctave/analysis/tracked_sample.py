@@ -15,6 +15,7 @@ from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
+from suboctave.bifurcation.extremum import ExtremalEquations
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -45,7 +46,7 @@ class TrackedSample:
     @property
     def equations(self) -> SingularEquations:
         """The scalar equations, where they are those of a singular operator."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         assert isinstance(equations, SingularEquations)
         return equations
 
@@ -63,13 +64,13 @@ class TrackedSample:
     @property
     def kappa(self) -> float:
         """Frequency of the critical perturbation at an NS, else 0."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         return equations.kappa if isinstance(equations, SingularEquations) else 0.0
 
     @property
     def instant_or_frequency(self) -> float:
         """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, else 0."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         if isinstance(equations, GrazingEquations):
             return equations.tau % (2.0 * math.pi)
         return self.kappa
@@ -77,7 +78,7 @@ class TrackedSample:
     @property
     def vectors(self) -> NullVectors | None:
         """Null vectors of the singular operator, None where there is none."""
-        found = getattr(self.evaluation.equations, "bordered", None)
+        found = getattr(self.evaluation.equations.own, "bordered", None)
         return None if found is None else found.vectors
 
     @lazy
@@ -105,12 +106,27 @@ class TrackedSample:
     @lazy
     def coefficient(self) -> float:
         """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
-        augmentation = self.curve.augmentation
+        augmentation = self.curve.augmentation.own
         kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
         if kind is Kind.FREE:
             return float("nan")
-        turn = -1.0 if self.twist > 0.0 else 1.0
-        return turn * (0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+        # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign
+        turn = 1.0 if self.twist > 0.0 else -1.0
+        return turn * (-0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+
+    @lazy
+    def extreme(self) -> str:
+        """On a curve of extrema whether it is a "minimum" or a "maximum", else empty."""
+        equations = self.evaluation.equations
+        if not isinstance(equations, ExtremalEquations):
+            return ""
+        return "minimum" if equations.curvature > 0.0 else "maximum"
+
+    @lazy
+    def isola(self) -> str:
+        """On a curve of extrema of limit points the type of `bifurcation.extremum`, else empty."""
+        equations = self.evaluation.equations
+        return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
     @property
     def other(self) -> float:

@@ -63,7 +63,7 @@ class ExtendedOperator(SingularOperator):
         vector: np.ndarray = extra[1 : self.rows + 1] + 1j * extra[self.rows + 1 :]
         return vector
 
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, str]) -> ExtendedEquations:
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> ExtendedEquations:
         """See `Augmentation.at`."""
         return ExtendedEquations(self, state, extra, names)
 
@@ -107,7 +107,7 @@ class ExtendedEquations(SingularEquations):
 
     of: ExtendedOperator
 
-    def __init__(self, of: ExtendedOperator, state: BalanceState, extra: Array, names: tuple[str, str]) -> None:
+    def __init__(self, of: ExtendedOperator, state: BalanceState, extra: Array, names: tuple[str, ...]) -> None:
         super().__init__(of, state, float(extra[0]) if of.kind is Kind.FREE else 0.0, names)
         self.phi = of.phi(extra)
 
@@ -147,15 +147,16 @@ class ExtendedEquations(SingularEquations):
         by = operator_along(state, kind, self.phi * scale, directions, self.kappa, shifts)
         by = by * (scale / self.of.unit)[:, None]
         if not self._complex:
-            last = np.concatenate((np.zeros(n), self.phi, [0.0, 0.0]))
+            last = np.concatenate((np.zeros(n), self.phi, np.zeros(len(self.names))))
             return np.vstack((np.hstack((by[:, :n], matrix, by[:, n:])), last))
-        out = np.zeros((2 * m + 2, n + 1 + 2 * m + 2))
+        end = n + 1 + 2 * m
+        out = np.zeros((2 * m + 2, end + len(self.names)))
         out[:m, : n + 1], out[m : 2 * m, : n + 1] = by[:, : n + 1].real, by[:, : n + 1].imag
-        out[: 2 * m, n + 1 : -2] = np.block([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]])
-        out[:m, -2:], out[m : 2 * m, -2:] = by[:, n + 1 :].real, by[:, n + 1 :].imag
-        out[-2, n + 1 : -2] = np.concatenate((self.phi.real, self.phi.imag))
+        out[: 2 * m, n + 1 : end] = np.block([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]])
+        out[:m, end:], out[m : 2 * m, end:] = by[:, n + 1 :].real, by[:, n + 1 :].imag
+        out[-2, n + 1 : end] = np.concatenate((self.phi.real, self.phi.imag))
         c = self.of.borders.right
-        out[-1, n + 1 : -2] = np.concatenate((-c.imag, c.real))
+        out[-1, n + 1 : end] = np.concatenate((-c.imag, c.real))
         return out
 
     def renewed(self) -> ExtendedOperator:
@@ -174,13 +175,13 @@ class PublishedDoubling(SingularOperator):
     turn: complex = 1.0 + 0.0j
 
     @classmethod
-    def started(cls, state: BalanceState, names: tuple[str, str]) -> PublishedDoubling:
+    def started(cls, state: BalanceState, names: tuple[str, ...]) -> PublishedDoubling:
         """The augmentation at a motion."""
         waves = null_vectors(state, Kind.FREE, 0.5 * state.rate)
         own = cls(Kind.HALF, null_vectors(state, Kind.HALF), state.omega**2, waves)
         return PublishedEquations(own, state, 0.0, names).renewed()
 
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, str]) -> PublishedEquations:
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> PublishedEquations:
         """See `Augmentation.at`."""
         return PublishedEquations(self, state, 0.0, names)
 
