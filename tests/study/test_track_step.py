@@ -76,3 +76,32 @@ def test_mistakes(study_file, suboctave, old, new, message):
     status, _, err = suboctave("run", study_file(STUDY.replace(old, new)))
     assert status != 0
     assert message in err
+
+
+DAMPING = """
+[[analyses]]
+name = "tips"
+type = "track"
+start = { analysis = "limits", bifurcation = "extremum" }
+parameter = "c"
+bounds = [0.05, 0.15]
+"""
+
+
+def test_an_extremum_in_a_third_parameter(study_file):
+    """The load `F (1 - q^2)` that a limit point needs is least at q = 0, whatever the damping."""
+    text = STUDY.replace('amplitude = "F"', 'amplitude = "F*(1 - q**2)"').replace("F = 0.3 }", "F = 0.3, q = 0.1 }")
+    text = text.replace('parameter = "F"', 'parameter = ["q", "F"]')
+    text = text.replace("bounds = [0.05, 0.5]", "bounds = [[-0.8, 0.8], [0.05, 0.5]]") + DAMPING
+    curve = run_study(read_study(study_file(text))).finished[-1].result
+    assert (curve.names, curve.turning) == (("q", "F", "c"), "F")
+    assert curve.parameter("c")[[0, -1]] == pytest.approx([0.05, 0.15])
+    assert curve.parameter("q") == pytest.approx(0.0, abs=1e-9)
+    assert set(curve.extreme) == {"minimum"}
+
+
+def test_two_parameters_more_for_an_extremum(study_file, suboctave):
+    text = STUDY + DAMPING.replace('"c"', '["c", "alpha"]').replace("[0.05, 0.15]", "[[0.05, 0.15], [0.5, 1.5]]")
+    status, _, err = suboctave("run", study_file(text))
+    assert status != 0
+    assert "is one name: the third parameter" in err

@@ -146,7 +146,10 @@ def with_extremum(curve: TrackedCurve, u: np.ndarray, turning: str, plane: tuple
     _, extra, _, _ = curve.split(u)
     (beside,) = set(plane) - {turning}
     sizes = dict(zip(curve.names, curve.spans, strict=True))
-    augmentation = extremal_of(curve.augmentation.own, curve.evaluate(u).state, extra, beside, turning, sizes)
+    n = curve.balance.dimension
+    extra_spans = 1.0 / curve.weights(u, 0.0)[n : n + len(extra)]
+    state = curve.evaluate(u).state
+    augmentation = extremal_of(curve.augmentation.own, state, extra, beside, turning, sizes, extra_spans)
     return replace(curve, augmentation=augmentation)
 
 

@@ -85,6 +85,11 @@ class TrackedBranch(Branch):
         self.turning = turning
 
     @property
+    def plane(self) -> tuple[str, str]:
+        """The two parameters that it is drawn over: of a curve of extrema the third one and the extreme one."""
+        return (self.names[-1], self.turning) if self.turning else (self.names[0], self.names[1])
+
+    @property
     def extrema(self) -> list[Bifurcation]:
         """Where the curve turns in one of its parameters (`parameter_name`), in the order met."""
         return self.bifurcations["extremum"]

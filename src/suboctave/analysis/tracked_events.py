@@ -20,6 +20,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
+import numpy as np
 from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
@@ -46,7 +47,7 @@ _RESOLVED, _ROUGH = 1e-11, 1e-3
 #: component of the tangent in scaled arclength that may be rounding at both ends of a step
 _LEVEL = 1e-9
 #: share of a step within which events coincide
-_SAME = 1e-5
+_SAME = 5e-3
 
 
 class CurveTest(ABC):
@@ -388,7 +389,8 @@ def _isola(found: Found) -> str:
         return ""
     (beside,) = set(curve.names) - {found.test.name}
     sizes = dict(zip(curve.names, curve.spans, strict=True))
-    extremal = extremal_of(curve.augmentation, sample.state, sample.evaluation.extra, beside, found.test.name, sizes)
+    extra = sample.evaluation.extra
+    extremal = extremal_of(curve.augmentation, sample.state, extra, beside, found.test.name, sizes, np.ones(len(extra)))
     equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
     return equations.isola
 

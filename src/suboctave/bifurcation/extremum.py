@@ -117,7 +117,13 @@ class ExtremalEquations(Equations):
 
 
 def extremal_of(
-    base: Augmentation, state: BalanceState, extra: Array, beside: str, turning: str, spans: Mapping[str, float]
+    base: Augmentation,
+    state: BalanceState,
+    extra: Array,
+    beside: str,
+    turning: str,
+    spans: Mapping[str, float],
+    extra_spans: Array,
 ) -> Extremal:
     """The extremum of a parameter along a curve of bifurcations, at a motion near it.
 
@@ -127,12 +133,12 @@ def extremal_of(
         What singles the bifurcation out, with bordering vectors of this motion, and its extra unknowns.
     beside, turning
         The two parameters of the curve, the latter extreme.
-    spans
-        Sizes of all free parameters by name.
+    spans, extra_spans
+        Sizes of all free parameters by name, and of the extra unknowns.
     """
     if isinstance(base, SingularOperator) and base.name == "LP":
         return LimitPointExtremal(base, beside, state.force_scale() / spans[beside], turning)
-    return BorderedExtremal.of(base, state, extra, beside, turning, spans)
+    return BorderedExtremal.of(base, state, extra, beside, turning, spans, extra_spans)
 
 
 @dataclass(frozen=True)
@@ -239,6 +245,7 @@ class BorderedExtremal(Extremal):
     force: float
     size: float
     sizes: Mapping[str, float]
+    extra_sizes: Array
     turning: str = ""
 
     @classmethod
@@ -250,12 +257,13 @@ class BorderedExtremal(Extremal):
         beside: str,
         turning: str,
         sizes: Mapping[str, float],
+        extra_sizes: Array,
     ) -> BorderedExtremal:
         """With the singular vectors of M at a motion."""
         weight = state.balance.per_unknown(state.balance.scales()[0])
         size = length(weight * state.x.ravel()) or 1.0
         blank = np.zeros(state.balance.dimension + base.extras + 1)
-        own = cls(base, beside, blank, blank, state.force_scale() or 1.0, size, dict(sizes), turning)
+        own = cls(base, beside, blank, blank, state.force_scale() or 1.0, size, dict(sizes), extra_sizes, turning)
         matrix = own.at(state, extra, tuple(sizes)).matrix
         u, _, vt = np.linalg.svd(matrix)
         return replace(own, right=vt[-1], left=u[:, -1])
@@ -315,7 +323,7 @@ class BorderedExtremalEquations(ExtremalEquations):
         """Of the unknowns."""
         state, of = self.state, self.of
         weight = state.balance.per_unknown(state.balance.scales()[0])
-        return np.concatenate((of.size / weight, of.base.spans(state.rate), [of.sizes[name] for name in self.names]))
+        return np.concatenate((of.size / weight, of.extra_sizes, [of.sizes[name] for name in self.names]))
 
     @property
     def matrix(self) -> Array:
@@ -367,14 +375,15 @@ class BorderedExtremalEquations(ExtremalEquations):
         return np.vstack((self.base.rows, row / self._sizes))
 
     def _moved(self, by: Array) -> BorderedExtremalEquations:
-        """The equations beside, for unknowns changed in the units of `BorderedExtremal`."""
+        """The equations for M and h beside, for unknowns changed in the units of `BorderedExtremal`."""
         state, step = self.state, by * self._sizes
         n, q = state.balance.dimension, len(self.extra)
         x = state.x + state.balance.spread(step[:n])
         change = dict(zip(self.names, step[n + q :].tolist(), strict=True))
         omega = state.omega + change.pop("omega", 0.0)
         values = {**state.values, **{name: state.values[name] + d for name, d in change.items()}}
-        return self.of.at(state.balance.at(x, omega, values), self.extra + step[n : n + q], self.names)
+        # M has a column of that parameter alone
+        return self.of.at(state.balance.at(x, omega, values), self.extra + step[n : n + q], (self.of.beside,))
 
     @property
     def curvature(self) -> float:

@@ -222,7 +222,7 @@ def _with_tracked(dataset: xarray.Dataset, branch: BranchLike, rows: Sequence[Ev
     if kind is None:
         return dataset
     meaning = {"long_name": "coefficient of the normal form: a of limit points, c3 of period doublings, else nan"}
-    dataset = dataset.assign_attrs(tracked=str(kind), plane="\n".join(getattr(branch, "names", ())))
+    dataset = dataset.assign_attrs(tracked=str(kind), plane="\n".join(getattr(branch, "plane", ())))
     return dataset.assign(
         coefficient=("point", np.asarray(getattr(branch, "coefficient", np.empty(0)), dtype=float), meaning),
         event_extreme=("event", np.array([row.extreme for row in rows], dtype=object)),

@@ -1,4 +1,4 @@
-"""The step "track": a bifurcation of an earlier branch in two parameters."""
+"""The step "track": a bifurcation of an earlier branch in two parameters, an extremum of such a curve in a third."""
 
 from __future__ import annotations
 
@@ -56,8 +56,10 @@ class Track(CurveStep):
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
-        elif kind not in TRACKED_KINDS:
+        elif kind not in (*TRACKED_KINDS, "extremum"):
             yield ("start", "bifurcation"), f"{kind} cannot be tracked{suggest(kind, TRACKED_KINDS)}"
+        elif kind == "extremum" and not isinstance(self.parameter, str):
+            yield ("parameter",), "of an extremum is one name: the third parameter"
 
     def known(self, around: Surroundings) -> Known | None:
         """See `Step.known`: what varies along it are parameters, too."""
