@@ -186,8 +186,8 @@ def test_limit_points_and_tori_of_an_absorber_meet_in_a_resonance(absorber):
     limits = so.track(absorber["LP"][2], "F", (0.05, 0.2), omega=(1.0, 2.5))
     tori = so.track(absorber["NS"][0], "F", (0.05, 0.2))
     turns = {e.remark(): (e.omega, e.parameter("F")) for e in limits.extrema}
-    assert turns["minimum of F"] == pytest.approx((1.80265, 0.12466), abs=1e-5)
-    assert turns["maximum of F"] == pytest.approx((1.44059, 0.18562), abs=1e-5)
+    assert turns["minimum of F; isola centre"] == pytest.approx((1.80265, 0.12466), abs=1e-5)
+    assert turns["maximum of F; isola merging"] == pytest.approx((1.44059, 0.18562), abs=1e-5)
     (end,) = tori.bifurcations["R1"]
     on_limits = min(limits.bifurcations["R1"], key=lambda e: abs(e.omega - end.omega))
     assert (end.omega, end.parameter("F")) == pytest.approx((on_limits.omega, on_limits.parameter("F")), abs=1e-7)

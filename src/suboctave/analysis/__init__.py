@@ -2,6 +2,7 @@
 
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
+from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
@@ -24,6 +25,7 @@ __all__ = [
     "find_subharmonics",
     "frequency_response",
     "load",
+    "locate_extremum",
     "periodic_orbit",
     "stability",
     "switch_branch",

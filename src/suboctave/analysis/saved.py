@@ -315,7 +315,9 @@ class _Reader:
             lists[place][index] = event
         bifurcations, own = ([found[i] for i in range(len(found))] for found in lists)
         tracked = record.get("tracked")
-        make = partial(TrackedBranch, tracked["kind"], tracked["names"]) if tracked else Branch
+        make: Any = Branch
+        if tracked:
+            make = partial(TrackedBranch, tracked["kind"], tracked["names"], turning=tracked.get("turning", ""))
         branch: Branch = make(
             self.system,
             record["name"],

@@ -1,4 +1,4 @@
-"""`track`: a bifurcation followed in two parameters."""
+"""`track`: a bifurcation followed in two parameters, an extremum along a curve of them in a third."""
 
 from __future__ import annotations
 
@@ -7,41 +7,23 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
-from suboctave.analysis.track_follow import Box, TrackedTrace, follow_tracked
+from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
+from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, linear_part, solved_start
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_sample import null_row
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.augmented import (
-    Augmentation,
-    BranchPointUnfolded,
-    GrazingContactEquations,
-    SingularOperator,
-)
-from suboctave.bifurcation.gaps import levels
-from suboctave.bifurcation.tracked import TRACKED_KINDS
+from suboctave.bifurcation.formulation import Formulation, written
+from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
-from suboctave.continuation.march import make_point
-from suboctave.continuation.newton import correct
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import AdaptiveHarmonics
-from suboctave.harmonic.state import BalanceState
 from suboctave.stability import StabilityMethod
-
-_OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
-#: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
-_NEAR = 0.05
 
 Range = tuple[float, float]
 
@@ -60,17 +42,22 @@ def track(
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
+    formulation: Formulation | str | None = None,
 ) -> TrackedBranch:
     """The curve of a bifurcation in two parameters, in both directions, from end to end or closed.
+
+    Of an extremum along such a curve (one of its `extrema`): the curve of these extrema in a third parameter.
 
     Parameters
     ----------
     bifurcation
-        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods).
+        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); or one of the
+        `extrema` of a tracked curve.
     parameter
-        The second parameter, omega being the first; or two names, with omega kept.
+        The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
-        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside.
+        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside. The parameter that is extreme
+        is not bounded.
     omega
         Range of omega, rad per unit time; default: not bounded.
     harmonics
@@ -78,6 +65,10 @@ def track(
     max_step
         Largest distance between neighbours in scaled arclength: each parameter in units of its range (omega without a
         range in units of its value at the start), the motion in units of its own size.
+
+    formulation
+        As in `frequency_response`: with "extended" the null vector is among the unknowns, with "alcorta2019" period
+        doublings are those of the published system.
 
     Other parameters as `frequency_response`.
 
@@ -99,38 +90,45 @@ def track(
     Minimally augmented systems (`bifurcation.augmented`) and pseudo-arclength. A branch point can be followed only
     where a symmetry forces it; the curve ends where that is broken.
     """
-    names, ranges = _free(bifurcation, parameter, bounds, omega)
+    turning = bifurcation.parameter_name if is_extremum(bifurcation) else ""
+    if is_extremum(bifurcation):
+        names, ranges = _third(bifurcation, parameter, bounds, omega)
+    else:
+        names, ranges = _free(bifurcation, parameter, bounds, omega)
     orbit = bifurcation.orbit
     system = orbit.system
-    settings = make_settings(system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability)
+    settings = make_settings(
+        system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
+    )
     basis = orbit.basis
     wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
-    adaptive, basis = _discretisation(basis, wanted)
+    adaptive, basis = discretisation(basis, wanted)
     second = ranges[1]
     assert second is not None
     ends = (min(second), max(second))
     first = None if ranges[0] is None else (min(ranges[0]), max(ranges[0]))
     box = Box(first, ends)
     computation_begins()
-    with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[1]}") as report:
+    with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[-1]}") as report:
         settings = replace(settings, report=report)
-        balance = HarmonicBalance(system, basis, linear=_linear_part(bifurcation))
-        start = _start(bifurcation, balance, adaptive, names, box, settings)
+        balance = HarmonicBalance(system, basis, linear=linear_part(bifurcation))
+        start = solved_start(bifurcation, balance, adaptive, names, box, settings)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     options = {
-        "bounds": {name: r for name, r in zip(names, ranges, strict=True) if r is not None},
+        "bounds": {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None},
         "harmonics": asdict(wanted) if isinstance(wanted, AdaptiveHarmonics) else wanted,
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),
         "stability": settings.stability.name,
+        "formulation": written(settings.formulation),
         "observe": settings.observe,
     }
-    context = {"system": system, "parameter": names[1], **options}
+    context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
-        bifurcation.kind,
+        kind_of(bifurcation),
         names,
         system,
-        names[1],
+        names[-1],
         trace.points,
         [replace(event, context=context) for event in trace.events],
         [],
@@ -139,19 +137,45 @@ def track(
         settings.observe,
         options,
         tuple(trace.warnings),
+        turning=turning,
     )
+
+
+def _third(
+    item: TrackedEvent, parameter: Any, bounds: Any, omega: Any
+) -> tuple[tuple[str, ...], tuple[Range | None, Range | None]]:
+    """The three parameters in which an extremum is followed, and the ranges of the first and the last, checked."""
+    system = item.orbit.system
+    if len(item.names) != 2:
+        raise InputError(
+            f"this extremum lies on a curve in {', '.join(item.names)}: only those along curves in two parameters can "
+            "be followed in another one"
+        )
+    if not isinstance(parameter, str):
+        raise InputError(f"an extremum is followed in one more parameter: give its name, not {parameter!r}")
+    check_parameter(system, parameter)
+    if parameter in item.names:
+        raise InputError(f"{parameter} is free on the curve of this extremum already: name a third parameter")
+    if omega is not None and item.names[0] != "omega":
+        raise InputError("omega= bounds omega where it is free, which it is not on the curve of this extremum")
+    first = None if omega is None else check_range("omega", omega, positive=True)
+    ranges = (first, check_bounds(system, parameter, bounds))
+    _check_inside(item, (item.names[0], parameter), ranges)
+    return (*item.names, parameter), ranges
 
 
 def _free(
     item: Bifurcation, parameter: Any, bounds: Any, omega: Any
-) -> tuple[tuple[str, str], tuple[Range | None, Range | None]]:
+) -> tuple[tuple[str, ...], tuple[Range | None, Range | None]]:
     """The two free parameters and their ranges, checked."""
     if not isinstance(item, Bifurcation):
         raise InputError(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
         )
     if item.kind not in TRACKED_KINDS:
-        raise InputError(f"track follows {', '.join(TRACKED_KINDS)}; this is a {item.kind}")
+        raise InputError(
+            f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves; this is a {item.kind}"
+        )
     system = item.orbit.system
     if isinstance(parameter, str):
         names: tuple[str, str] = ("omega", parameter)
@@ -174,114 +198,23 @@ def _free(
         if not isinstance(bounds, Sequence) or len(bounds) != 2 or any(is_number(b) for b in bounds):
             raise InputError(f"bounds of two parameters are two ranges, ((from, to), (from, to)), not {bounds!r}")
         first, second = (check_bounds(system, name, r) for name, r in zip(names, bounds, strict=True))
-    for name, ends in zip(names, (first, second), strict=True):
+    _check_inside(item, names, (first, second))
+    return names, (first, second)
+
+
+def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range | None, Range | None]) -> None:
+    """Refuse a bifurcation outside the ranges."""
+    for name, ends in zip(names, ranges, strict=True):
         if ends is None:
             continue
         value, (low, high) = item.parameter(name), sorted(ends)
         slack = 1e-9 * (high - low)
         if not low - slack <= value <= high + slack:
             raise InputError(f"the bifurcation has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
-    return names, (first, second)
 
 
 def _observed(item: Bifurcation, observe: int | None) -> int | None:
     return item.context.get("observe") if observe is None and item.context else observe
-
-
-def _discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
-    if isinstance(wanted, str) and wanted == "adaptive":
-        wanted = AdaptiveHarmonics()
-    if isinstance(wanted, AdaptiveHarmonics):
-        return wanted, basis.filled
-    if isinstance(wanted, (int, np.integer)) and not isinstance(wanted, bool) and wanted >= 1:
-        return None, HarmonicBasis(int(wanted) * basis.nu, basis.nu)
-    raise InputError(
-        f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {wanted!r}'
-    )
-
-
-def _linear_part(item: Bifurcation) -> LinearPart | None:
-    """The linear part a bifurcation was solved with, at its parameters; None for its system's own matrices."""
-    linear = item.orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
-
-
-def _augmentation(item: Bifurcation, state: BalanceState, names: tuple[str, str]) -> tuple[Augmentation, np.ndarray]:
-    """What singles the bifurcation out, and the start of its extra unknowns."""
-    if item.kind == "grazing":
-        assert item.contact is not None
-        places = np.array(levels(state.local(item.contact.element)))
-        index = int(np.argmin(np.abs(places - item.contact.gap)))
-        tau = item.contact.time * state.rate
-        return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
-    if item.kind == "BP":
-        return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
-    kind = _OPERATORS[item.kind]
-    extra = np.zeros(0)
-    if kind is Kind.FREE:
-        kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
-        extra = np.array([kappa])
-    return SingularOperator.of(state, kind, float(extra.sum())), extra
-
-
-def _start(
-    item: Bifurcation,
-    balance: HarmonicBalance,
-    adaptive: AdaptiveHarmonics | None,
-    names: tuple[str, str],
-    box: Box,
-    settings: Settings,
-) -> CurvePoint:
-    """The bifurcation solved again as a point of the curve, in a basis that suits it."""
-    orbit = item.orbit
-    x = orbit.basis.resized(orbit.coefficients, balance.basis)
-    balance = balance.settle(x, orbit.omega)
-    state = balance.at(x, orbit.omega)
-    augmentation, extra = _augmentation(item, state, names)
-    values = np.array([item.parameter(name) for name in names])
-    for i, ends in enumerate((box.first, box.second)):
-        if ends is not None:
-            values[i] = min(ends[1], max(ends[0], values[i]))
-    first = abs(values[0]) or 1.0
-    if box.first is not None:
-        first = box.first[1] - box.first[0]
-    spans = (first, box.second[1] - box.second[0])
-    force = state.force_scale()
-    floor = 0.0 if force > 0.0 else 1e-8 * orbit.omega**2
-    curve = TrackedCurve(
-        balance,
-        augmentation,
-        names,
-        spans,
-        orbit.omega,
-        adaptive,
-        # between what a response curve needs and what a located event does
-        0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
-        max(force, floor),
-        floor,
-        {balance.basis: balance},
-    )
-    u = curve.join(x, extra, values)
-    begin = u
-    origin = curve
-    try:
-        for _ in range(8):
-            weights = curve.weights(u, 0.0)
-            row = null_row(curve, u, weights)
-            if abs(row[-1]) > 1e-2:
-                row = np.eye(1, len(row), len(row) - 1)[0]
-            solved = correct(curve, u, row, weights, settings.newton)
-            adapted = curve.adapted(solved.u, solved.evaluation)
-            same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
-            if same:
-                break
-            u, curve = adapted.transfer(solved.u, curve), adapted
-        moved = weights * (solved.u - curve.transfer(begin, origin))
-        if float(np.linalg.norm(moved)) > _NEAR:
-            raise ConvergenceError(f"what was found lies elsewhere, at {curve.where(solved.u)}")
-        return make_point(solved, curve, None, 0.0)
-    except ConvergenceError as failure:
-        raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
 
 
 def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> TrackedTrace:
@@ -303,9 +236,12 @@ def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) ->
 
 def _leads_inside(point: CurvePoint, box: Box) -> bool:
     """Whether a curve that begins at a point stays within its ranges there."""
-    for index, ends in ((-2, box.first), (-1, box.second)):
+    assert isinstance(point.curve, TrackedCurve)
+    names = point.curve.names
+    for name, ends in ((names[0], box.first), (names[-1], box.second)):
         if ends is None:
             continue
+        index = point.curve.index(name)
         low, high = ends
         value, slope = point.u[index], point.tangent[index]
         slack = 1e-9 * (high - low)

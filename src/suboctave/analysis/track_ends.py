@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class End:
 
 def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
     """The end of a curve between two neighbours, None if it goes on."""
-    augmentation = b.curve.augmentation
+    augmentation = b.curve.augmentation.own
     if isinstance(augmentation, BranchPointUnfolded):
         beta = float(b.evaluation.extra[0])
         if abs(beta) > _UNFOLDING:
@@ -85,6 +86,8 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
 def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""
     name, operator, words = ("R2", Kind.HALF, "1:2") if double else ("R1", Kind.INTEGER, "1:1")
+    if a.curve.augmentation.turning:
+        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)}")
     try:
         found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(name), newton, _AROUND)
     except ConvergenceError as failure:
@@ -95,7 +98,7 @@ def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
 def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
     """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
     basis = a.curve.balance.basis
-    if a.curve.augmentation.name != "LP" or basis.nu % 2:
+    if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
         return None
     parent = HarmonicBasis(max(1, basis.harmonics // 2), basis.nu // 2)
     x = np.zeros((parent.size, a.curve.balance.size))
@@ -155,9 +158,14 @@ def _parts(point: CurvePoint) -> list[Array]:
     basis = curve.balance.basis
     nu = basis.nu
     x = point.u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
-    k = np.repeat(np.arange(1, basis.harmonics + 1), 2)
+    return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
+
+
+@lru_cache(maxsize=64)
+def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
+    k = np.append(0, np.repeat(np.arange(1, harmonics + 1), 2))
     primes = [d for d in range(2, nu + 1) if nu % d == 0 and all(d % e for e in range(2, math.isqrt(d) + 1))]
-    return [x[1:][k % prime != 0].ravel() for prime in primes]
+    return [np.flatnonzero(k % prime) for prime in primes]
 
 
 __all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from suboctave.analysis.extremum import polished
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
+from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import CurveTest, as_event, events_between, refined, tests_of
@@ -48,14 +50,6 @@ class TrackedTrace:
         ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
         warnings = self.warnings + other.warnings
         return TrackedTrace(points, events, warnings, False, ended, other.interrupted)
-
-
-@dataclass(frozen=True)
-class Box:
-    """Ranges of the two free parameters, None where one is not bounded: the curve ends where it leaves them."""
-
-    first: tuple[float, float] | None
-    second: tuple[float, float]
 
 
 def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> TrackedTrace:
@@ -144,7 +138,7 @@ class _Tracker:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
         for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
-            item = refined(found, settings.newton, self.trace.warnings)
+            item = polished(refined(found, settings.newton, self.trace.warnings), settings.newton)
             self.trace.events.append(as_event(item, settings.stability, settings.observe))
         self._add(new)
         self.previous = new
@@ -163,6 +157,8 @@ class _Tracker:
                 self.settings.stability,
                 sample.instant_or_frequency,
                 sample.coefficient,
+                extreme=sample.extreme,
+                isola=sample.isola,
             )
         )
 
@@ -202,12 +198,12 @@ class _Tracker:
         if self.box.first is None:
             return True
         low, high = self.box.first
-        return low <= float(sample.point.u[-2]) <= high
+        return low <= float(sample.point.u[sample.curve.index(sample.curve.names[0])]) <= high
 
     def _landed(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
         """The point at which the curve leaves the range of its first parameter between two neighbours."""
         assert self.box.first is not None
-        index = b.curve.parameter - 1
+        index = b.curve.index(b.curve.names[0])
         low, high = self.box.first
         bound = low if b.point.u[index] < low else high
         left, right = 0.0, 1.0
@@ -238,4 +234,4 @@ def _drop_seam(events: list[TrackedEvent]) -> None:
             events.pop()
 
 
-__all__ = ["Box", "TrackedTrace", "follow_tracked"]
+__all__ = ["TrackedTrace", "follow_tracked"]

@@ -24,12 +24,14 @@ class TrackedPoint(BranchPoint):
     """One point of a tracked curve: a branch point with the extra unknown and the coefficient of its normal form.
 
     `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0; `coefficient` the one that decides the
-    normal form of an LP (a) or a PD (c3), else nan. The multipliers are computed when asked for, by `method`, unless
-    they are `known`.
+    normal form of an LP (a) or a PD (c3), else nan; `extreme` and `isola` say on a curve of extrema of which nature
+    they are (`TrackedEvent`). The multipliers are computed when asked for, by `method`, unless they are `known`.
     """
 
     extra: float
     coefficient: float
+    extreme: str
+    isola: str
 
     def __init__(
         self,
@@ -40,9 +42,11 @@ class TrackedPoint(BranchPoint):
         extra: float = 0.0,
         coefficient: float = float("nan"),
         known: FloquetResult | None = None,
+        extreme: str = "",
+        isola: str = "",
     ) -> None:
         said = {"orbit": orbit, "arclength": arclength, "iterations": iterations, "method": method, "extra": extra}
-        self.__dict__.update(said, coefficient=coefficient)
+        self.__dict__.update(said, coefficient=coefficient, extreme=extreme, isola=isola)
         if known is not None:
             self.__dict__["floquet"] = known
 
@@ -56,7 +60,7 @@ class TrackedPoint(BranchPoint):
         """The same at another place on the curve."""
         kept = self.__dict__
         args = self.orbit, arclength, self.iterations, kept["method"], self.extra, self.coefficient
-        return TrackedPoint(*args, kept.get("floquet"))
+        return TrackedPoint(*args, kept.get("floquet"), self.extreme, self.isola)
 
 
 class TrackedBranch(Branch):
@@ -67,15 +71,18 @@ class TrackedBranch(Branch):
     kind
         "LP", "BP", "PD", "NS" or "grazing".
     names
-        The two free parameters; `name` is the second.
+        The two free parameters; `name` is the second. Three of a curve of extrema; `name` is the third.
+    turning
+        The one of them that is extreme all along a curve of extrema; else empty.
     bifurcations
         Extrema of either parameter and points of codimension two, in the order met; `extrema` the former.
     """
 
-    def __init__(self, kind: str, names: tuple[str, str], *args: Any, **named: Any) -> None:
+    def __init__(self, kind: str, names: tuple[str, ...], *args: Any, turning: str = "", **named: Any) -> None:
         super().__init__(*args, **named)
         self.kind = kind
         self.names = names
+        self.turning = turning
 
     @property
     def extrema(self) -> list[Bifurcation]:
@@ -105,6 +112,16 @@ class TrackedBranch(Branch):
         return np.array([p.coefficient for p in self.tracked])
 
     @property
+    def extreme(self) -> list[str]:
+        """Along a curve of extrema whether each is a "minimum" or a "maximum" of `turning`; else empty texts."""
+        return [p.extreme for p in self.tracked]
+
+    @property
+    def isola(self) -> list[str]:
+        """Along a curve of extrema of limit points "isola_centre" or "isola_merging" (`TrackedEvent`), else empty."""
+        return [p.isola for p in self.tracked]
+
+    @property
     def tracked(self) -> tuple[TrackedPoint, ...]:
         """The points, with what only tracked curves have."""
         return self.points  # type: ignore[return-value]
@@ -132,7 +149,8 @@ class TrackedBranch(Branch):
 
     def __repr__(self) -> str:
         ends = [", ".join(f"{n}={self.parameter(n)[i]:.6g}" for n in self.names) for i in (0, -1)]
-        text = f"{self.kind} curve: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."
+        what = f"{self.kind} curve, extrema of {self.turning}" if self.turning else f"{self.kind} curve"
+        text = f"{what}: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."
         for warning in self.warnings:
             text += f"\n  note: {warning}"
         return text + "\n" + repr(self.bifurcations)
@@ -143,16 +161,19 @@ def tracked_record(branch: TrackedBranch) -> dict[str, Any]:
     return {
         "kind": branch.kind,
         "names": branch.names,
+        "turning": branch.turning,
         "extra": [p.extra for p in branch.tracked],
         "coefficient": [p.coefficient for p in branch.tracked],
+        "nature": [(p.extreme, p.isola) for p in branch.tracked],
     }
 
 
 def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> list[Any]:
     """Points that were read, as those of a tracked curve."""
+    natures = record.get("nature") or [("", "")] * len(points)
     return [
-        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet)
-        for p, extra, coefficient in zip(points, record["extra"], record["coefficient"], strict=True)
+        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet, *nature)
+        for p, extra, coefficient, nature in zip(points, record["extra"], record["coefficient"], natures, strict=True)
     ]
 
 

@@ -1,7 +1,8 @@
-"""Bifurcations in two free parameters as curves for the continuation engine: unknowns `u = (X, extra, p, q)`.
+"""Bifurcations in two free parameters as curves for the continuation engine: unknowns `u = (X, extra, p, q)`; their
+extrema in three, `(X, extra, p, q, r)`.
 
 `extra` are the unknowns that come with the kind (kappa, an unfolding, an instant; `bifurcation.augmented`), p and q the
-free parameters, "omega" and a named one, or two named ones. The engine's free parameter is the last, q.
+free parameters, "omega" and a named one, or two named ones. The engine's free parameter is the last.
 """
 
 from __future__ import annotations
@@ -73,13 +74,14 @@ class TrackedEvaluation:
         """Derivatives by u, shape (N, N + 1)."""
         state, equations = self.state, self.equations
         n, q = state.balance.dimension, len(self.extra)
-        out = np.zeros((n + q + 1, n + q + 2))
+        rows = equations.rows
+        out = np.zeros((n + rows.shape[0], rows.shape[1]))
         out[:n, :n] = state.jacobian
         if equations.column is not None:
             out[:n, n] = equations.column
         for i, name in enumerate(self.curve.names):
             out[:n, n + q + i] = state.residual_by(name)
-        out[n:] = equations.rows
+        out[n:] = rows
         out[n:] *= self.curve.force
         return out
 
@@ -98,14 +100,14 @@ class TrackedEvaluation:
 
 @dataclass(frozen=True, eq=False)
 class TrackedCurve:
-    """Bifurcations of one kind in two free parameters.
+    """Bifurcations of one kind in two free parameters, or extrema along curves of them in three.
 
     balance
         Equations of motion in the present basis.
     augmentation
         What singles the bifurcation out, with its bordering vectors.
     names, spans
-        The two free parameters and the widths of their ranges.
+        The free parameters and the widths of their ranges.
     omega
         Frequency, where it is not free.
     adaptive, tolerance
@@ -118,8 +120,8 @@ class TrackedCurve:
 
     balance: HarmonicBalance
     augmentation: Augmentation
-    names: tuple[str, str]
-    spans: tuple[float, float]
+    names: tuple[str, ...]
+    spans: tuple[float, ...]
     omega: float
     adaptive: AdaptiveHarmonics | None
     tolerance: float
@@ -130,12 +132,12 @@ class TrackedCurve:
 
     @property
     def parameter(self) -> int:
-        """Index of the second free parameter in u: the last."""
-        return self.balance.dimension + self.augmentation.extras + 1
+        """Index of the last free parameter in u, the last entry."""
+        return self.balance.dimension + self.augmentation.extras + len(self.names) - 1
 
     def index(self, name: str) -> int:
         """Index of one of the free parameters in u."""
-        return self.parameter - 1 + self.names.index(name)
+        return self.balance.dimension + self.augmentation.extras + self.names.index(name)
 
     @lazy
     def _weight(self) -> Array:
@@ -145,12 +147,13 @@ class TrackedCurve:
         """Coefficients (2 H + 1, size), extra unknowns, omega and parameter values of a vector u."""
         n = self.balance.dimension
         x = u[:n].reshape(self.balance.basis.size, self.balance.size)
-        free = dict(zip(self.names, u[-2:].tolist(), strict=True))
+        extra, parameters = np.split(u[n:], [self.augmentation.extras])
+        free = dict(zip(self.names, parameters.tolist(), strict=True))
         omega = free.pop("omega", self.omega)
-        return x, u[n:-2], omega, {**self.balance.values, **free}
+        return x, extra, omega, {**self.balance.values, **free}
 
     def join(self, x: Array, extra: Array, values: Array) -> Array:
-        """The vector u of coefficients, extra unknowns and the two parameters."""
+        """The vector u of coefficients, extra unknowns and the free parameters."""
         return np.concatenate((x.ravel(), extra, values))
 
     def evaluate(self, u: Array) -> TrackedEvaluation:
@@ -169,7 +172,7 @@ class TrackedCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * largest) or 1.0
-        extra = self.augmentation.spans(self.evaluate(u).state)
+        extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu)
         return self.join(self._weight / size, 1.0 / extra, 1.0 / np.array(self.spans))
 
     def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
@@ -221,11 +224,13 @@ class TrackedCurve:
             return u
         n = origin.balance.dimension
         x = u[:n].reshape(basis.size, -1)
-        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), u[n:]))
+        extra = origin.augmentation.carried(u[n:-2], self.balance.basis, self.balance.size)
+        return np.concatenate((basis.resized(x, self.balance.basis).ravel(), extra, u[-2:]))
 
     def images(self, u: Array) -> list[Array]:
         """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""
         basis, n = self.balance.basis, self.balance.dimension
+        extra, parameters = np.split(u[n:], [self.augmentation.extras])
         found = []
         for shift in range(basis.nu):
             turn = 2.0 * np.pi * shift / basis.nu
@@ -234,12 +239,13 @@ class TrackedCurve:
             y = x.copy()
             y[1::2] = np.cos(angle) * x[1::2] + np.sin(angle) * x[2::2]
             y[2::2] = np.cos(angle) * x[2::2] - np.sin(angle) * x[1::2]
-            found.append(self.join(y, self.augmentation.shifted(u[n:-2], turn), u[-2:]))
+            found.append(self.join(y, self.augmentation.shifted(extra, turn), parameters))
         return found
 
     def where(self, u: Array) -> str:
-        """Where in the plane of the two parameters, in words."""
-        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, u[-2:], strict=True))
+        """Where in the plane of the parameters, in words."""
+        values = u[-len(self.names) :]
+        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, values, strict=True))
 
 
 __all__ = ["TrackedCurve", "TrackedEvaluation"]

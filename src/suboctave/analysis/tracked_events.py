@@ -15,6 +15,7 @@ by the cusp's function keep their signs. (Kuznetsov, Elements of Applied Bifurca
 
 from __future__ import annotations
 
+import itertools
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -23,20 +24,29 @@ from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
-from suboctave.bifurcation.augmented import SingularOperator
+from suboctave.bifurcation.augmented import GrazingEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.extremum import extremal_of
+from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
-from suboctave.continuation.march import point_between
-from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import CurvePoint, between, make_point, point_between
+from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import choose_harmonics
 from suboctave.stability import StabilityMethod
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
-#: share of a step to which an event is located
-_RESOLVED = 1e-11
+#: share of a step to which an event is located, at once and where more harmonics are to follow
+_RESOLVED, _ROUGH = 1e-11, 1e-3
+#: component of the tangent in scaled arclength that may be rounding at both ends of a step
+_LEVEL = 1e-9
+#: share of a step within which events coincide
+_SAME = 1e-5
 
 
 class CurveTest(ABC):
@@ -64,7 +74,14 @@ class Extremum(CurveTest):
         """See `CurveTest.value`."""
         slope = float(sample.point.tangent[sample.curve.index(self.name)])
         # at a cusp both change sign
-        return slope / sample.bend if sample.curve.augmentation.name == "LP" and sample.bend != 0.0 else slope
+        plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
+        return slope / sample.bend if plane and sample.bend != 0.0 else slope
+
+    def level(self, *samples: TrackedSample) -> bool:
+        """Whether the parameter stays as it is but for rounding."""
+        indices = [sample.curve.index(self.name) for sample in samples]
+        points = [sample.point for sample in samples]
+        return all(abs(p.tangent[i] * p.weights[i]) < _LEVEL for p, i in zip(points, indices, strict=True))
 
 
 @dataclass(frozen=True)
@@ -140,7 +157,7 @@ class FoldFlip(CurveTest):
 def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns = tuple(Extremum(name) for name in curve.names)
-    augmentation = curve.augmentation
+    augmentation = curve.augmentation.own
     if not isinstance(augmentation, SingularOperator):
         return turns
     own: dict[Kind, tuple[CurveTest, ...]] = {
@@ -153,11 +170,14 @@ def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
 
 @dataclass(frozen=True)
 class Found:
-    """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns."""
+    """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns; `rough`:
+    where more harmonics are to locate it better.
+    """
 
     test: CurveTest
     sample: TrackedSample
     extreme: str = ""
+    rough: _Stretch | None = None
 
 
 def events_between(
@@ -168,17 +188,43 @@ def events_between(
     for test in tests:
         try:
             for low, high in _brackets(test, a, b, newton):
-                sample = _zero_between(low, high, test.within(low, high), newton)
-                found.append(Found(test, sample, _extreme(test, low)))
+                stretch = _Stretch(low, high, test.within(low, high), newton)
+                sample = stretch.zero(_ROUGH)
+                # what more harmonics will move need not be known better
+                finer = _finer(sample) is not None
+                sample = sample if finer else stretch.zero(_RESOLVED)
+                found.append(Found(test, sample, _extreme(test, low), stretch if finer else None))
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
+    if b.curve.augmentation.turning:
+        found = _without_consequences(found, b.curve, _SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
+    """Events along a curve of extrema without those that others bring about.
+
+    Where the third parameter turns the extreme one does so too: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M.
+    At a cusp a symmetry may have both turn, which makes no extremum of either.
+    """
+    extreme, last = curve.augmentation.turning, curve.names[-1]
+
+    def beside(item: Found, others: list[Found]) -> bool:
+        return any(abs(item.sample.point.arclength - o.sample.point.arclength) <= near for o in others)
+
+    turns = {name: [i for i in found if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
+    cusps = [item for item in found if isinstance(item.test, Cusp)]
+    both = [item for item in turns[extreme] if beside(item, turns[last])]
+    dropped = both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
+    return [item for item in found if not any(item is d for d in dropped)]
 
 
 def _brackets(
     test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
 ) -> list[tuple[TrackedSample, TrackedSample]]:
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    if isinstance(test, Extremum) and test.level(a, b):
+        return []
     first, last = test.value(a), test.value(b)
     if first * last < 0.0 or (last == 0.0 and first != 0.0):
         return [(a, b)]
@@ -208,16 +254,59 @@ def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
     return s if slope * math.copysign(1.0, start) < 0.05 * abs(start) else None
 
 
-def _zero_between(a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> TrackedSample:
-    """Where a test vanishes between two neighbours, by Brent's method on the way along the chord."""
-    known = {0.0: a, 1.0: b}
+class _Stretch:
+    """A test between two neighbours, by the share of the way along the chord."""
 
-    def value(share: float) -> float:
-        if share not in known:
-            known[share] = TrackedSample(point_between(a.point, b.point, share, newton))
-        return test.value(known[share])
+    def __init__(self, a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> None:
+        self.a, self.b = a, b
+        self.test = test
+        self.newton = newton
+        self.samples = {0.0: a, 1.0: b}
+        self.values = {0.0: test.value(a), 1.0: test.value(b)}
 
-    return known[float(brentq(value, 0.0, 1.0, xtol=_RESOLVED, rtol=8.9e-16))]
+    def value(self, share: float) -> float:
+        """The test's function."""
+        if share not in self.values:
+            sample = self.samples[share] = TrackedSample(self._point(share))
+            self.values[share] = self.test.value(sample)
+        return self.values[share]
+
+    def _point(self, share: float) -> CurvePoint:
+        """As `point_between`, started from the nearest points known."""
+        a, b = self.a.point, self.b.point
+        low = max(s for s in self.samples if s < share)
+        high = min(s for s in self.samples if s > share)
+        curve, weights, origin = b.curve, b.weights, b.curve.transfer(a.u, a.curve)
+        chord = b.u - origin
+        row = weights * chord
+        row = row / length(row)
+        guess = between(self.samples[low].point, self.samples[high].point, (share - low) / (high - low))
+        # a fixed plane for every share, whatever the start
+        ahead = share * float(row @ (weights * chord)) - float(row @ (weights * (guess - origin)))
+        solved = correct(curve, guess + ahead * row / weights, row, weights, self.newton)
+        return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
+
+    def zero(self, resolved: float) -> TrackedSample:
+        """Where the test vanishes, to a share of the way, by Brent's method."""
+        shares = sorted(self.values)
+        for low, high in itertools.pairwise(shares):
+            if self.values[low] * self.values[high] <= 0.0:
+                return self.samples_at(float(brentq(self.value, low, high, xtol=resolved, rtol=8.9e-16)))
+        raise ConvergenceError("the test does not change sign")
+
+    def samples_at(self, share: float) -> TrackedSample:
+        """The point at a share."""
+        self.value(share)
+        return self.samples[share]
+
+
+def _finer(sample: TrackedSample) -> HarmonicBasis | None:
+    """The basis that an event asks for, None where the present one will do."""
+    curve = sample.curve
+    if curve.adaptive is None:
+        return None
+    basis = choose_harmonics(sample.state, curve.adaptive, curve.adaptive.event_tolerance)
+    return basis if basis.harmonics > curve.balance.basis.harmonics else None
 
 
 def _extreme(test: CurveTest, a: TrackedSample) -> str:
@@ -231,18 +320,16 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     sample = found.sample
     arclength = sample.point.arclength
     for _ in range(6):
-        curve = sample.curve
-        if curve.adaptive is None:
-            break
-        basis = choose_harmonics(sample.state, curve.adaptive, curve.adaptive.event_tolerance)
-        if basis.harmonics <= curve.balance.basis.harmonics:
+        curve, basis = sample.curve, _finer(sample)
+        if basis is None:
             break
         finer = curve.with_basis(basis)
         u = finer.transfer(sample.point.u, curve)
         try:
             x, _, omega, values = finer.split(u)
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
-            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton)
+            along = finer.transfer(sample.point.tangent, curve)
+            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton, along)
             near = TrackedSample(start)
             test = found.test.within(near, near)
             sample = zero_along(start, test.value, newton, _BESIDE)
@@ -251,6 +338,8 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
                 f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
                 f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
+            if sample is found.sample and found.rough is not None:
+                sample = found.rough.zero(_RESOLVED)
             break
     if sample is found.sample:
         return found
@@ -274,7 +363,34 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
         curve=curve.augmentation.name,
         names=curve.names,
         extreme=found.extreme,
+        contact=_contact(sample),
+        isola=_isola(found),
+        turning=curve.augmentation.turning,
     )
+
+
+def _contact(sample: TrackedSample) -> GrazingContact | None:
+    """What grazes along a curve of grazings."""
+    equations = sample.evaluation.equations.own
+    if not isinstance(equations, GrazingEquations):
+        return None
+    state, of = sample.state, equations.of
+    local = state.local(of.element)
+    time = sample.instant_or_frequency / state.rate
+    value = float(sample.point.u[-1])
+    return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
+
+
+def _isola(found: Found) -> str:
+    """What happens to branches at an extremum along a curve of limit points."""
+    curve, sample = found.sample.curve, found.sample
+    if not isinstance(found.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
+        return ""
+    (beside,) = set(curve.names) - {found.test.name}
+    sizes = dict(zip(curve.names, curve.spans, strict=True))
+    extremal = extremal_of(curve.augmentation, sample.state, sample.evaluation.extra, beside, found.test.name, sizes)
+    equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
+    return equations.isola
 
 
 __all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]

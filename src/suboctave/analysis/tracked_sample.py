@@ -15,6 +15,7 @@ from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations, SingularOperator
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
+from suboctave.bifurcation.extremum import ExtremalEquations
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -27,6 +28,8 @@ from suboctave.lazy import lazy
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
+#: way along a curve, in scaled arclength, that a zero may still be off by the last secant
+_AT_ZERO = 1e-10
 
 
 class TrackedSample:
@@ -43,7 +46,7 @@ class TrackedSample:
     @property
     def equations(self) -> SingularEquations:
         """The scalar equations, where they are those of a singular operator."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         assert isinstance(equations, SingularEquations)
         return equations
 
@@ -61,13 +64,13 @@ class TrackedSample:
     @property
     def kappa(self) -> float:
         """Frequency of the critical perturbation at an NS, else 0."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         return equations.kappa if isinstance(equations, SingularEquations) else 0.0
 
     @property
     def instant_or_frequency(self) -> float:
         """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, else 0."""
-        equations = self.evaluation.equations
+        equations = self.evaluation.equations.own
         if isinstance(equations, GrazingEquations):
             return equations.tau % (2.0 * math.pi)
         return self.kappa
@@ -75,7 +78,7 @@ class TrackedSample:
     @property
     def vectors(self) -> NullVectors | None:
         """Null vectors of the singular operator, None where there is none."""
-        found = getattr(self.evaluation.equations, "bordered", None)
+        found = getattr(self.evaluation.equations.own, "bordered", None)
         return None if found is None else found.vectors
 
     @lazy
@@ -103,13 +106,27 @@ class TrackedSample:
     @lazy
     def coefficient(self) -> float:
         """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
-        augmentation = self.curve.augmentation
+        augmentation = self.curve.augmentation.own
         kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
         if kind is Kind.FREE:
             return float("nan")
         # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign
         turn = 1.0 if self.twist > 0.0 else -1.0
         return turn * (-0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+
+    @lazy
+    def extreme(self) -> str:
+        """On a curve of extrema whether it is a "minimum" or a "maximum", else empty."""
+        equations = self.evaluation.equations
+        if not isinstance(equations, ExtremalEquations):
+            return ""
+        return "minimum" if equations.curvature > 0.0 else "maximum"
+
+    @lazy
+    def isola(self) -> str:
+        """On a curve of extrema of limit points the type of `bifurcation.extremum`, else empty."""
+        equations = self.evaluation.equations
+        return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
     @property
     def other(self) -> float:
@@ -134,15 +151,17 @@ def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOption
     return TrackedSample(make_point(solved, curve, along, point.arclength))
 
 
-def nearest_point(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it.
+def nearest_point(
+    curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions, along: np.ndarray | None = None
+) -> CurvePoint:
+    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known.
 
     Raises
     ------
     ConvergenceError
         If Newton's method does not converge.
     """
-    row = null_row(curve, u, weights)
+    row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
     return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
 
 
@@ -172,20 +191,22 @@ def zero_along(
     row = weights * start.tangent
     row = row / length(row)
 
-    def at(s: float) -> TrackedSample:
-        solved = correct(curve, start.u + s * row / weights, row, weights, newton)
-        return TrackedSample(make_point(solved, curve, start.tangent, s))
-
     s, old = 0.02 * reach, 0.0
-    value_old = function(at(0.0))
+    value_old = function(TrackedSample(start))
+    guess = start.u + s * row / weights
+    before = start.u
     for _ in range(iterations):
-        sample = at(s)
+        solved = correct(curve, guess, row, weights, newton)
+        sample = TrackedSample(make_point(solved, curve, start.tangent, s))
         value = function(sample)
-        if value == 0.0 or abs(s - old) < 1e-11:
-            return sample
-        if value == value_old:
+        if value == value_old and value != 0.0:
             break
-        s, old, value_old = s - value * (s - old) / (value - value_old), s, value
+        change = value * (s - old) / (value - value_old) if value != 0.0 else 0.0
+        if abs(change) < _AT_ZERO:
+            return sample
+        # on the straight line through the last two, in the plane that belongs to the next
+        guess = solved.u - change * (solved.u - before) / (s - old)
+        s, old, value_old, before = s - change, s, value, solved.u
         if abs(s) > reach:
             break
     raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")

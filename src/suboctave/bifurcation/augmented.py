@@ -39,6 +39,11 @@ class Equations(ABC):
     column: Array | None = None
 
     @property
+    def own(self) -> Equations:
+        """Those of the bifurcation alone, without that of an extremum."""
+        return self
+
+    @property
     @abstractmethod
     def values(self) -> Array:
         """Values, shape (q + 1,), q the number of extra unknowns."""
@@ -46,14 +51,14 @@ class Equations(ABC):
     @property
     @abstractmethod
     def rows(self) -> Array:
-        """Derivatives by coefficients, extra unknowns and the two parameters, shape (q + 1, dimension + q + 2)."""
+        """Derivatives by coefficients, extra unknowns and the free parameters, shape (q + 1, dimension + q + 2)."""
 
     @abstractmethod
     def renewed(self) -> Augmentation:
         """The augmentation with bordering vectors of this motion."""
 
 
-def gradient_of(b: Bordered, names: tuple[str, str]) -> tuple[np.ndarray, dict[str, complex], complex]:
+def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
     """The gradient of g, the parameters' part apart: most of it is the same whatever the parameters are."""
     named = tuple(name for name in names if name != "omega")
     rates = form_rates(b.state, b.kind, b.left, b.right, named, b.kappa)
@@ -70,13 +75,20 @@ class Augmentation(ABC):
     name: str
     #: number of extra unknowns
     extras: int = 0
+    #: the parameter that has an extremum along curves of these bifurcations (`extremum`), empty where none need have
+    turning: str = ""
+
+    @property
+    def own(self) -> Augmentation:
+        """That of the bifurcation alone, without the equation of an extremum."""
+        return self
 
     @abstractmethod
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, str]) -> Equations:
-        """Evaluate at a motion, values of the extra unknowns, and the names of the two free parameters."""
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> Equations:
+        """Evaluate at a motion, values of the extra unknowns, and the names of the free parameters."""
 
-    def spans(self, state: BalanceState) -> Array:
-        """Natural sizes of the extra unknowns, shape (q,)."""
+    def spans(self, rate: float) -> Array:
+        """Natural sizes of the extra unknowns, shape (q,); rate: the base frequency."""
         return np.ones(self.extras)
 
     def resized(self, basis: HarmonicBasis, size: int) -> Augmentation:
@@ -85,6 +97,10 @@ class Augmentation(ABC):
 
     def shifted(self, extra: Array, angle: float) -> Array:
         """Extra unknowns of the motion shifted in time, `x(tau + angle)`."""
+        return extra
+
+    def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
+        """Extra unknowns in a basis with other harmonics."""
         return extra
 
 
@@ -114,13 +130,13 @@ class SingularOperator(Augmentation):
         """kappa, where it is free."""
         return 1 if self.kind is Kind.FREE else 0
 
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, str]) -> SingularEquations:
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> SingularEquations:
         """See `Augmentation.at`."""
         return SingularEquations(self, state, float(extra[0]) if self.extras else 0.0, names)
 
-    def spans(self, state: BalanceState) -> Array:
+    def spans(self, rate: float) -> Array:
         """kappa in units of the base frequency."""
-        return np.full(self.extras, state.rate)
+        return np.full(self.extras, rate)
 
     def resized(self, basis: HarmonicBasis, size: int) -> SingularOperator:
         """See `Augmentation.resized`."""
@@ -130,7 +146,7 @@ class SingularOperator(Augmentation):
 class SingularEquations(Equations):
     """g, or its real and imaginary part, in units of omega^2."""
 
-    def __init__(self, of: SingularOperator, state: BalanceState, kappa: float, names: tuple[str, str]) -> None:
+    def __init__(self, of: SingularOperator, state: BalanceState, kappa: float, names: tuple[str, ...]) -> None:
         self.of = of
         self.state = state
         self.kappa = kappa
@@ -196,7 +212,7 @@ class BranchPointUnfolded(Augmentation):
     name = "BP"
     extras = 1
 
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, str]) -> BranchPointEquations:
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> BranchPointEquations:
         """See `Augmentation.at`."""
         return BranchPointEquations(self, state, float(extra[0]), names)
 
@@ -208,7 +224,7 @@ class BranchPointUnfolded(Augmentation):
 class BranchPointEquations(Equations):
     """g in units of omega^2, and psi . R_p in units of the forces that balance, psi of unit length."""
 
-    def __init__(self, of: BranchPointUnfolded, state: BalanceState, beta: float, names: tuple[str, str]) -> None:
+    def __init__(self, of: BranchPointUnfolded, state: BalanceState, beta: float, names: tuple[str, ...]) -> None:
         self.of = of
         self.state = state
         self.names = names
@@ -274,11 +290,11 @@ class GrazingContactEquations(Augmentation):
     name = "grazing"
     extras = 1
 
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, str]) -> GrazingEquations:
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> GrazingEquations:
         """See `Augmentation.at`."""
         return GrazingEquations(self, state, float(extra[0]), names)
 
-    def spans(self, state: BalanceState) -> Array:
+    def spans(self, rate: float) -> Array:
         """tau in periods."""
         return np.array([2.0 * math.pi])
 
@@ -290,7 +306,7 @@ class GrazingContactEquations(Augmentation):
 class GrazingEquations(Equations):
     """`u(tau) - gap` and `du/dtau`, in units of the motion."""
 
-    def __init__(self, of: GrazingContactEquations, state: BalanceState, tau: float, names: tuple[str, str]) -> None:
+    def __init__(self, of: GrazingContactEquations, state: BalanceState, tau: float, names: tuple[str, ...]) -> None:
         self.of = of
         self.state = state
         self.tau = tau
@@ -323,7 +339,7 @@ class GrazingEquations(Equations):
         _, slope, curve = self.derivatives
         gap = [-level_rate(self.state, self.of.element, self.of.index, name) for name in self.names]
         above = np.concatenate((np.multiply.outer(first, direction).ravel(), [slope], gap))
-        level = np.concatenate((np.multiply.outer(second, direction).ravel(), [curve], [0.0, 0.0]))
+        level = np.concatenate((np.multiply.outer(second, direction).ravel(), [curve], np.zeros(len(gap))))
         return np.array([above, level]) / self.of.unit
 
     def renewed(self) -> GrazingContactEquations:

@@ -13,7 +13,7 @@ import numpy as np
 
 from suboctave.bifurcation.normal_form_real import Expansion
 from suboctave.continuation.linear import Factor
-from suboctave.harmonic import kernels
+from suboctave.harmonic import kernels, real_form
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real
 from suboctave.harmonic.bends import bends_of
 from suboctave.harmonic.perturbation import Kind
@@ -71,9 +71,5 @@ def _waves(vector: Array) -> ComplexArray:
 
 def _values(waves: ComplexArray, zr: Array, zi: Array) -> Array:
     """These functions at instants, up to a sign that all of them share."""
-    cosine = np.sqrt(0.5 * (1.0 + zr))
-    # beside tau = pi, where the cosine of the half angle vanishes, its sine does not
-    sine = np.copysign(np.sqrt(0.5 * (1.0 - zr)), zi)
-    values = kernels.polynomial(waves, zr, zi)
-    result: Array = values.real * cosine - values.imag * sine
+    result: Array = real_form.half_odd_values(waves, zr, zi)
     return result

@@ -11,7 +11,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 TRACKED_KINDS = ("LP", "BP", "PD", "NS", "grazing")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrackedEvent(Bifurcation):
     """A bifurcation of a tracked curve at which the curve turns, or at which a second condition holds.
 
@@ -23,16 +23,34 @@ class TrackedEvent(Bifurcation):
         The two free parameters.
     extreme
         "minimum" or "maximum" of `parameter_name` at an extremum, else empty.
+    isola
+        At an extremum along limit points what happens to branches over the other parameter when `parameter_name`
+        passes it: "isola_centre" (a closed branch shrinks to a point), "isola_merging" (two branches meet and
+        reconnect), empty where that is not certain.
+    turning
+        On a curve of extrema the parameter that is extreme all along it, else empty.
     """
 
     curve: str = ""
     names: tuple[str, ...] = ()
     extreme: str = ""
+    isola: str = ""
+    turning: str = ""
 
     @property
     def free_names(self) -> tuple[str, ...]:
-        """The two free parameters."""
+        """The free parameters."""
         return self.names
+
+    @property
+    def smooth(self) -> bool:
+        """False along a curve of grazings."""
+        return self.curve != "grazing"
+
+    @property
+    def discontinuous(self) -> bool:
+        """False: events are located along curves, not behind a grazing."""
+        return False
 
     def critical_multiplier(self) -> complex:
         """The multiplier on the unit circle that the curve's bifurcations have."""
@@ -45,7 +63,15 @@ class TrackedEvent(Bifurcation):
     def remark(self) -> str:
         """What a table says beside the numbers."""
         words = [f"{self.extreme} of {self.parameter_name}"] if self.extreme else []
-        return "; ".join([*words, super().remark()] if super().remark() else words)
+        if self.extreme and self.turning and self.parameter_name == self.names[-1]:
+            words.append(f"a minimum and a maximum of {self.turning} meet")
+        if self.isola:
+            words.append(self.isola.replace("_", " "))
+        if self.contact is not None:
+            words.append(str(self.contact))
+        elif super().remark():
+            words.append(super().remark())
+        return "; ".join(words)
 
 
 __all__ = ["TRACKED_KINDS", "TrackedEvent"]

@@ -26,7 +26,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.group_force import GroupLaw, uniform_count
 from suboctave.harmonic.nodal import NodalForce
 from suboctave.harmonic.nodal_third import nodal_third
-from suboctave.harmonic.quadrature import even, graded_nodes, search_grid, uniform_nodes
+from suboctave.harmonic.quadrature import Nodes, even, graded_motion, search_grid, uniform_nodes
 from suboctave.harmonic.state import BalanceState
 from suboctave.harmonic.third_weights import Third
 from suboctave.lazy import lazy
@@ -85,21 +85,26 @@ def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, movin
     if law.polynomial.shape[0] > 3:
         nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
         u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
-        third = np.polynomial.polynomial.polyval(u, np.polynomial.polynomial.polyder(law.polynomial, 3))
+        third = np.zeros_like(u)
+        for p in range(len(law.polynomial) - 1, 2, -1):
+            third = third * u + p * (p - 1) * (p - 2) * law.polynomial[p]
         yield _in_displacement(nodes.zr, nodes.zi, nodes.weights * third, None, moving)
+    if law.told:
+        sampled = graded_motion(motion, *law.told_places, top)
+        third = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[1]
+        yield _in_displacement(sampled[0], sampled[1], third, None, moving)
     for members, points, widths in (
-        (law.told, law.smooth_steps[:, 0].copy(), law.smooth_steps[:, 1].copy()),
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),
     ):
         if not members:
             continue
-        nodes = (
-            uniform_nodes(uniform_count(law, balance.samples, high, top))
-            if points is None or widths is None
-            else graded_nodes(motion, points, widths, top)
-        )
-        u, du = kernels.motion(motion, nodes.zr, nodes.zi)
+        if points is None or widths is None:
+            nodes = uniform_nodes(uniform_count(law, balance.samples, high, top))
+            u, du = kernels.motion(motion, nodes.zr, nodes.zi)
+        else:
+            zr, zi, w, u, du = graded_motion(motion, points, widths, top)
+            nodes = Nodes(zr, zi, w)
         weights = np.zeros((2, 2, 2, len(u)) if moving else (1, 1, 1, len(u)))
         for i, c in members:
             uuu, *rest = balance.elements[i].third(u, state.rate * du, c)

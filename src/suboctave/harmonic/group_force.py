@@ -23,7 +23,6 @@ from suboctave.harmonic.quadrature import (
     Nodes,
     even,
     graded_motion,
-    graded_nodes,
     on_circle,
     search_grid,
     singularities,
@@ -168,6 +167,19 @@ class PackedLaws(NamedTuple):
     @classmethod
     def of(cls, laws: list[GroupLaw]) -> PackedLaws:
         """Pack the laws of all directions."""
+        if len(laws) == 1:
+            # what follows, without the joining
+            law = laws[0]
+            return cls(
+                law.pieces,
+                np.zeros(len(law.pieces), dtype=np.int64),
+                np.array((0, len(law.pieces))),
+                law.polynomial[None],
+                law.smooth_steps,
+                np.zeros(len(law.smooth_steps), dtype=np.int64),
+                law.line[None],
+                bool(law.told or law.sharp or law.uniform),
+            )
         number = np.arange(len(laws))
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
         for g, law in enumerate(laws):
@@ -214,11 +226,11 @@ def add_sampled_spectra(
         group_kernels.add_smooth_steps(sampled, law.smooth_steps, law.line, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
-        _add_sampled(law.sharp, elements, u, v, rate, Nodes(zr, zi, w), out)
+        _add_sampled(law.sharp, elements, u, rate * v, Nodes(zr, zi, w), out)
     if law.uniform:
         nodes = uniform_nodes(uniform_count(law, samples, high, top))
         u, v = kernels.motion(motion, nodes.zr, nodes.zi)
-        _add_sampled(law.uniform, elements, u, v, rate, nodes, out)
+        _add_sampled(law.uniform, elements, u, rate * v, nodes, out)
 
 
 def _add_sampled(
@@ -226,12 +238,10 @@ def _add_sampled(
     elements: tuple[Element, ...],
     u: Array,
     v: Array,
-    rate: float,
     nodes: Nodes,
     out: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> None:
-    """`u`, `v`: displacement and its derivative by tau at the nodes."""
-    v *= rate
+    """`u`, `v`: displacement and velocity at the nodes."""
     rows: list[Array | None] = [None, None, None]
     for i, c in members:
         parts = elements[i].tangent(u, v, c)
@@ -274,22 +284,25 @@ def curvature_of(
         for p in range(len(law.polynomial) - 1, 1, -1):
             bend = bend * u + p * (p - 1) * law.polynomial[p]
         parts.append(Curvature(nodes.zr, nodes.zi, nodes.weights * bend, None, None))
+    if law.told:
+        sampled = graded_motion(motion, *law.told_places, top)
+        bend = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[0]
+        parts.append(Curvature(sampled[0], sampled[1], bend, None, None))
     for members, points, widths in (
-        (law.told, *law.told_places),
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),
     ):
         if not members:
             continue
-        nodes = (
-            uniform_nodes(uniform_count(law, samples, high, top))
-            if points is None or widths is None
-            else graded_nodes(motion, points, widths, top)
-        )
-        values = kernels.motion(motion, nodes.zr, nodes.zi)
+        if points is None or widths is None:
+            nodes = uniform_nodes(uniform_count(law, samples, high, top))
+            u, v = kernels.motion(motion, nodes.zr, nodes.zi)
+        else:
+            zr, zi, w, u, v = graded_motion(motion, points, widths, top)
+            nodes = Nodes(zr, zi, w)
         rows: list[Array | None] = [None, None, None]
         for i, c in members:
-            for r, part in enumerate(elements[i].curvature(values[0], rate * values[1], c)):
+            for r, part in enumerate(elements[i].curvature(u, rate * v, c)):
                 if part is not None:
                     weighted, sofar = nodes.weights * part, rows[r]
                     rows[r] = weighted if sofar is None else sofar + weighted

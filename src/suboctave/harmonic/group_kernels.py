@@ -106,6 +106,24 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
             pr[j] = t
 
 
+@kernel()
+def bends_of_smooth_steps(sampled, steps):
+    """Second and third derivatives of arctan steps by the displacement, times the nodes' weights, (2, N); arguments as
+    in `add_smooth_steps`.
+    """
+    n = sampled.shape[1]
+    out = np.zeros((2, n))
+    for s in range(steps.shape[0]):
+        point, sharpness = steps[s, 0], 1.0 / steps[s, 1]
+        scale = steps[s, 2] * sharpness / math.pi
+        for j in range(n):
+            ratio = (sampled[3, j] - point) * sharpness
+            share = 1.0 / (1.0 + ratio * ratio)
+            out[0, j] += sampled[2, j] * scale * share
+            out[1, j] -= 2.0 * sampled[2, j] * scale * sharpness * ratio * share * share
+    return out
+
+
 @kernel(patience=QUICK, fastmath=_FAST)
 def add_smooth_steps(sampled, steps, line, force, stiffness):
     """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.

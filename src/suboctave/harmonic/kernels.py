@@ -73,6 +73,23 @@ def spectra(values, zr, zi, top):
 
 
 @kernel()
+def toeplitz_form(left, spectrum, right):
+    """`left^H T right`, T the product with a real periodic function whose Fourier coefficients 0 .. top are given, on
+    waves of consecutive frequencies, shape (F,) each.
+    """
+    count = left.shape[0]
+    total = 0.0 + 0.0j
+    for k in range(count):
+        re = im = 0.0
+        for m in range(count):
+            c = spectrum[k - m] if k >= m else spectrum[m - k].conjugate()
+            re += c.real * right[m].real - c.imag * right[m].imag
+            im += c.real * right[m].imag + c.imag * right[m].real
+        total += left[k].conjugate() * complex(re, im)
+    return total
+
+
+@kernel()
 def contact_spectrum(tau, above, side, top):
     """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
 

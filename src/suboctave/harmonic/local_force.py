@@ -21,8 +21,8 @@ import numpy as np
 
 from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import Nodes, nodes_for, sampled_spectra, search_grid
-from suboctave.model.sampling import Piece, PiecewiseLinear, Sampling
+from suboctave.harmonic.quadrature import Nodes, graded_motion, nodes_for, sampled_spectra, search_grid, singularities
+from suboctave.model.sampling import Piece, PiecewiseLinear, Sampling, SharpSampling
 
 _NONE = np.zeros(0, dtype=complex)
 
@@ -219,8 +219,13 @@ def _coefficient_change(local: LocalMotion, rates: Array) -> CoefficientChange:
     if local.pieces is not None:
         whole = coefficient_force(local)
         return CoefficientChange(rates @ whole.force, rates @ whole.stiffness, None)
-    nodes = local.nodes()
-    x, xd = kernels.motion(local.motion, nodes.zr, nodes.zi)
+    kind = local.kind
+    if isinstance(kind, SharpSampling):
+        zr, zi, w, x, xd = graded_motion(local.motion, *singularities(kind), local.top)
+        nodes = Nodes(zr, zi, w)
+    else:
+        nodes = local.nodes()
+        x, xd = kernels.motion(local.motion, nodes.zr, nodes.zi)
     parts = local.element.coefficient_tangent(x, local.rate * xd, local.coefficients)
     rows = np.array([(rates @ part) * nodes.weights for part in parts if part is not None])
     found = kernels.spectra(rows, nodes.zr, nodes.zi, local.top)

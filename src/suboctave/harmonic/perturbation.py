@@ -21,8 +21,8 @@ import numpy as np
 
 from suboctave.harmonic import kernels, nodal_second, real_form
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
-from suboctave.harmonic.rates import coefficient_rates
+from suboctave.harmonic.changes import changes_by
+from suboctave.harmonic.local_force import CoefficientChange, Curvature
 from suboctave.harmonic.second import Direction, second_derivative
 from suboctave.harmonic.state import BalanceState, apply_blocks
 
@@ -166,11 +166,8 @@ def bilinear_gradient(
     for name in names:
         if name == "omega":
             continue
-        for element, local in zip(state.balance.elements, state.local_motions, strict=True):
-            change = coefficient_rates(element, state.values, {name: 1.0})
-            if change.any():
-                d = linear.retain(element.direction(state.balance.system.n))
-                rates[name] += _change_of_form(local, change, u_force @ d, v @ d, frequency)
+        for group, change in changes_by(state, name):
+            rates[name] += _change_of_form(change, u_force @ group.direction, v @ group.direction, frequency)
     g_kappa += _form(u, slope, v)
     compliance_slope = linear.compliance(frequency, 1)
     if compliance_slope is not None:
@@ -201,21 +198,29 @@ def form_rates(
     None where that takes more than the elements' coefficients and the linear part: elements with nodes of their own, a
     condensed model.
     """
-    linear, elements = state.linear, state.balance.elements
+    linear = state.linear
     if state.nodal or state.compliance is not None:
         return None
     size, rates = state.balance.size, dict.fromkeys(names, 0j)
+    if kind is Kind.INTEGER:
+        left, right = state.balance.spread(left), state.balance.spread(right)
     for name in names:
-        changes = [coefficient_rates(element, state.values, {name: 1.0}) for element in elements]
-        if not (name in linear_names(state) or any(change.any() for change in changes)):
+        changes = changes_by(state, name)
+        direct = name in linear_names(state)
+        if not (changes or direct):
+            continue
+        if not (kind is Kind.FREE or direct or any(change.damping is not None for _, change in changes)):
+            u, v = left.reshape(-1, size), right.reshape(-1, size)
+            for group, change in changes:
+                rates[name] += real_form.toeplitz_part(
+                    u, v, kind is Kind.INTEGER, group.dofs, group.values, change.stiffness
+                )
             continue
         u, f = _as_waves(left, kind, size, left=True)
         v, _ = _as_waves(right, kind, size, left=False)
         frequency = f * state.rate + (kappa if kind is Kind.FREE else 0.0)
-        for element, local, change in zip(elements, state.local_motions, changes, strict=True):
-            if change.any():
-                d = linear.retain(element.direction(state.balance.system.n))
-                rates[name] += _change_of_form(local, change, u @ d, v @ d, frequency)
+        for group, change in changes:
+            rates[name] += _change_of_form(change, u @ group.direction, v @ group.direction, frequency)
         block = linear.stiffness_by(frequency, (name,))
         if block is not None:
             rates[name] += _form(u, block, v)
@@ -228,12 +233,9 @@ def linear_names(state: BalanceState) -> frozenset[str]:
     return frozenset(system.mass.names | system.damping.names | system.stiffness.names)
 
 
-def _change_of_form(
-    local: LocalMotion, change: Array, left: ComplexArray, right: ComplexArray, frequency: Array
-) -> complex:
-    """What a change of an element's coefficients does to the form, along the element's direction."""
-    c = coefficient_change(local, change)
-    result = _inner(left, _toeplitz_apply(c.stiffness, right))
+def _change_of_form(c: CoefficientChange, left: ComplexArray, right: ComplexArray, frequency: Array) -> complex:
+    """What a change of the forces along a direction does to the form."""
+    result = complex(kernels.toeplitz_form(left, c.stiffness, right))
     if c.damping is not None:
         result += _inner(left, _toeplitz_apply(c.damping, 1j * frequency * right))
     return result
@@ -338,16 +340,12 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
             direct = -basis.derivative(_transposed(damping, ue, basis.harmonics))
             gx += np.multiply.outer(part + direct, group.direction)
     else:
-        for element, local in zip(state.balance.elements, state.local_motions, strict=True):
-            change = coefficient_rates(element, state.values, {name: 1.0})
-            if change.any():
-                d = linear.retain(element.direction(state.balance.system.n))
-                ue = u_force @ d
-                c = coefficient_change(local, change)
-                part = _transposed(c.stiffness, ue, basis.harmonics)
-                if c.damping is not None:
-                    part = part - state.omega * basis.derivative(_transposed(c.damping, ue, basis.harmonics))
-                gx += np.multiply.outer(part, d)
+        for group, c in changes_by(state, name):
+            ue = u_force @ group.direction
+            part = _transposed(c.stiffness, ue, basis.harmonics)
+            if c.damping is not None:
+                part = part - state.omega * basis.derivative(_transposed(c.damping, ue, basis.harmonics))
+            gx += np.multiply.outer(part, group.direction)
     for nodal in state.nodal:
         found = nodal_second.parameter_form_gradient(nodal, u_force, state.x, state.values, name, _waves_of)
         if found is not None:

@@ -35,6 +35,9 @@ _RATIO = 1.4
 FEWEST, _MOST = 32, 1 << 15
 #: relative change of force and tangent coefficients below which adaptive sampling is content
 _SETTLED = 1e-11
+#: how many sets of graded nodes are kept, and those
+_REMEMBERED = 8
+_recent: dict[tuple[bytes, bytes, bytes, int], Array] = {}
 
 
 @dataclass(frozen=True)
@@ -99,10 +102,18 @@ def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -
 
 
 def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int) -> Array:
-    """These nodes with the motion there: cosines, sines, weights, values, derivatives by tau, (5, N)."""
-    high = motion.shape[0] - 1
-    grid = search_grid(high)
-    found: Array = graded.sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables())
+    """These nodes with the motion there: cosines, sines, weights, values, derivatives by tau, (5, N); not to be
+    written to: forces, curvatures and what a parameter changes ask for the same ones one after the other.
+    """
+    key = (motion.tobytes(), points.tobytes(), widths.tobytes(), top)
+    found = _recent.get(key)
+    if found is None:
+        high = motion.shape[0] - 1
+        grid = search_grid(high)
+        found = graded.sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables())
+        while len(_recent) >= _REMEMBERED:
+            _recent.pop(next(iter(_recent)), None)
+        _recent[key] = found
     return found
 
 

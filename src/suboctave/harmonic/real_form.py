@@ -17,9 +17,33 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.kernels import polynomial, spectra
+from suboctave.harmonic.kernels import polynomial, spectra, toeplitz_form
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.state import BalanceState
+
+
+@kernel()
+def _half_turn(zr, zi):
+    """Real and imaginary part of `exp(i tau / 2)`, up to a sign."""
+    if zr > 0.0:
+        cosine = math.sqrt(0.5 * (1.0 + zr))
+        return cosine, 0.5 * zi / cosine
+    sine = math.sqrt(0.5 * (1.0 - zr))
+    return 0.5 * zi / sine, sine
+
+
+@kernel()
+def half_odd_values(waves, zr, zi):
+    """`Re sum_k c_k exp(i (k + 1/2) tau)` of every row of amplitudes (R, F) at instants, (R, N), up to a sign that all
+    rows share.
+    """
+    values = polynomial(waves, zr, zi)
+    out = np.empty((waves.shape[0], zr.shape[0]))
+    for j in range(zr.shape[0]):
+        cosine, sine = _half_turn(zr[j], zi[j])
+        for r in range(waves.shape[0]):
+            out[r, j] = values[r, j].real * cosine - values[r, j].imag * sine
+    return out
 
 
 @kernel()
@@ -44,13 +68,8 @@ def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
     for j in range(n):
         cosine, sine = 1.0, 0.0
         if not mean:
-            # exp(i tau / 2) up to a sign, which both functions share
-            if zr[j] > 0.0:
-                cosine = math.sqrt(0.5 * (1.0 + zr[j]))
-                sine = 0.5 * zi[j] / cosine
-            else:
-                sine = math.sqrt(0.5 * (1.0 - zr[j]))
-                cosine = 0.5 * zi[j] / sine
+            # up to a sign, which both functions share
+            cosine, sine = _half_turn(zr[j], zi[j])
         u = values[0, j].real * cosine - values[0, j].imag * sine
         v = values[1, j].real * cosine - values[1, j].imag * sine
         product[0, j] = u * v * uu[j]
@@ -60,6 +79,29 @@ def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
         for k in range(1, high + 1):
             gx[2 * k - 1, dofs[s]] += shape[s] * found[0, k].real
             gx[2 * k, dofs[s]] -= shape[s] * found[0, k].imag
+
+
+@kernel()
+def toeplitz_part(left, right, mean, dofs, shape, spectrum):
+    """`left^T T right` along a direction, T the product with a real periodic function whose Fourier coefficients
+    0 .. top are given; vectors (rows, n) of the integer basis (mean) or the half-odd one.
+    """
+    count = left.shape[0] // 2
+    middle = count + 1 if mean else count
+    waves = np.zeros((2, middle + count), dtype=np.complex128)
+    for s in range(dofs.shape[0]):
+        d = dofs[s]
+        if mean:
+            waves[0, count] += shape[s] * left[0, d]
+            waves[1, count] += shape[s] * right[0, d]
+        for k in range(count):
+            at = 2 * k + 1 if mean else 2 * k
+            waves[0, middle + k] += shape[s] * complex(left[at, d], -left[at + 1, d])
+            waves[1, middle + k] += 0.5 * shape[s] * complex(right[at, d], -right[at + 1, d])
+    for k in range(count):
+        waves[0, count - 1 - k] = waves[0, middle + k].conjugate()
+        waves[1, count - 1 - k] = waves[1, middle + k].conjugate()
+    return toeplitz_form(waves[0], spectrum, waves[1]).real
 
 
 @kernel()
@@ -113,4 +155,4 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     return gx, by_omega, 1j * by_kappa
 
 
-__all__ = ["applies", "real_gradient"]
+__all__ = ["applies", "half_odd_values", "real_gradient", "toeplitz_part"]

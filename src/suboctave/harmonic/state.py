@@ -15,12 +15,12 @@ import numpy as np
 
 from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+from suboctave.harmonic.changes import changes_by
 from suboctave.harmonic.group_force import Group, curvature_of
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.local_force import Curvature, LocalMotion, coefficient_change
+from suboctave.harmonic.local_force import Curvature, LocalMotion
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
-from suboctave.harmonic.rates import coefficient_rates
 from suboctave.lazy import lazy
 
 if TYPE_CHECKING:
@@ -287,12 +287,9 @@ class BalanceState:
                     slope = self.basis.derivative(self.x @ group.direction)
                     parts.append((self.toeplitz(damping) @ slope, group.direction))
         else:
-            for element, local in zip(self.balance.elements, self.local_motions, strict=True):
-                rates = coefficient_rates(element, self.values, {name: 1.0})
-                if rates.any():
-                    spectrum = coefficient_change(local, rates).force[:, None]
-                    direction = self.linear.retain(element.direction(self.balance.system.n))
-                    parts.append((spectrum_to_real(spectrum, self.basis.harmonics)[:, 0], direction))
+            for group, by_name in changes_by(self, name):
+                spectrum = spectrum_to_real(by_name.force[:, None], self.basis.harmonics)
+                parts.append((spectrum[:, 0], group.direction))
         for nodal in self.nodal:
             change = force_by(nodal, self.x, self.values, name)
             if change is not None:

@@ -1,4 +1,7 @@
-"""Compiled tangent of the regularised stop. Imported on first evaluation, so that a model alone needs no compiler."""
+"""Compiled tangent of the regularised stop and its derivatives by the coefficients.
+
+Imported on first evaluation, so that a model alone needs no compiler.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["regularised_tangent"]
+__all__ = ["regularised_rates", "regularised_tangent"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -26,4 +29,29 @@ def regularised_tangent(u, stiffness, gap, sharpness, side, at_rest):
         else:
             force[i] = stiffness * (u[i] - phi + at_rest)
             slope[i] = stiffness * (0.5 - angle)
+    return force, slope
+
+
+@njit(cache=True, error_model="numpy")
+def regularised_rates(u, stiffness, gap, sharpness, side, at_rest, by_gap, by_sharpness):
+    """Derivatives of force and stiffness by stiffness, gap and sharpness, (3, N) each.
+
+    `by_gap`, `by_sharpness`: what `at_rest` contributes per unit of stiffness.
+    """
+    n = u.shape[0]
+    force = np.empty((3, n))
+    slope = np.empty((3, n))
+    for i in range(n):
+        y = u[i] - gap
+        sy = sharpness * y
+        angle = math.atan(sy) / math.pi
+        log = math.log1p(sy * sy) / (2.0 * math.pi * sharpness)
+        phi = y * (0.5 + angle) - log
+        bend = stiffness * side / (math.pi * (1.0 + sy * sy))
+        force[0, i] = (phi if side > 0 else u[i] - phi) + at_rest
+        slope[0, i] = 0.5 + angle if side > 0 else 0.5 - angle
+        force[1, i] = stiffness * (by_gap - side * (0.5 + angle))
+        slope[1, i] = -bend * sharpness
+        force[2, i] = stiffness * (side * log / sharpness + by_sharpness)
+        slope[2, i] = bend * y
     return force, slope

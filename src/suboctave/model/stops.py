@@ -102,7 +102,7 @@ class ElasticStop(Element):
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gap with width 1/s."""
         if self.regularised:
-            k, b, sharpness = (float(value) for value in c)
+            k, b, sharpness = c.tolist()
             # right: k [phi + at_rest], left: k [u - phi + at_rest], phi = y / 2 + an arctan step at the gap
             constant = k * (self._at_rest(b, sharpness) - 0.5 * self._sign * b)
             return SharpSampling((b,), (1.0 / sharpness,), constant, 0.5 * k, (self._sign * k,))
@@ -136,11 +136,13 @@ class ElasticStop(Element):
             contact = self._contact(u, c)
             f_c = np.array([contact * (u - c[1]), -c[0] * contact])
             return f_c, np.array([contact, np.zeros_like(u)]), None
-        k, b, s = c
-        sign, y = self._sign, u - b
-        f, f_u, _ = self.tangent(u, v, np.array([1.0, b, s]))
-        f_c = np.array([f, k * self._by_gap(y, b, s), k * sign * (_phi_s(y, s) - _phi_s(-b, s))])
-        f_uc = np.array([f_u, -k * sign * _phi_yy(y, s), k * sign * _phi_ys(y, s)])
+        k, b, s = c.tolist()
+        sign = self._sign
+        # what the constant that makes the force right at u = 0 adds
+        by_gap = sign * (0.5 - math.atan(s * b) / math.pi) - (1.0 if sign * b < 0.0 else 0.0)
+        f_c, f_uc = _rates_kernel()(
+            np.ascontiguousarray(u), k, b, s, sign, self._at_rest(b, s), by_gap, -sign * _phi_s(-b, s)
+        )
         return f_c, f_uc, None
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
@@ -178,6 +180,13 @@ def _kernel() -> Callable[..., tuple[Array, Array]]:
     from suboctave.model.stop_kernel import regularised_tangent
 
     return regularised_tangent
+
+
+@functools.cache
+def _rates_kernel() -> Callable[..., tuple[Array, Array]]:
+    from suboctave.model.stop_kernel import regularised_rates
+
+    return regularised_rates
 
 
 def _phi(y: float, s: float) -> float:

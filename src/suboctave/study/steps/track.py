@@ -49,9 +49,8 @@ class Track(CurveStep):
         for name in names:
             if name in self.parameters:
                 yield ("parameters", name), "is a parameter that varies: its range is in bounds"
-        for given, key in ((self.events, "events"), (self.formulation, "formulation")):
-            if given:
-                yield (key,), "is no option of a curve of bifurcations: leave it out"
+        if self.events:
+            yield ("events",), "is no option of a curve of bifurcations: leave it out"
 
     def _check_start(self) -> Iterator[Complaint]:
         kind = None if self.motion is None else self.motion.bifurcation

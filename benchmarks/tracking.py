@@ -1,0 +1,115 @@
+"""How long bifurcations tracked in two parameters take per point, warm, on one thread, and where the time goes.
+
+Period doublings of the reference oscillator's T branch (motions of the load's period) and 2T branch, over its gap (j),
+contact stiffness (Kc) and load (p), in both directions, with extrema and points of codimension two located. All cases
+run once, then REPEATS times, interleaved. Times are those of the processor, so that a busy machine matters less: the
+least and the median of each, and both in units of the eigenvalues of a 62 x 62 matrix timed in between. On a machine
+on which these take 478 us, 0.5 ms per point is a ratio of 1.05 and 1.5 ms one of 3.14.
+
+A last run of each case counts the evaluations of the augmented equations and of their Jacobian.
+
+    python benchmarks/tracking.py [repeats]
+"""
+
+from __future__ import annotations
+
+import platform
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from unittest.mock import patch
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+import suboctave as so
+from suboctave.analysis.tracked_branch import TrackedBranch
+from suboctave.analysis.tracked_curve import TrackedEvaluation
+from suboctave.compiled import compile_at_once
+
+REPEATS = 7
+
+
+def cases() -> dict[str, Callable[[], TrackedBranch]]:
+    def doubling(p: float, **law: float) -> so.Bifurcation:
+        system = so.library.reference_oscillator(p=p, **law)
+        return so.frequency_response(system, (4.5, 1.3)).bifurcations["PD"][0]
+
+    def tracked(item: so.Bifurcation, name: str, bounds: tuple[float, float]) -> Callable[[], TrackedBranch]:
+        return lambda: so.track(item, name, bounds)
+
+    exact, arctan = doubling(0.55), doubling(0.55, regularization=3000.0)
+    doubled = so.switch_branch(doubling(1.7, regularization=3000.0)).bifurcations["PD"][0]
+    found = {}
+    for law, item in (("s=3000", arctan), ("exact", exact)):
+        for name, bounds in (("j", (0.0, 1.0)), ("Kc", (1.0, 30.0)), ("p", (0.3, 2.0))):
+            found[f"T, {law}, over {name}"] = tracked(item, name, bounds)
+    found["2T, s=3000, over p"] = tracked(doubled, "p", (0.5, 2.0))
+    found["2T, s=3000, over Kc"] = tracked(doubled, "Kc", (1.0, 30.0))
+    return found
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def counted(work: Callable[[], object]) -> Counter[str]:
+    """How often the augmented equations and their Jacobian are evaluated."""
+    counts: Counter[str] = Counter()
+    whole, rows = TrackedEvaluation.__init__, TrackedEvaluation.__dict__["jacobian"].compute
+
+    def begin(self: TrackedEvaluation, *args: object) -> None:
+        counts["evaluations"] += 1
+        whole(self, *args)  # type: ignore[arg-type]
+
+    def differentiate(self: TrackedEvaluation) -> np.ndarray:
+        counts["jacobians"] += 1
+        result: np.ndarray = rows(self)
+        return result
+
+    with (
+        patch.object(TrackedEvaluation, "__init__", begin),
+        patch.object(TrackedEvaluation.__dict__["jacobian"], "compute", differentiate),
+    ):
+        work()
+    return counts
+
+
+def main(repeats: int) -> None:
+    compile_at_once()
+    matrix = np.random.default_rng(0).standard_normal((62, 62))
+    work = cases()
+    curves = {name: run() for name, run in work.items()}
+    unit: list[float] = []
+    times: dict[str, list[float]] = {name: [] for name in work}
+    for _ in range(repeats):
+        for name, run in work.items():
+            unit += [seconds(lambda: np.linalg.eigvals(matrix)) for _ in range(20)]
+            times[name].append(seconds(run))
+    least, middle = min(unit), float(np.median(unit))
+    print(
+        f"suboctave {so.__version__}, Python {platform.python_version()}, NumPy {np.__version__}, {platform.machine()}"
+    )
+    print(
+        f"{repeats} repeats, one thread, warm; eigvals 62: least {1e6 * least:.0f} us, median {1e6 * middle:.0f} us\n"
+    )
+    head = ("points", "events", "least ms", "ms/point", "/ eigvals", "median ms", "ms/point", "/ eigvals")
+    head = (*head, "evaluations/point", "Jacobians/point")
+    print("| " + f"{'curve':<22}" + " | " + " | ".join(head) + " |")
+    print("|" + "-" * 24 + "|" + "".join("-" * (len(title) + 1) + ":|" for title in head))
+    for name, curve in curves.items():
+        n, counts = len(curve), counted(work[name])
+        row = [f"{n}", f"{len(curve.bifurcations)}"]
+        for value, by in ((min(times[name]), least), (float(np.median(times[name])), middle)):
+            row += [f"{1e3 * value:.0f}", f"{1e3 * value / n:.2f}", f"{value / n / by:.2f}"]
+        row += [f"{counts[kind] / n:.1f}" for kind in ("evaluations", "jacobians")]
+        cells = [text.rjust(len(title)) for text, title in zip(row, head, strict=True)]
+        print("| " + f"{name:<22}" + " | " + " | ".join(cells) + " |")
+
+
+if __name__ == "__main__":
+    with threadpool_limits(1):
+        main(int(sys.argv[1]) if len(sys.argv) > 1 else REPEATS)

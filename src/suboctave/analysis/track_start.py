@@ -1,0 +1,207 @@
+"""Where tracking begins: a bifurcation, or an extremum along a curve of them, solved again as a point of its curve."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from suboctave.analysis.trace import Settings
+from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_sample import null_row
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.augmented import (
+    Augmentation,
+    BranchPointUnfolded,
+    GrazingContactEquations,
+    SingularOperator,
+)
+from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
+from suboctave.bifurcation.extremum import extremal_of
+from suboctave.bifurcation.formulation import BORDERED, Alcorta2019, ExtendedSystem, Formulation
+from suboctave.bifurcation.gaps import levels
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation import CurvePoint
+from suboctave.continuation.march import make_point
+from suboctave.continuation.newton import correct
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.harmonic.state import BalanceState
+
+_OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
+#: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
+_NEAR = 0.05
+
+
+@dataclass(frozen=True)
+class Box:
+    """Ranges of the first and the last free parameter, None where one is not bounded: the curve ends on them."""
+
+    first: tuple[float, float] | None
+    second: tuple[float, float]
+
+
+def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
+    """Whether something is an extremum along a tracked curve."""
+    return isinstance(item, TrackedEvent) and item.kind == "extremum"
+
+
+def kind_of(item: Bifurcation) -> str:
+    """Kind of the bifurcations that are followed."""
+    return item.curve if isinstance(item, TrackedEvent) else item.kind
+
+
+def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
+    if isinstance(wanted, str) and wanted == "adaptive":
+        wanted = AdaptiveHarmonics()
+    if isinstance(wanted, AdaptiveHarmonics):
+        return wanted, basis.filled
+    if isinstance(wanted, (int, np.integer)) and not isinstance(wanted, bool) and wanted >= 1:
+        return None, HarmonicBasis(int(wanted) * basis.nu, basis.nu)
+    raise InputError(
+        f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {wanted!r}'
+    )
+
+
+def linear_part(item: Bifurcation) -> LinearPart | None:
+    """The linear part a bifurcation was solved with, at its parameters; None for its system's own matrices."""
+    linear = item.orbit.balance.linear
+    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
+
+
+def _augmentation(
+    item: Bifurcation, state: BalanceState, names: tuple[str, ...], formulation: Formulation
+) -> tuple[Augmentation, np.ndarray]:
+    """What singles the bifurcation out, and the start of its extra unknowns."""
+    if kind_of(item) == "grazing":
+        assert item.contact is not None
+        places = np.array(levels(state.local(item.contact.element)))
+        index = int(np.argmin(np.abs(places - item.contact.gap)))
+        tau = item.contact.time * state.rate
+        return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
+    if kind_of(item) == "BP":
+        return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
+    kind = _OPERATORS[kind_of(item)]
+    extra = np.zeros(0)
+    if kind is Kind.FREE:
+        kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
+        extra = np.array([kappa])
+    kappa = float(extra.sum())
+    if isinstance(formulation, Alcorta2019) and kind is Kind.HALF:
+        return PublishedDoubling.started(state, names), extra
+    if isinstance(formulation, ExtendedSystem) or (isinstance(formulation, Alcorta2019) and kind is Kind.INTEGER):
+        return ExtendedOperator.started(state, kind, kappa)
+    return SingularOperator.of(state, kind, kappa), extra
+
+
+def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tuple[float, ...]:
+    """Sizes of the free parameters: widths of their ranges, where there are none their values."""
+    ranges = dict((item.context or {}).get("bounds", {})) if is_extremum(item) else {}
+    if box is not None:
+        ranges |= {name: ends for name, ends in ((names[0], box.first), (names[-1], box.second)) if ends is not None}
+    sizes = [abs(float(ranges[n][1]) - float(ranges[n][0])) if n in ranges else abs(item.parameter(n)) for n in names]
+    return tuple(size or 1.0 for size in sizes)
+
+
+def curve_through(
+    item: Bifurcation,
+    balance: HarmonicBalance,
+    adaptive: AdaptiveHarmonics | None,
+    names: tuple[str, ...],
+    spans: tuple[float, ...],
+    formulation: Formulation = BORDERED,
+) -> tuple[TrackedCurve, np.ndarray]:
+    """The curve of bifurcations in free parameters through one of them, and its u there, in the basis of `balance`."""
+    orbit = item.orbit
+    x = orbit.basis.resized(orbit.coefficients, balance.basis)
+    balance = balance.settle(x, orbit.omega)
+    state = balance.at(x, orbit.omega)
+    augmentation, extra = _augmentation(item, state, names, formulation)
+    force = state.force_scale()
+    floor = 0.0 if force > 0.0 else 1e-8 * orbit.omega**2
+    curve = TrackedCurve(
+        balance,
+        augmentation,
+        names,
+        spans,
+        orbit.omega,
+        adaptive,
+        # between what a response curve needs and what a located event does
+        0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
+        max(force, floor),
+        floor,
+        {balance.basis: balance},
+    )
+    return curve, curve.join(x, extra, np.array([item.parameter(name) for name in names]))
+
+
+def with_extremum(curve: TrackedCurve, u: np.ndarray, turning: str, plane: tuple[str, str]) -> TrackedCurve:
+    """The curve with the equation of an extremum of one of the two parameters in its plane, at one of its points."""
+    _, extra, _, _ = curve.split(u)
+    (beside,) = set(plane) - {turning}
+    sizes = dict(zip(curve.names, curve.spans, strict=True))
+    augmentation = extremal_of(curve.augmentation.own, curve.evaluate(u).state, extra, beside, turning, sizes)
+    return replace(curve, augmentation=augmentation)
+
+
+def solved_start(
+    item: Bifurcation,
+    balance: HarmonicBalance,
+    adaptive: AdaptiveHarmonics | None,
+    names: tuple[str, ...],
+    box: Box,
+    settings: Settings,
+) -> CurvePoint:
+    """The bifurcation solved again as a point of the curve, in a basis that suits it.
+
+    Raises
+    ------
+    ConvergenceError
+        If it is not found again.
+    """
+    formulation = BORDERED if is_extremum(item) else settings.formulation
+    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), formulation)
+    for name, ends in ((names[0], box.first), (names[-1], box.second)):
+        if ends is not None:
+            u[curve.index(name)] = min(ends[1], max(ends[0], u[curve.index(name)]))
+    if is_extremum(item):
+        curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
+    begin = u
+    origin = curve
+    try:
+        for _ in range(8):
+            weights = curve.weights(u, 0.0)
+            row = null_row(curve, u, weights)
+            if abs(row[-1]) > 1e-2:
+                row = np.eye(1, len(row), len(row) - 1)[0]
+            solved = correct(curve, u, row, weights, settings.newton)
+            adapted = curve.adapted(solved.u, solved.evaluation)
+            same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
+            if same:
+                break
+            u, curve = adapted.transfer(solved.u, curve), adapted
+        moved = weights * (solved.u - curve.transfer(begin, origin))
+        if float(np.linalg.norm(moved)) > _NEAR:
+            raise ConvergenceError(f"what was found lies elsewhere, at {curve.where(solved.u)}")
+        return make_point(solved, curve, None, 0.0)
+    except ConvergenceError as failure:
+        raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
+
+
+__all__ = [
+    "Box",
+    "curve_through",
+    "discretisation",
+    "is_extremum",
+    "kind_of",
+    "linear_part",
+    "solved_start",
+    "spans_of",
+    "with_extremum",
+]
