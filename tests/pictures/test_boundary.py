@@ -174,6 +174,17 @@ def test_units_and_axes():
     assert "amplitude" in upright.axes[0].get_ylabel()
 
 
+def test_part_of_the_axes_and_some_of_the_marks():
+    figure = plot(boundary(), xlim=(1.9, 2.5), marks=["GPD"])
+    assert figure.axes[0].get_xlim() == (1.9, 2.5)
+    assert not lines(figure, "extremum")
+    (mark,) = lines(figure, "GPD")
+    assert mark.get_xdata() == pytest.approx([2.24])
+    assert [text.get_text() for text in figure.axes[0].texts if text.get_gid() == "label"] == ["GPD"]
+    along = np.concatenate([m.get_xdata() for m in lines(figure, "along", "along-hollow")])
+    assert np.all((along > 1.9) & (along < 2.5))
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

@@ -14,6 +14,7 @@ from suboctave.study.commands import examples
 ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 FIRST, LAST = TUTORIAL.split("## 5. ")
+LAST, BOUNDARIES = LAST.split("## 6. ")
 CASCADE, SUBHARMONIC = LAST.split("### Sub-harmonics")
 
 
@@ -37,14 +38,14 @@ def test_three_lines_of_the_new_file_are_changed(suboctave, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     assert suboctave("new", "study.toml")[0] == 0
     before = Path("study.toml").read_text(encoding="utf-8").splitlines()
-    after, _ = blocks("toml")
+    (after,) = blocks("toml")
     changed = [a for a, b in zip(before, after.splitlines(), strict=True) if a != b]
     assert [line.split(" = ")[0] for line in changed] == ["title", "parameters", "omega"]
 
 
 def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    text, _ = blocks("toml")
+    (text,) = blocks("toml")
     Path("study.toml").write_text(text, encoding="utf-8")
     checked, ran = blocks("console")
     assert suboctave("check", "study.toml")[1] == checked.split("\n", 1)[1]
@@ -53,7 +54,7 @@ def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
     assert numbers(out) == numbers(ran)  # the table is what the program prints
     assert len(numbers(out)) == 6
 
-    script, again, _ = blocks("python")
+    script, again = blocks("python")
     scope = {}
     exec(compile(script + again, "docs/tutorial.md", "exec"), scope)
     said = capsys.readouterr().out
@@ -113,7 +114,7 @@ def test_its_isolated_subharmonic(capsys):
 
 def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text, _ = blocks("toml")
+    (text,) = blocks("toml")
     text = text.replace("alpha = 0.0", "alpa = 0.0").replace("omega = [2.5, 0.5]", "omega = [2.5]")
     Path("study.toml").write_text(text, encoding="utf-8")
     status, _, err = suboctave("check", "study.toml")
@@ -123,19 +124,19 @@ def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):
 
 def test_its_boundaries(suboctave, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    text, more = blocks("toml")
-    script, _, chapter = blocks("python")
+    (text,), (more,) = blocks("toml"), blocks("toml", BOUNDARIES)
+    (script, _), (chapter,) = blocks("python"), blocks("python", BOUNDARIES)
     scope = {}
     exec(compile(script, "docs/tutorial.md", "exec"), scope)
     capsys.readouterr()
     exec(compile(chapter, "docs/tutorial.md", "exec"), scope)
     said = capsys.readouterr().out
-    assert said == blocks("text")[2]
+    assert [said] == blocks("text", BOUNDARIES)
     assert Path("boundaries.png").stat().st_size > 0
     # the limit points of a response computed at one of these gaps
     curve = so.frequency_response(scope["system"].with_parameters({"j": 0.2}), omega=(2.5, 0.5))
     assert [f"{point.omega:.4f}" for point in curve.bifurcations["LP"]] == re.findall(r"j = 0.2: omega = (.*)", said)
-    (figure,) = re.findall(r"`(\{ kind = .*? \})`", TUTORIAL)
+    (figure,) = re.findall(r"`(\{ kind = .*? \})`", BOUNDARIES)
     whole = text.replace('{ file = "response.png" }', '{ file = "response.png" }, ' + figure) + more
     assert figure in whole
     Path("study.toml").write_text(whole, encoding="utf-8")

@@ -85,6 +85,15 @@ class Plane:
         first = frequency if self.across == "omega" else scale if self.upwards == "omega" else 1.0
         return first, frequency if self.upwards == "omega" else scale
 
+    def marked(self, dataset: xarray.Dataset) -> np.ndarray:
+        """Which of the events of a prepared dataset get a marker, (events,), bool."""
+        kinds, marks = dataset["event_kind"].to_numpy(), self.view.marks
+        chosen = np.array([marks is None or str(kind) in marks for kind in kinds], dtype=bool)
+        for column, limits in zip(places(dataset, self).T, (self.view.xlim, self.view.ylim), strict=True):
+            if limits is not None:
+                chosen &= (column >= limits[0]) & (column <= limits[1])
+        return chosen
+
     def labels(self, dataset: xarray.Dataset) -> tuple[str, str]:
         """What the two axes say."""
         view = self.view
@@ -144,13 +153,17 @@ def plot_boundaries(
     if title:
         axes.set_title(title.replace("$", r"\$"), fontsize=look.large, color=style.INK)
     _limit(axes, prepared, plane)
+    if plane.view.xlim is not None:
+        axes.set_xlim(*plane.view.xlim)
+    if plane.view.ylim is not None:
+        axes.set_ylim(*plane.view.ylim)
     names = [name.replace("$", r"\$") for name in (labels if labels is not None else boundary_names(group))]
     styles = boundary_styles(group, names)
     cut = [parts(dataset, plane.across, _UPWARDS) for dataset in prepared]
     _lines(axes, prepared, styles, plane, look)
-    legend = _entries(group, cut, names, styles, look)
+    legend = _entries(prepared, cut, names, styles, plane, look)
     for dataset in prepared:
-        mark_events(axes, dataset, places(dataset, plane).T, look)
+        mark_events(axes, dataset, places(dataset, plane).T, look, plane.marked(dataset))
     # a named size is a width: what stands above the frame adds height
     place_legend(figure, [axes], legend, look, grow=isinstance(size, str))
     figure.draw_without_rendering()  # the frame has its place: marks along lines are spaced on paper
@@ -255,17 +268,18 @@ def _lines(
 
 
 def _entries(
-    group: Sequence[xarray.Dataset],
+    prepared: Sequence[xarray.Dataset],
     cut: Sequence[Sequence[Part]],
     names: Sequence[str],
     styles: Sequence[style.CurveStyle],
+    plane: Plane,
     look: style.Look,
 ) -> dict[str, Line2D]:
     """The legend: curves, strokes and hollow marks where there are two of them, events."""
     from matplotlib.lines import Line2D
 
     entries: dict[str, Line2D] = {}
-    for dataset, name, curve in zip(group, names, styles, strict=True):
+    for dataset, name, curve in zip(prepared, names, styles, strict=True):
         small = _small(kind_of(dataset), curve, look, hollow=False)
         entries[name] = Line2D([], [], color=curve.colour, linewidth=look.line * curve.width, **small)
     every = [part for pieces in cut for part in pieces]
@@ -277,7 +291,9 @@ def _entries(
     if any(part.subcritical for part in every):
         hollow = _small("PD", style.ONE_CURVE, look, hollow=True)
         entries[SUBCRITICAL] = Line2D([], [], linestyle="none", **hollow)
-    kinds = {kind for dataset in group for kind, _, _ in style.marks(dataset)}
+    kinds = {
+        kind for dataset in prepared for kind, _, which in style.marks(dataset) if plane.marked(dataset)[which].any()
+    }
     order = list(style.KINDS)
     for kind in sorted(kinds, key=lambda k: (order.index(k) if k in order else len(order), k)):
         entries[event_words(kind)] = Line2D([], [], **event_drawing(style.kind_style(kind), look))
@@ -321,7 +337,8 @@ def _along(
     clear = style.MARKER_SIZE * look.marker * figure.dpi / 72.0
     for part in pieces:
         on_paper = axes.transData.transform(np.column_stack([part.x, part.y]) * np.array(plane.factors()))
-        found = stations(on_paper[:, 0], on_paper[:, 1], spacing)
+        spots = stations(on_paper[:, 0], on_paper[:, 1], spacing)
+        found = [p for p in spots if axes.bbox.contains(*p)]
         keep = [p for p in found if not len(events) or np.hypot(*(events - p).T).min() > clear]
         if not keep:
             continue
@@ -330,9 +347,15 @@ def _along(
         axes.plot(x, y, linestyle="none", zorder=3.5, gid="along-hollow" if part.subcritical else "along", **drawing)
 
 
-def mark_events(axes: Any, dataset: xarray.Dataset, at: np.ndarray, look: style.Look) -> None:
-    """Markers of extrema and points of codimension two; `at`, (2, events) or, in space, (3, events)."""
-    for kind, mark, which in style.marks(dataset):
+def mark_events(axes: Any, dataset: xarray.Dataset, at: np.ndarray, look: style.Look, marked: np.ndarray) -> None:
+    """Markers of extrema and points of codimension two; `at`, (2, events) or, in space, (3, events).
+
+    `marked`, (events,): which of them.
+    """
+    for kind, mark, every in style.marks(dataset):
+        which = every[marked[every]]
+        if not which.size:
+            continue
         axes.plot(*at[:, which], zorder=5, gid=kind, clip_on=False, **event_drawing(mark, look))
 
 
@@ -357,7 +380,10 @@ def _name_events(
     for dataset in prepared:
         at = places(dataset, plane)
         told = dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else [""] * len(at)
-        for place, kind, extreme in zip(at, dataset["event_kind"].to_numpy(), told, strict=True):
+        kinds, marked = dataset["event_kind"].to_numpy(), plane.marked(dataset)
+        for place, kind, extreme, wanted in zip(at, kinds, told, marked, strict=True):
+            if not wanted:
+                continue
             if str(kind) != "extremum":
                 spots.append(place)
                 texts.append(str(kind))

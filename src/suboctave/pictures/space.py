@@ -260,7 +260,7 @@ def _draw(
                 axes.plot(*at[:, which], zorder=6, gid=kind, **drawing)
                 kinds[kind] = style.kind_style(kind)
     for dataset in bounds:
-        mark_events(axes, dataset, space.values(dataset)[1], look)
+        mark_events(axes, dataset, space.values(dataset)[1], look, np.ones(dataset.sizes["event"], dtype=bool))
         kinds |= {kind: mark for kind, mark, _ in style.marks(dataset)}
     if False in verdicts:
         entries["unstable"] = Line2D([], [], color=style.SOFT, linewidth=_THIN * look.line, linestyle=dashed)

@@ -22,6 +22,7 @@ from suboctave.study.steps.base import Complaint
 
 __all__ = ["CURVE_FIGURES", "BoundaryFigure", "CurveFigure", "FigureSection", "SpaceFigure", "branches_of"]
 
+_VIEW = [field.name for field in fields(View)]
 #: the curves that a study gives, by name, with the two parameters in which bifurcations were tracked, else None
 Drawable = Mapping[str, tuple[str, str] | None]
 
@@ -51,7 +52,8 @@ class CurveFigure(BaseModel):
     @property
     def view(self) -> View:
         """Quantity and units; InputError where they do not go together."""
-        return View(**{field.name: getattr(self, field.name, None) for field in fields(View)})
+        given: dict[str, Any] = {name: getattr(self, name, None) for name in _VIEW}
+        return View(**given)
 
     @property
     def texts(self) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -108,8 +110,9 @@ class CurveFigure(BaseModel):
         readings = [] if view.variable == "amplitude" else [view.variable]
         labels: Sequence[str] | None = None
         alone = results[there[0]] if len(there) == 1 else None
-        if getattr(self, "labels", None) is not None:
-            told = {name: self.labels[every.index(name)] for name in there}
+        given: list[str] | None = getattr(self, "labels", None)
+        if given is not None:
+            told = {name: given[every.index(name)] for name in there}
             labels = [label for name in there for label in _labels(results[name], curves[name], told[name])]
         elif isinstance(alone, BifurcationDiagram):
             labels = alone.legend
@@ -238,14 +241,8 @@ class SpaceFigure(CurveFigure):
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """See `CurveFigure.drawing`."""
         own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
-        plot_space(
-            datasets,
-            path,
-            **own,
-            **{
-                field.name: getattr(view, field.name) for field in fields(View) if field.name in type(self).model_fields
-            },
-        )
+        units: dict[str, Any] = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
+        plot_space(datasets, path, **own, **units)
 
 
 def _same(x: str | None, y: str | None) -> Iterator[Complaint]:
