@@ -65,7 +65,7 @@ if TYPE_CHECKING:
         check_derivatives,
         library,
     )
-    from suboctave.pictures import plot, plot_history, plot_phase, plot_spectrum, write_report
+    from suboctave.pictures import plot, plot_history, plot_phase, plot_space, plot_spectrum, write_report
     from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy
 
 # Public name -> the module that defines it. A new public name is one entry here and one import above.
@@ -123,6 +123,7 @@ _HOME = {
     "plot": "suboctave.pictures",
     "plot_history": "suboctave.pictures",
     "plot_phase": "suboctave.pictures",
+    "plot_space": "suboctave.pictures",
     "plot_spectrum": "suboctave.pictures",
     "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
@@ -184,6 +185,7 @@ __all__ = [
     "plot",
     "plot_history",
     "plot_phase",
+    "plot_space",
     "plot_spectrum",
     "stability",
     "switch_branch",

@@ -128,9 +128,15 @@ def test_doubled_limit_points_end_on_the_period_doublings():
         assert (end.omega, end.parameter("j")) == pytest.approx(place, abs=3e-5)
         assert (curve.omega[-1], curve.parameter("j")[-1]) == (end.omega, end.parameter("j"))
         assert "period doublings of the parent" in curve.ended
+    dataset = doubling.to_xarray()
+    told = {str(text) for text in dataset["event_extreme"].values}
+    assert told == {"", "maximum of j", "minimum of omega"}
+    after = dataset["event_after"].values
+    assert np.array_equal(dataset["event_stable_after"].values == 1, doubling.stable[after])
     # c3 is negative, the doublings supercritical, outside the two
     inside = (doubling.omega < expected[0][0]) & (doubling.omega > expected[1][0]) & (doubling.parameter("j") > 0.15)
-    assert len(set(np.sign(doubling.coefficient[inside]))) == 1
+    assert np.all(doubling.coefficient[inside] > 0.0)
+    assert np.all(doubling.coefficient[~inside & (np.abs(doubling.omega - expected[0][0]) > 0.05)] < 0.0)
 
 
 def test_corners_of_the_exact_law_where_another_contact_grazes():

@@ -40,7 +40,7 @@ def test_drawn_over_the_plane_of_its_parameters(curve, tmp_path):
     figure = so.plot(curve, tmp_path / "limits.png", title="limit points")
     (axes,) = figure.axes
     assert axes.get_ylabel() == "F"
-    drawn = [line for line in axes.get_lines() if line.get_gid() in ("stable", "unstable")]
+    drawn = [line for line in axes.get_lines() if line.get_gid() in ("border", "within")]
     y = np.concatenate([line.get_ydata() for line in drawn])
     assert (y.min(), y.max()) == pytest.approx((curve.parameter("F").min(), 0.2), rel=1e-2)
     markers = [line for line in axes.get_lines() if line.get_gid() == "CP"]
@@ -129,3 +129,26 @@ def test_what_cannot_be_tracked(curve, limit_point):
         so.track(curve.bifurcations["CP"][0], "F", (0.0, 0.2))
     with pytest.raises(so.InputError, match="a located bifurcation, not PeriodicOrbit"):
         so.track(limit_point.orbit, "F", (0.0, 0.2))
+
+
+def test_the_coefficient_of_period_doublings_has_the_sign_of_their_normal_form():
+    system = so.library.reference_oscillator(p=0.55)
+    doubling = so.frequency_response(system, (4.05, 3.9)).bifurcations["PD"][0]
+    border = so.track(doubling, "j", (0.0, 0.01))
+    dataset = border.to_xarray()
+    assert doubling.criticality == "supercritical"
+    assert border.coefficient[0] == pytest.approx(doubling.normal_form.coefficients["c3"], rel=1e-3)
+    assert np.array_equal(dataset["coefficient"], border.coefficient)
+    assert list(border.to_dataframe().columns)[:2] == ["omega", "j"]
+    # where motions at the end of a border branch off, its points say of them what a response curve there does
+    there = so.frequency_response(system.with_parameters({"j": 0.01}), (3.85, 3.7)).bifurcations["PD"][0]
+    assert there.omega == pytest.approx(border.omega[-1], rel=1e-6)
+    assert (there.criticality == "supercritical") == (border.coefficient[-1] < 0.0)
+
+
+def test_events_of_a_dataset_say_what_turns_and_that_stability_goes_on(curve):
+    dataset = curve.to_xarray()
+    assert [str(kind) for kind in dataset["event_kind"].values] == ["CP"]
+    assert [str(text) for text in dataset["event_extreme"].values] == [""]
+    after = int(dataset["event_after"][0])
+    assert bool(dataset["event_stable_after"][0]) == bool(curve.stable[after])

@@ -14,6 +14,7 @@ from suboctave.study.commands import examples
 ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 FIRST, LAST = TUTORIAL.split("## 5. ")
+LAST, BOUNDARIES = LAST.split("## 6. ")
 CASCADE, SUBHARMONIC = LAST.split("### Sub-harmonics")
 
 
@@ -119,6 +120,31 @@ def test_its_mistakes_are_told_as_it_says(suboctave, tmp_path, monkeypatch):
     status, _, err = suboctave("check", "study.toml")
     assert status == 2
     assert err == blocks("text")[0]
+
+
+def test_its_boundaries(suboctave, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (text,), (more,) = blocks("toml"), blocks("toml", BOUNDARIES)
+    (script, _), (chapter,) = blocks("python"), blocks("python", BOUNDARIES)
+    scope = {}
+    exec(compile(script, "docs/tutorial.md", "exec"), scope)
+    capsys.readouterr()
+    exec(compile(chapter, "docs/tutorial.md", "exec"), scope)
+    said = capsys.readouterr().out
+    assert [said] == blocks("text", BOUNDARIES)
+    assert Path("boundaries.png").stat().st_size > 0
+    # the limit points of a response computed at one of these gaps
+    curve = so.frequency_response(scope["system"].with_parameters({"j": 0.2}), omega=(2.5, 0.5))
+    assert [f"{point.omega:.4f}" for point in curve.bifurcations["LP"]] == re.findall(r"j = 0.2: omega = (.*)", said)
+    (figure,) = re.findall(r"`(\{ kind = .*? \})`", BOUNDARIES)
+    whole = text.replace('{ file = "response.png" }', '{ file = "response.png" }, ' + figure) + more
+    assert figure in whole
+    Path("study.toml").write_text(whole, encoding="utf-8")
+    status, _, err = suboctave("run", "study.toml")
+    assert status == 0, err
+    found = so.load("study_results/results.nc")["falls"]
+    assert np.abs(found.omega - scope["limits"][1].omega).max() < 1e-9
+    assert Path("study_results/falls.png").stat().st_size > 0
 
 
 def test_every_command_it_names_is_there(suboctave):

@@ -12,6 +12,7 @@ from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
 from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, linear_part, solved_start
+from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation
@@ -95,6 +96,10 @@ def track(
         names, ranges = _third(bifurcation, parameter, bounds, omega)
     else:
         names, ranges = _free(bifurcation, parameter, bounds, omega)
+    if bifurcation.kind == "GPD":
+        assert isinstance(bifurcation, TrackedEvent)
+        assert ranges[1] is not None
+        bifurcation = _leaving(bifurcation, names, ranges[1])
     orbit = bifurcation.orbit
     system = orbit.system
     settings = make_settings(
@@ -177,7 +182,7 @@ def _free(
         raise InputError(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
         )
-    if item.kind not in TRACKED_KINDS:
+    if item.kind not in (*TRACKED_KINDS, "GPD"):
         raise InputError(
             f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves; this is a {item.kind}"
         )
@@ -216,6 +221,15 @@ def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range
         slack = 1e-9 * (high - low)
         if not low - slack <= value <= high + slack:
             raise InputError(f"the bifurcation has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+
+
+def _leaving(item: TrackedEvent, names: tuple[str, ...], second: Range) -> Bifurcation:
+    """Where the curve of doubled limit points that begins at a GPD is entered."""
+    if names != item.names:
+        raise InputError(
+            f"the limit points that leave this GPD are followed over {' and '.join(item.names)}, in which it was found"
+        )
+    return limit_point_beside(item, abs(second[1] - second[0]))
 
 
 def _observed(item: Bifurcation, observe: int | None) -> int | None:

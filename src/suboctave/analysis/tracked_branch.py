@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from suboctave.continuation.problem import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
 from suboctave.stability import FloquetResult, StabilityMethod
+
+if TYPE_CHECKING:
+    import pandas
 
 
 class TrackedPoint(BranchPoint):
@@ -137,6 +140,17 @@ class TrackedBranch(Branch):
             distance = np.minimum(np.abs(mu - target), np.abs(mu - np.conj(target)))
             mu = np.delete(mu, np.argsort(distance, kind="stable")[: 2 if self.kind == "NS" else 1])
         return bool(np.all(np.abs(mu) < 1.0))
+
+    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+        """As of any branch, with both parameters, `coefficient`, and `kappa` of an NS curve."""
+        frame = super().to_dataframe(readings)
+        for place, name in enumerate(self.names):
+            if name not in frame:
+                frame.insert(1 + place, name, self.parameter(name))
+        frame["coefficient"] = self.coefficient
+        if self.kind == "NS":
+            frame["kappa"] = self.kappa
+        return frame
 
     def __repr__(self) -> str:
         ends = [", ".join(f"{n}={self.parameter(n)[i]:.6g}" for n in self.names) for i in (0, -1)]

@@ -230,6 +230,8 @@ class TrackedCurve:
     def images(self, u: Array) -> list[Array]:
         """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""
         basis, n = self.balance.basis, self.balance.dimension
+        if basis.nu == 1:
+            return [u]
         extra, parameters = np.split(u[n:], [self.augmentation.extras])
         found = []
         for shift in range(basis.nu):

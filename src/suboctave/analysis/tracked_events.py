@@ -36,12 +36,12 @@ from suboctave.harmonic.selection import choose_harmonics
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
+#: share of a step to which an event is located, at once and where more harmonics are to follow
+_RESOLVED, _ROUGH = 1e-11, 1e-3
 #: component of the tangent in scaled arclength that may be rounding at both ends of a step
 _LEVEL = 1e-9
 #: share of a step within which events coincide
 _SAME = 5e-3
-#: share of a step to which an event is located, at once and where more harmonics are to follow
-_RESOLVED, _ROUGH = 1e-11, 1e-3
 
 
 class CurveTest(ABC):

@@ -110,8 +110,9 @@ class TrackedSample:
         kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
         if kind is Kind.FREE:
             return float("nan")
-        turn = -1.0 if self.twist > 0.0 else 1.0
-        return turn * (0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+        # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign
+        turn = 1.0 if self.twist > 0.0 else -1.0
+        return turn * (-0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
 
     @lazy
     def extreme(self) -> str:

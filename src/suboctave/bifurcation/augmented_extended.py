@@ -147,15 +147,16 @@ class ExtendedEquations(SingularEquations):
         by = operator_along(state, kind, self.phi * scale, directions, self.kappa, shifts)
         by = by * (scale / self.of.unit)[:, None]
         if not self._complex:
-            last = np.concatenate((np.zeros(n), self.phi, [0.0, 0.0]))
+            last = np.concatenate((np.zeros(n), self.phi, np.zeros(len(self.names))))
             return np.vstack((np.hstack((by[:, :n], matrix, by[:, n:])), last))
-        out = np.zeros((2 * m + 2, n + 1 + 2 * m + 2))
+        end = n + 1 + 2 * m
+        out = np.zeros((2 * m + 2, end + len(self.names)))
         out[:m, : n + 1], out[m : 2 * m, : n + 1] = by[:, : n + 1].real, by[:, : n + 1].imag
-        out[: 2 * m, n + 1 : -2] = np.block([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]])
-        out[:m, -2:], out[m : 2 * m, -2:] = by[:, n + 1 :].real, by[:, n + 1 :].imag
-        out[-2, n + 1 : -2] = np.concatenate((self.phi.real, self.phi.imag))
+        out[: 2 * m, n + 1 : end] = np.block([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]])
+        out[:m, end:], out[m : 2 * m, end:] = by[:, n + 1 :].real, by[:, n + 1 :].imag
+        out[-2, n + 1 : end] = np.concatenate((self.phi.real, self.phi.imag))
         c = self.of.borders.right
-        out[-1, n + 1 : -2] = np.concatenate((-c.imag, c.real))
+        out[-1, n + 1 : end] = np.concatenate((-c.imag, c.real))
         return out
 
     def renewed(self) -> ExtendedOperator:

@@ -5,12 +5,14 @@ from suboctave.pictures import plot
 plot(curve.to_xarray(), "curve.png")
 """
 
+from suboctave.pictures.boundary import plot_boundaries
 from suboctave.pictures.history import plot_history
 from suboctave.pictures.phase import plot_phase
 from suboctave.pictures.plot import plot
 from suboctave.pictures.report import write_report
 from suboctave.pictures.response import draw_response, plot_panels, plot_response
 from suboctave.pictures.saving import save_figure
+from suboctave.pictures.space import plot_space
 from suboctave.pictures.spectrum import plot_spectrum
 from suboctave.pictures.view import View
 
@@ -18,10 +20,12 @@ __all__ = [
     "View",
     "draw_response",
     "plot",
+    "plot_boundaries",
     "plot_history",
     "plot_panels",
     "plot_phase",
     "plot_response",
+    "plot_space",
     "plot_spectrum",
     "save_figure",
     "write_report",

@@ -21,11 +21,35 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["figure_data"]
+__all__ = ["AXIS", "DASHES", "FONT", "SYMBOLS", "Words", "figure_data", "layout_of", "short"]
 
-_SYMBOLS = {"o": "circle", "v": "triangle-down", "s": "square", "D": "diamond", "x": "x-thin", "*": "star"}
-_DASHES = ("7px,4px", "10px,3px,2px,3px", "2px,3px")
+SYMBOLS = {
+    "o": "circle",
+    "v": "triangle-down",
+    "s": "square",
+    "D": "diamond",
+    "x": "x-thin",
+    "*": "star",
+    "d": "diamond-tall",
+    "P": "cross",
+    "h": "hexagon",
+    "<": "triangle-left",
+    ">": "triangle-right",
+    "p": "pentagon",
+    "8": "octagon",
+    "X": "x",
+}
+DASHES = ("7px,4px", "10px,3px,2px,3px", "2px,3px")
 _DIGITS = 9
+FONT = {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK}
+AXIS = {
+    "showline": True,
+    "mirror": True,
+    "ticks": "inside",
+    "linecolor": style.INK,
+    "gridcolor": style.GRID,
+    "zeroline": False,
+}
 
 
 def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str) -> dict[str, Any]:
@@ -41,25 +65,25 @@ def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str
         data += _markers(dataset, horizontal, html.escape(label), edge, several)
     first = next(iter(curves.values()))
     across = "forcing frequency ω" if horizontal == "omega" else html.escape(horizontal)
-    one = int(first.attrs.get("dofs", 1)) == 1
-    x = "x" if one else f"x<sub>{int(first.attrs.get('observed_dof', 0))}</sub>"
-    axis = {
-        "showline": True,
-        "mirror": True,
-        "ticks": "inside",
-        "linecolor": style.INK,
-        "gridcolor": style.GRID,
-        "zeroline": False,
-    }
-    layout = {
-        "font": {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK},
+    return {"data": data, "layout": layout_of(across, None, first), "name": name}
+
+
+def layout_of(across: str, upwards: str | None, dataset: xarray.Dataset | None = None) -> dict[str, Any]:
+    """The layout of a frame; with a `dataset` and nothing else said, its amplitude upwards."""
+    upright: dict[str, Any] = {**AXIS, "title": {"text": upwards}}
+    if dataset is not None:
+        one = int(dataset.attrs.get("dofs", 1)) == 1
+        x = "x" if one else f"x<sub>{int(dataset.attrs.get('observed_dof', 0))}</sub>"
+        upright |= {"title": {"text": f"amplitude max |{x}|"}, "rangemode": "tozero"}
+    return {
+        "font": FONT,
         "margin": {"l": 64, "r": 12, "t": 34, "b": 52},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "hovermode": "closest",
         "hoverlabel": {"align": "left"},
-        "xaxis": {**axis, "title": {"text": across, "standoff": 8}, "automargin": True},
-        "yaxis": {**axis, "title": {"text": f"amplitude max |{x}|"}, "rangemode": "tozero"},
+        "xaxis": {**AXIS, "title": {"text": across, "standoff": 8}, "automargin": True},
+        "yaxis": upright,
         "legend": {
             "orientation": "h",
             "yref": "container",
@@ -69,14 +93,13 @@ def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str
             "font": {"size": 12},
         },
     }
-    return {"data": data, "layout": layout, "name": name}
 
 
 def _lines(
     dataset: xarray.Dataset, horizontal: str, label: str, curve: style.CurveStyle, index: int, several: bool
 ) -> list[dict[str, Any]]:
     whole = line(dataset, horizontal)
-    words = _Words(dataset)
+    words = Words(dataset)
     again = repeated(whole)
     verdicts = [None] if whole.stable is None else [True, False]
     traces = []
@@ -97,15 +120,15 @@ def _lines(
                 "mode": "lines",
                 "name": f"{label}: {word}" if several else word,
                 "legendgroup": label,
-                "x": _short(x),
-                "y": _short(y),
+                "x": short(x),
+                "y": short(y),
                 "text": told,
                 "hovertemplate": f"{label}: {word}<br>%{{text}}<extra></extra>",
                 "connectgaps": False,
                 "line": {
                     "color": curve.colour,
                     "width": 2.2 * curve.width,
-                    "dash": _DASHES[index % len(_DASHES)] if verdict is False else "solid",
+                    "dash": DASHES[index % len(DASHES)] if verdict is False else "solid",
                 },
             }
         )
@@ -126,7 +149,7 @@ def _of_verdict(stable: np.ndarray | None, verdict: bool | None, count: int, aga
 
 def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, several: bool) -> list[dict[str, Any]]:
     positions = coordinate(dataset, horizontal)[1]
-    words, heights = _Words(dataset), dataset["event_amplitude"].to_numpy()
+    words, heights = Words(dataset), dataset["event_amplitude"].to_numpy()
     smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
     traces = []
     for _, mark, chosen in style.marks(dataset):
@@ -137,12 +160,12 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
                 "mode": "markers",
                 "name": f"{label}: {named}" if several else named,
                 "legendgroup": label if several else named,
-                "x": _short(positions[chosen].tolist()),
-                "y": _short(heights[chosen].tolist()),
+                "x": short(positions[chosen].tolist()),
+                "y": short(heights[chosen].tolist()),
                 "text": [words.of_event(int(i)) for i in chosen],
                 "hovertemplate": f"{label}: {named}<br>%{{text}}<extra></extra>",
                 "marker": {
-                    "symbol": _SYMBOLS[mark.marker],
+                    "symbol": SYMBOLS[mark.marker],
                     "size": 1.5 * mark.size * smaller,
                     "color": mark.colour,
                     "line": {"color": edge, "width": 1.8},
@@ -152,34 +175,34 @@ def _markers(dataset: xarray.Dataset, horizontal: str, label: str, edge: str, se
     return traces
 
 
-class _Words:
-    """What hovering over a point or an event says: omega, the free parameter, amplitude, a multiplier."""
+class Words:
+    """What hovering over a point or an event says: omega, free parameters, amplitude, a multiplier."""
 
     def __init__(self, dataset: xarray.Dataset) -> None:
-        free = str(dataset.attrs["free"])
-        self.free = "" if free == "omega" else html.escape(free)
-        at, there = coordinate(dataset, free)
+        plane = str(dataset.attrs.get("plane", "")).split("\n") if dataset.attrs.get("tracked") else []
+        free = list(dict.fromkeys(name for name in [*plane, str(dataset.attrs["free"])] if name != "omega"))
+        self.free = [html.escape(name) for name in free]
+        self.at = [coordinate(dataset, name) for name in free]
         known = "multipliers" in dataset and dataset.sizes.get("multiplier", 0) > 0
-        leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(at.size, np.nan + 0.0j)
-        self.points = (dataset["omega"].to_numpy(), at, dataset["amplitude"].to_numpy(), leading)
+        leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(dataset.sizes["point"], np.nan + 0.0j)
+        self.points = (dataset["omega"].to_numpy(), dataset["amplitude"].to_numpy(), leading)
         self.events = (
             dataset["event_omega"].to_numpy(),
-            there,
             dataset["event_amplitude"].to_numpy(),
             dataset["event_multiplier"].to_numpy(),
         )
 
     def of_point(self, index: int) -> str:
-        return self._told(self.points, index, "leading")
+        return self._told(self.points, index, 0)
 
     def of_event(self, index: int) -> str:
-        return self._told(self.events, index, "critical")
+        return self._told(self.events, index, 1)
 
-    def _told(self, columns: tuple[np.ndarray, ...], index: int, which: str) -> str:
-        omega, free, amplitude, multiplier = (column[index] for column in columns)
+    def _told(self, columns: tuple[np.ndarray, ...], index: int, at_event: int) -> str:
+        omega, amplitude, multiplier = (column[index] for column in columns)
+        which = ("leading", "critical")[at_event]
         lines = [f"ω = {omega:.{_DIGITS}g}"]
-        if self.free:
-            lines.append(f"{self.free} = {free:.{_DIGITS}g}")
+        lines += [f"{n} = {at[at_event][index]:.{_DIGITS}g}" for n, at in zip(self.free, self.at, strict=True)]
         lines.append(f"amplitude = {amplitude:.7g}")
         mu = complex(multiplier)
         if np.isfinite(mu):
@@ -188,6 +211,6 @@ class _Words:
         return "<br>".join(lines)
 
 
-def _short(values: list[Any]) -> list[float | None]:
+def short(values: list[Any]) -> list[float | None]:
     """Numbers with the digits that a screen can show; null where there is none."""
     return [None if v is None or not math.isfinite(v) else float(f"{v:.{_DIGITS}g}") for v in values]

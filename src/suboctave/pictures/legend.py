@@ -15,11 +15,16 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
 
-__all__ = ["ordered", "place_legend"]
+__all__ = ["TIGHT", "ordered", "place_legend"]
+
+#: so that two columns fit into the width of a journal's column
+TIGHT: dict[str, Any] = {"handlelength": 2.0, "handletextpad": 0.5, "columnspacing": 1.0}
 
 
-def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line2D], look: style.Look) -> None:
-    """Put the legend where there is room for it."""
+def place_legend(
+    figure: Figure, frames: Sequence[Axes], entries: dict[str, Line2D], look: style.Look, *, grow: bool = False
+) -> None:
+    """Put the legend where there is room for it; where it stands above the frames, `grow` adds its height to theirs."""
     if not entries:
         return
     drawing: dict[str, Any] = {
@@ -29,6 +34,8 @@ def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line
         "edgecolor": style.GRID,
         "handlelength": 2.6,
     }
+    if grow:
+        drawing |= TIGHT
     figure.draw_without_rendering()  # places the frames; a legend inside one of them moves nothing
     for axes in frames:
         for location in ("upper left", "upper right", "center left", "center right", "lower left", "lower right"):
@@ -38,10 +45,15 @@ def place_legend(figure: Figure, frames: Sequence[Axes], entries: dict[str, Line
                 return
             legend.remove()
     columns = min(len(entries), 4)
+    width, height = figure.get_size_inches()
     while True:
+        if grow:  # as high as it may become, so that the frames keep theirs while it is measured
+            figure.set_size_inches(width, height + 2.0 * look.small / 72.0 * (len(entries) // columns + 2))
         legend = figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns, **drawing)
         figure.draw_without_rendering()
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            if grow:
+                figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
             return
         legend.remove()
         columns -= 1

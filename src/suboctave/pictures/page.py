@@ -89,7 +89,9 @@ SCRIPT = """
       document.body.classList.add("live");
       Plotly.newPlot(figure.querySelector(".plot"), told.data, told.layout, {
         responsive: true, displaylogo: false, plotlyServerURL: "",
-        modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
+        modeBarButtons: told.space
+          ? [["toImage"], ["orbitRotation", "tableRotation", "zoom3d", "pan3d"], ["resetCameraDefault3d"]]
+          : [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
         toImageButtonOptions: { format: "svg", filename: told.name }
       });
     });

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from suboctave.errors import InputError
-from suboctave.pictures.boundary import is_boundary, plot_boundaries
+from suboctave.pictures.boundary import plot_boundaries
+from suboctave.pictures.boundary_lines import is_boundary
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.view import View
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["plot"]
+__all__ = ["datasets_of", "plot"]
 
 
 def plot(
@@ -27,6 +28,7 @@ def plot(
     element: int | None = None,
     dof: int | None = None,
     x: str | None = None,
+    y: str | None = None,
     frequency: str | None = None,
     omega_reference: float | None = None,
     scale: float | None = None,
@@ -59,14 +61,17 @@ def plot(
     harmonic, element, dof
         Of which harmonic (alone: its amplitude), of which element, of which degree of freedom.
     x
-        The horizontal axis: "omega" or a parameter; default what the curves were followed in. Curves of bifurcations
-        (`track`) are drawn over the plane of their two parameters.
+        The horizontal axis: "omega" or a parameter; default what the curves were followed in.
+    y
+        Of curves of bifurcations (`track`), which are drawn over the plane of their two parameters: the vertical axis.
+        A `quantity` that is asked for takes its place.
     frequency
         "rad/s" or "Hz", where the system's time is in seconds.
     omega_reference
         The axis shows `omega / omega_reference`.
     scale, unit
-        Factor on the quantity, and its unit for the label: `scale=1e3, unit="mm"`.
+        Factor on the quantity, and its unit for the label: `scale=1e3, unit="mm"`. In the plane of two parameters, of
+        the one that is no frequency.
     xlabel, ylabel, labels, title
         Texts of the axes, names of the curves in the legend, title.
     xlim, ylim
@@ -81,6 +86,7 @@ def plot(
     InputError
         For what cannot be drawn, before anything is.
     """
+    projected = quantity is not None or harmonic is not None
     if quantity is None:
         quantity = "amplitude" if harmonic is None else "harmonic"
     given = _several(curves)
@@ -90,10 +96,25 @@ def plot(
     view = View(
         quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel, xlim, ylim, marks
     )
-    datasets = [dataset for item in given for dataset in _datasets(item, view)]
-    if all(is_boundary(dataset) for dataset in datasets) and datasets:
-        return plot_boundaries(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
+    datasets = datasets_of(curves, view)
+    tracked = [is_boundary(dataset) for dataset in datasets]
+    if tracked and all(tracked):
+        return plot_boundaries(
+            datasets, path, x=x, y=y, labels=labels, title=title, size=size, view=view, projected=projected
+        )
+    if y is not None:
+        raise InputError("y= is for curves of bifurcations; of other curves quantity= says what is drawn upwards")
+    if any(tracked) and x is None:
+        raise InputError(
+            "there are curves of bifurcations among response curves: plot_space draws them together, x= one over the "
+            "other; or draw each kind by itself"
+        )
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
+
+
+def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
+    """The datasets of what `plot` takes, with the quantity that is drawn."""
+    return [dataset for item in _several(curves) for dataset in _datasets(item, view)]
 
 
 def _several(curves: Any) -> list[Any]:

@@ -20,8 +20,10 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
+from suboctave.pictures.boundary_lines import is_boundary, plane_of
 from suboctave.pictures.interactive import figure_data
 from suboctave.pictures.page import POLICY, SCRIPT, STYLE, plotly_source
+from suboctave.pictures.report_boundaries import Shown, boundary_figure, boundary_overviews, space_figure
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.saving import svg_text
 from suboctave.store.files import free_place, replace_file
@@ -36,7 +38,7 @@ __all__ = ["write_report"]
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page
 _TOLD = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
-_RECORDS = {"record", "digest", "contents"}
+_RECORDS = {"record", "digest", "contents", "tracked", "plane"}
 _LONG = 400
 _BESIDE = 56  # characters in a row of a table that stands beside its figure
 
@@ -155,13 +157,19 @@ def _overviews(curves: Mapping[str, xarray.Dataset]) -> list[str]:
     """All curves over the same parameter in one figure, where there are several of one observed DOF."""
     groups: dict[tuple[Any, ...], dict[str, xarray.Dataset]] = {}
     for name, data in curves.items():
+        if is_boundary(data):
+            continue
         key = (str(data.attrs["free"]), int(data.attrs.get("dofs", 1)), int(data.attrs.get("observed_dof", 0)))
         groups.setdefault(key, {})[name] = data
     several = [(key[0], group) for key, group in groups.items() if len(group) > 1]
-    return [
+    parts = [
         f"<section><h2>All curves over {_safe(_spelt(free))}</h2>{_figure(group, free, list(group))}</section>"
         for free, group in several
     ]
+    for members, what in boundary_overviews(curves):
+        shown = (boundary_figure if what == "plane" else space_figure)(members, _file_name(members))
+        parts.append(f"<section><h2>{_safe(shown.heading)}</h2>{_framed(shown)}</section>")
+    return parts
 
 
 def _curve(name: str, dataset: xarray.Dataset) -> str:
@@ -170,6 +178,13 @@ def _curve(name: str, dataset: xarray.Dataset) -> str:
     if "stable" in dataset:
         unstable = int(np.count_nonzero(~dataset["stable"].to_numpy().astype(bool)))
     said = f"{count} points" + ("" if unstable is None else f", {unstable} of them unstable")
+    figure: Any = _figure
+    over = "Bifurcations"
+    if is_boundary(dataset):
+        said = f"{_kind(dataset)}: {count} points" + (
+            "" if unstable is None else f", {unstable} within unstable motions"
+        )
+        figure, over = _boundary, "Extrema and points of codimension two"
     period = int(dataset.attrs.get("period", 1))
     if period > 1:
         said += f"; motions of {period} periods of the force"
@@ -180,52 +195,77 @@ def _curve(name: str, dataset: xarray.Dataset) -> str:
     wide = " wide" if sum(widths) > _BESIDE else ""
     return (
         f'<p class="soft">{_safe(said + ended)}.</p>'
-        f'<div class="pair{wide}"><div>{_figure({name: dataset}, str(dataset.attrs["free"]))}</div>'
-        f"<div><h3>Bifurcations, in the order met</h3>{table}</div></div>{notes}{_provenance(dataset)}"
+        f'<div class="pair{wide}"><div>{figure({name: dataset}, str(dataset.attrs["free"]))}</div>'
+        f"<div><h3>{over}, in the order met</h3>{table}</div></div>{notes}{_provenance(dataset)}"
     )
 
 
+def _kind(dataset: xarray.Dataset) -> str:
+    kind = str(dataset.attrs["tracked"])
+    return f"curve of bifurcations of the kind {kind} ({style.kind_style(kind).name})"
+
+
+def _file_name(curves: Mapping[str, xarray.Dataset]) -> str:
+    return re.sub(r"[^\w-]+", "_", "_".join(curves))[:60] or "figure"
+
+
 def _figure(curves: Mapping[str, xarray.Dataset], free: str, labels: Sequence[str] | None = None) -> str:
-    name = re.sub(r"[^\w-]+", "_", "_".join(curves))[:60] or "figure"
-    told = json.dumps(figure_data(curves, free, name), ensure_ascii=False, separators=(",", ":"))
+    still = plot_response(list(curves.values()), x=free, labels=labels, size=(6.4, 4.2))
+    words = f"Amplitude over {_spelt(free)}: {', '.join(curves)}"
+    return _framed(Shown("", figure_data(curves, free, _file_name(curves)), still, words))
+
+
+def _boundary(curves: Mapping[str, xarray.Dataset], _: str) -> str:
+    return _framed(boundary_figure(curves, _file_name(curves)))
+
+
+def _framed(shown: Shown) -> str:
+    told = json.dumps(shown.told, ensure_ascii=False, separators=(",", ":"))
     # what would end the script early, or is no line end for JSON but one for scripts
     for bad in "<>&\u2028\u2029":
         told = told.replace(bad, f"\\u{ord(bad):04x}")
-    still = svg_text(plot_response(list(curves.values()), x=free, labels=labels, size=(6.4, 4.2)))
-    packed = base64.b64encode(still.encode("utf-8")).decode("ascii")
-    alt = f"Amplitude over {_spelt(free)}: {', '.join(curves)}"
+    packed = base64.b64encode(svg_text(shown.still).encode("utf-8")).decode("ascii")
     return (
-        f'<div class="figure"><div class="plot"></div><div class="still"><img alt="{_safe(alt)}" '
+        f'<div class="figure"><div class="plot"></div><div class="still"><img alt="{_safe(shown.words)}" '
         f'src="data:image/svg+xml;base64,{packed}"></div><script type="application/json">{told}</script></div>'
     )
 
 
 def _bifurcations(dataset: xarray.Dataset) -> tuple[list[tuple[str, str]], list[list[str]]]:
     """Headings with their class, and the rows of the table."""
-    free = str(dataset.attrs["free"])
-    values = coordinate(dataset, free)[1]
+    free = _free(dataset)
+    values = [coordinate(dataset, name)[1] for name in free]
+    varied = _spelt(str(dataset.attrs["free"]))
+    extreme = dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else None
     column = {name: dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier")}
     residual, doubt = dataset["event_residual"].to_numpy(), dataset["event_uncertainty"].to_numpy()
     contact, critical = dataset["event_contact"].to_numpy(), dataset["event_criticality"].to_numpy()
-    head = [("kind", _TEXT), ("ω", "")] + ([(free, "")] if free != "omega" else [])
+    head = [("kind", _TEXT), ("ω", ""), *((name, "") for name in free)]
     head += [("max |x|", ""), ("multiplier", ""), ("residual", "")]
     remarks = []
-    for i in range(len(values)):
-        words = [str(critical[i])] if str(critical[i]) else []
-        words += [f"± {doubt[i]:.0e} in {_spelt(free)}"] if doubt[i] else []
+    for i in range(len(residual)):
+        words = [str(extreme[i])] if extreme is not None and str(extreme[i]) else []
+        words += [str(critical[i])] if str(critical[i]) else []
+        words += [f"± {doubt[i]:.0e} in {varied}"] if doubt[i] else []
         words += [f"contact: {contact[i]}"] if str(contact[i]) else []
         remarks.append("; ".join(words))
     if any(remarks):
         head.append(("remark", "long"))
     rows = []
-    for i in range(len(values)):
+    for i in range(len(residual)):
         kind = str(column["kind"][i])
         name = style.kind_style(kind).name
         row = [f"{kind} ({name})" if kind.isupper() and name != kind else name, f"{column['omega'][i]:.9g}"]
-        row += [f"{values[i]:.9g}"] if free != "omega" else []
+        row += [f"{value[i]:.9g}" for value in values]
         row += [f"{column['amplitude'][i]:.7g}", _complex(complex(column["multiplier"][i])), _small(residual[i])]
         rows.append(row + ([remarks[i]] if any(remarks) else []))
     return head, rows
+
+
+def _free(dataset: xarray.Dataset) -> list[str]:
+    """The free parameters other than omega."""
+    names = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
+    return [name for name in names if name != "omega"]
 
 
 def _notes(dataset: xarray.Dataset) -> list[str]:
@@ -252,7 +292,10 @@ def _provenance(dataset: xarray.Dataset) -> str:
         ("computed by", f"suboctave {attrs.get('suboctave', '(unknown version)')}"),
         ("system", str(attrs.get("system") or "(no name)")),
         ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {attrs.get('observed_dof', 0)}"),
-        ("free parameter", _spelt(str(attrs["free"]))),
+        (
+            "free parameter",
+            " and ".join(map(_spelt, plane_of(dataset))) if is_boundary(dataset) else _spelt(str(attrs["free"])),
+        ),
         ("fixed parameters", _fixed(dataset) or "none"),
     ]
     if "harmonics" in dataset:

@@ -145,7 +145,7 @@ def draw_response(
     for index in order:  # markers after all lines: none is crossed out by another curve
         edge = styles[index].colour if several or periods else style.INK
         legend |= _draw_events(axes, group[index], shown, horizontal, edge, look, several)
-    _dress(axes, *shown.labels(group[0], horizontal), look)
+    dress(axes, *shown.labels(group[0], horizontal), look)
     return legend
 
 
@@ -234,7 +234,7 @@ def _draw_events(
     return legend
 
 
-def _dress(axes: Axes, across: str, upwards: str, look: style.Look) -> None:
+def dress(axes: Axes, across: str, upwards: str, look: style.Look) -> None:
     axes.set_xlabel(across, fontsize=look.large, color=style.INK)
     axes.set_ylabel(upwards, fontsize=look.large, color=style.INK)
     axes.tick_params(direction="in", top=True, right=True, labelsize=look.normal, color=style.INK, zorder=2)

@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 UNKNOWN = -1  # in event_stable_after
+#: where, along a curve of bifurcations, a multiplier other than the critical ones reaches the unit circle
+_BY_ANOTHER = frozenset({"R1", "R2", "LPPD"})
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,8 @@ class EventRow:
     the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
     `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at
     a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does;
-    `multiplier_error` is the estimated error of `multiplier`, `stability_method` where it comes from.
+    `multiplier_error` is the estimated error of `multiplier`, `stability_method` where it comes from; `extreme` says of
+    an extremum what it is ("maximum of j").
     """
 
     kind: str
@@ -36,6 +39,7 @@ class EventRow:
     contact: str = ""
     contact_at: float = np.nan
     parameters: Mapping[str, float] = field(default_factory=dict)
+    extreme: str = ""
 
 
 class ContactLike(Protocol):
@@ -115,16 +119,27 @@ def event_rows(branch: BranchEvents, arclength: np.ndarray) -> list[EventRow]:
                 multiplier_error=event.critical_error,
                 stability_method=event.stability_method,
                 criticality=event.criticality,
-                stable_after=(
-                    before if id(event) in own else not before and not _others_unstable(event.multipliers, critical)
-                ),
+                stable_after=_stable_after(branch, event, after, before, id(event) in own),
                 uncertainty=event.uncertainty,
                 contact="" if event.contact is None else str(event.contact),
                 contact_at=np.nan if event.contact is None else event.contact.parameter,
                 parameters=dict(event.parameters),
+                extreme=_extreme(event),
             )
         )
     return rows
+
+
+def _stable_after(branch: BranchEvents, event: EventLike, after: int, before: bool, own: bool) -> bool:
+    """Whether the motions right after an event are stable; of a curve of bifurcations, all but its critical ones."""
+    if getattr(event, "curve", ""):
+        return bool(branch.stable[min(after + 1, len(branch.stable) - 1)]) if event.kind in _BY_ANOTHER else before
+    return before if own else not before and not _others_unstable(event.multipliers, event.critical_multiplier())
+
+
+def _extreme(event: EventLike) -> str:
+    which = getattr(event, "extreme", "")
+    return f"{which} of {getattr(event, 'parameter_name', '')}" if which else ""
 
 
 def _others_unstable(multipliers: np.ndarray, critical: complex) -> bool:

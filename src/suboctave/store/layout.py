@@ -15,6 +15,11 @@ line: point `i`, the events with `event_after == i` in their order, point `i + 1
 that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which
 it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...; docs/pictures.md) are further variables on
 `point`, each with its own on `event`.
+
+Curves of bifurcations (`track`) have the attributes `tracked`, their kind, and `plane`, their two free parameters, one
+a line; `stable` means that all multipliers but the critical ones lie inside the unit circle; on `point` there is
+`coefficient`, which decides the normal form (a of limit points, c3 of period doublings, negative where they are
+supercritical; else nan), on `event` `event_extreme` ("maximum of j" at an extremum, else empty).
 """
 
 from __future__ import annotations
@@ -183,8 +188,8 @@ def curve_dataset(
 def branch_dataset(branch: BranchLike) -> xarray.Dataset:
     """A computed branch as a labelled dataset; the layout is described at the top of this module."""
     names = list(branch.system.parameters)
-    arclength = np.asarray(branch.arclength)
-    return curve_dataset(
+    rows = event_rows(branch, np.asarray(branch.arclength))
+    dataset = curve_dataset(
         branch.omega,
         branch.amplitude,
         stable=branch.stable,
@@ -196,25 +201,32 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
         stability_method=branch.stability_methods,
         parameters={name: branch.parameter(name) for name in names},
         free=branch.name,
-        events=event_rows(branch, arclength),
+        events=rows,
         system=branch.system.name,
         ended=branch.ended,
         closed=branch.closed,
         period=branch.orbits[0].basis.nu if len(branch.orbits) else 1,
         observed_dof=branch.observe,
         dofs=branch.system.n,
-        options=_of_tracked(branch)
-        | {
+        options={
             name: value if isinstance(value, str | int | float) else repr(value)
             for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
         },
     )
+    return _with_tracked(dataset, branch, rows)
 
 
-def _of_tracked(branch: BranchLike) -> dict[str, str | int | float]:
-    """The kind and the two parameters of a curve of bifurcations."""
+def _with_tracked(dataset: xarray.Dataset, branch: BranchLike, rows: Sequence[EventRow]) -> xarray.Dataset:
+    """The dataset with what only curves of bifurcations have."""
     kind = getattr(branch, "kind", None)
-    return {} if kind is None else {"tracked": str(kind), "plane": "\n".join(getattr(branch, "plane", ()))}
+    if kind is None:
+        return dataset
+    meaning = {"long_name": "coefficient of the normal form: a of limit points, c3 of period doublings, else nan"}
+    dataset = dataset.assign_attrs(tracked=str(kind), plane="\n".join(getattr(branch, "plane", ())))
+    return dataset.assign(
+        coefficient=("point", np.asarray(getattr(branch, "coefficient", np.empty(0)), dtype=float), meaning),
+        event_extreme=("event", np.array([row.extreme for row in rows], dtype=object)),
+    )
 
 
 def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:

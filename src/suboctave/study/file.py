@@ -16,10 +16,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from suboctave.errors import InputError, suggest
 from suboctave.model.description import describe
 from suboctave.model.system import System
+from suboctave.study.curve_figures import CURVE_FIGURES, CurveFigure
 from suboctave.study.lines import Lines
 from suboctave.study.mistakes import Mistake, Mistakes, StudyError
 from suboctave.study.motion_figures import MOTION_FIGURES, MotionFigure
-from suboctave.study.outputs import FigureSection, Outputs, check_outputs
+from suboctave.study.outputs import Outputs, check_outputs
 from suboctave.study.steps import STEPS, Known, Step, Surroundings
 from suboctave.study.system import SystemSection, make_system, overridden
 from suboctave.version import __version__
@@ -251,8 +252,8 @@ def _outputs(
 ) -> Outputs | None:
     plain = dict(given)
     figures = plain.pop("figures", [])
-    sections: list[FigureSection | MotionFigure] = []
-    kinds: dict[str, type[BaseModel]] = {"response": FigureSection, **MOTION_FIGURES}
+    sections: list[CurveFigure | MotionFigure] = []
+    kinds: dict[str, type[BaseModel]] = {**CURVE_FIGURES, **MOTION_FIGURES}
     if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
         mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
         figures = []

@@ -95,6 +95,11 @@ class Step(BaseModel):
     type: str
     parameters: dict[str, float] = Field(default_factory=dict)
 
+    @property
+    def plane(self) -> tuple[str, str] | None:
+        """The two parameters of a curve of bifurcations; None for any other result."""
+        return None
+
     @classmethod
     def __pydantic_init_subclass__(cls, **more: Any) -> None:
         super().__pydantic_init_subclass__(**more)

@@ -23,6 +23,12 @@ class Track(CurveStep):
     bounds: Range | list[Range]
     omega: Range | None = None
 
+    @property
+    def plane(self) -> tuple[str, str] | None:
+        """See `Step.plane`."""
+        both = ["omega", self.parameter] if isinstance(self.parameter, str) else self.parameter
+        return (both[0], both[1]) if len(both) == 2 else None
+
     def check(self, around: Surroundings) -> Iterator[Complaint]:
         """See `Step.check`."""
         yield from super().check(around)

@@ -1,0 +1,117 @@
+"""Short texts beside points of a figure, each put where it covers least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from suboctave.pictures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["annotate"]
+
+#: nearest first; further away where everything near is taken
+_DISTANCES = (1.0, 2.4, 3.8)
+_SIDES = ((1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1))
+
+
+def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str], look: style.Look) -> None:
+    """Write `texts` beside `places`, (texts, 2) in data coordinates; the same text at the same place once.
+
+    Of the sides of a point the one is taken on which the text covers the fewest lines, markers and other texts.
+    """
+    if not len(texts):
+        return
+    figure.draw_without_rendering()
+    points = axes.transData.transform(np.asarray(places, dtype=float))
+    taken = _ink(axes)
+    frame = axes.get_window_extent()
+    legend = axes.get_legend()
+    boxes = [] if legend is None else [_corners(legend.get_window_extent())]
+    unit = figure.dpi / 72.0
+    gap = 0.75 * style.MARKER_SIZE * look.marker
+    done: list[tuple[str, np.ndarray]] = []
+    for text, point in zip(texts, points, strict=True):
+        if any(text == other and np.hypot(*(point - there)) < 3.0 * unit for other, there in done):
+            continue
+        done.append((text, point))
+        probe = axes.text(0.0, 0.0, text, fontsize=look.small)
+        size = probe.get_window_extent()
+        probe.remove()
+        best: tuple[float, tuple[int, int], float] | None = None
+        for distance, (rank, side) in product(_DISTANCES, enumerate(_SIDES)):
+            reach = distance * gap
+            box = _beside(point, side, size.width, size.height, reach * unit)
+            inside = frame.x0 <= box[0] and box[2] <= frame.x1 and frame.y0 <= box[1] and box[3] <= frame.y1
+            cost = 2.0 * _covered(box, taken) + 400.0 * sum(_overlap(box, other) for other in boxes)
+            cost += (0.0 if inside else 400.0) + 0.1 * rank + 5.0 * (distance - 1.0)
+            if best is None or cost < best[0]:
+                best = (cost, side, reach)
+        assert best is not None
+        _, side, reach = best
+        boxes.append(_beside(point, side, size.width, size.height, reach * unit))
+        axes.annotate(
+            text,
+            tuple(axes.transData.inverted().transform(point)),
+            xytext=_offset(side, reach),
+            textcoords="offset points",
+            ha=("center", "left", "right")[side[0]],
+            va=("center", "bottom", "top")[side[1]],
+            fontsize=look.small,
+            color=style.INK,
+            zorder=7,
+            annotation_clip=False,
+            gid="label",
+        )
+
+
+def _offset(side: tuple[int, int], gap: float) -> tuple[float, float]:
+    share = 0.75 if side[0] and side[1] else 1.0
+    return side[0] * gap * share, side[1] * gap * share
+
+
+def _beside(
+    point: np.ndarray, side: tuple[int, int], width: float, height: float, gap: float
+) -> tuple[float, float, float, float]:
+    """The box (x0, y0, x1, y1) of a text on one side of a point."""
+    across, up = _offset(side, gap)
+    x = point[0] + across - (0.5, 0.0, 1.0)[side[0]] * width
+    y = point[1] + up - (0.5, 0.0, 1.0)[side[1]] * height
+    return x, y, x + width, y + height
+
+
+def _corners(box: object) -> tuple[float, float, float, float]:
+    return box.x0, box.y0, box.x1, box.y1  # type: ignore[attr-defined]
+
+
+def _ink(axes: Axes) -> np.ndarray:
+    """Pixels (points, 2) along all that is drawn."""
+    found = [np.empty((0, 2))]
+    for item in axes.get_lines():
+        data = np.column_stack([item.get_xdata(), item.get_ydata()]).astype(float)
+        path = item.get_transform().transform(data[np.isfinite(data).all(axis=1)])
+        if len(path) == 0:
+            continue
+        if item.get_linestyle() == "None":
+            reach = 0.35 * item.get_markersize() * axes.figure.dpi / 72.0
+            found += [path + reach * np.array(side) for side in ((0, 0), *_SIDES)]
+            continue
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        dense = np.linspace(0.0, along[-1], int(along[-1]) + 2)
+        found.append(np.column_stack([np.interp(dense, along, column) for column in path.T]))
+    return np.concatenate(found)
+
+
+def _covered(box: tuple[float, float, float, float], ink: np.ndarray) -> float:
+    x, y = ink.T
+    return float(np.count_nonzero((x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])))
+
+
+def _overlap(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]

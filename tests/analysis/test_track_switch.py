@@ -1,0 +1,45 @@
+"""From a generalised period doubling onto the limit points of the doubled motions, against shooting."""
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def border():
+    system = so.library.reference_oscillator(p=0.55, regularization=3000.0)
+    response = so.frequency_response(system, (4.5, 1.3))
+    return so.track(response.bifurcations["PD"][0], "j", (0, 1))
+
+
+def test_the_limit_points_that_leave_a_generalised_period_doubling(border):
+    """They end on the border, and lead over the merging point and the cusp to the isola's centre and to j = 0."""
+    event = border.bifurcations["GPD"][1]
+    curve = so.track(event, "j", (0, 1))
+    assert curve.kind == "LP"
+    assert curve.orbits[-1].basis.nu == 2
+    np.testing.assert_allclose(
+        [curve.omega[0], curve.parameter("j")[0]], [event.omega, event.parameter("j")], atol=1e-5
+    )
+    merging, centre = (e for e in curve.extrema if e.parameter_name == "j")
+    np.testing.assert_allclose([merging.omega, merging.parameter("j")], [2.023364, 0.176829], atol=1e-5)
+    np.testing.assert_allclose([centre.omega, centre.parameter("j")], [2.355660, 0.579889], atol=1e-5)
+    (cusp,) = curve.bifurcations["CP"]
+    np.testing.assert_allclose([cusp.omega, cusp.parameter("j")], [2.022540, 0.176778], atol=1e-5)
+    assert curve.omega[-1] == pytest.approx(3.14017686, abs=1e-5)
+
+
+def test_the_other_one_leads_to_the_other_limit_points(border):
+    curve = so.track(border.bifurcations["GPD"][0], "j", (0, 1))
+    ends = sorted([curve.parameter("j")[0], curve.parameter("j")[-1]])
+    assert ends[0] == pytest.approx(0.0, abs=1e-12)
+    assert ends[1] == pytest.approx(border.bifurcations["GPD"][0].parameter("j"), abs=1e-4)
+    last = curve.omega[int(np.argmin(curve.parameter("j")))]
+    assert last == pytest.approx(2.94603063, abs=1e-5)
+
+
+def test_only_in_the_parameters_in_which_it_was_found(border):
+    with pytest.raises(InputError, match="followed over omega and j"):
+        so.track(border.bifurcations["GPD"][0], "Kc", (4, 5))
