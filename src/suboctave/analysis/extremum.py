@@ -25,8 +25,10 @@ from suboctave.analysis.track_start import (
     with_extremum,
 )
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import Extremum, Found, as_event
+from suboctave.analysis.tracked_events import Extremum, Found
+from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point
+from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
 from suboctave.bifurcation.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.compiled import computation_begins
@@ -195,6 +197,8 @@ def polished(found: Found, newton: NewtonOptions) -> Found:
     curve, point = found.sample.curve, found.sample.point
     if not isinstance(found.test, Extremum) or curve.augmentation.turning:
         return found
+    if isinstance(curve.augmentation, ExtendedOperator | PublishedDoubling):
+        return found  # by brackets alone, so that other systems are solved from beginning to end
     try:
         u = newton_extremum(curve, point.u, found.test.name, newton)
         if length(curve.weights(u, 0.0) * (u - point.u)) > _BESIDE:

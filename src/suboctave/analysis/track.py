@@ -16,7 +16,7 @@ from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.formulation import Formulation, written
+from suboctave.bifurcation.formulation import BorderedSystem, Formulation, written
 from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
@@ -105,6 +105,11 @@ def track(
     settings = make_settings(
         system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
     )
+    if turning and not isinstance(settings.formulation, BorderedSystem):
+        raise InputError(
+            f"curves of extrema are followed by the bordered system, not {settings.formulation.name!r}: leave "
+            "formulation= out; locate_extremum solves for a single one by the published system"
+        )
     basis = orbit.basis
     wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     adaptive, basis = discretisation(basis, wanted)

@@ -19,7 +19,8 @@ from suboctave.bifurcation.augmented import (
     SingularOperator,
 )
 from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
-from suboctave.bifurcation.extremum import extremal_of
+from suboctave.bifurcation.extremum import LimitPointExtremal
+from suboctave.bifurcation.extremum_bordered import BorderedExtremal
 from suboctave.bifurcation.formulation import BORDERED, Alcorta2019, ExtendedSystem, Formulation
 from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
@@ -149,7 +150,12 @@ def with_extremum(curve: TrackedCurve, u: np.ndarray, turning: str, plane: tuple
     n = curve.balance.dimension
     extra_spans = 1.0 / curve.weights(u, 0.0)[n : n + len(extra)]
     state = curve.evaluate(u).state
-    augmentation = extremal_of(curve.augmentation.own, state, extra, beside, turning, sizes, extra_spans)
+    base = curve.augmentation.own
+    augmentation: Augmentation
+    if isinstance(base, SingularOperator) and base.name == "LP":
+        augmentation = LimitPointExtremal(base, beside, state.force_scale() / sizes[beside], turning)
+    else:
+        augmentation = BorderedExtremal.of(base, state, extra, beside, turning, sizes, extra_spans)
     return replace(curve, augmentation=augmentation)
 
 
@@ -168,8 +174,7 @@ def solved_start(
     ConvergenceError
         If it is not found again.
     """
-    formulation = BORDERED if is_extremum(item) else settings.formulation
-    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), formulation)
+    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), settings.formulation)
     for name, ends in ((names[0], box.first), (names[-1], box.second)):
         if ends is not None:
             u[curve.index(name)] = min(ends[1], max(ends[0], u[curve.index(name)]))

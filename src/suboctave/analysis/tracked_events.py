@@ -20,17 +20,12 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
-import numpy as np
 from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
-from suboctave.bifurcation.augmented import GrazingEquations, SingularOperator
+from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
-from suboctave.bifurcation.contact import GrazingContact
-from suboctave.bifurcation.extremum import extremal_of
-from suboctave.bifurcation.gaps import levels
-from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, make_point, point_between
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -38,16 +33,15 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import choose_harmonics
-from suboctave.stability import StabilityMethod
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
-#: share of a step to which an event is located, at once and where more harmonics are to follow
-_RESOLVED, _ROUGH = 1e-11, 1e-3
 #: component of the tangent in scaled arclength that may be rounding at both ends of a step
 _LEVEL = 1e-9
 #: share of a step within which events coincide
 _SAME = 5e-3
+#: share of a step to which an event is located, at once and where more harmonics are to follow
+_RESOLVED, _ROUGH = 1e-11, 1e-3
 
 
 class CurveTest(ABC):
@@ -347,52 +341,4 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
 
 
-def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEvent:
-    """An event as users get it; `observe`: the DOF whose amplitude is reported."""
-    sample = found.sample
-    curve, orbit = sample.curve, sample.orbit
-    return TrackedEvent(
-        found.test.kind,
-        orbit,
-        method.along(sample.state),
-        orbit.residual,
-        orbit.amplitude(observe),
-        getattr(found.test, "name", curve.names[1]),
-        sample.vectors,
-        sample.kappa,
-        arclength=sample.point.arclength,
-        curve=curve.augmentation.name,
-        names=curve.names,
-        extreme=found.extreme,
-        contact=_contact(sample),
-        isola=_isola(found),
-        turning=curve.augmentation.turning,
-    )
-
-
-def _contact(sample: TrackedSample) -> GrazingContact | None:
-    """What grazes along a curve of grazings."""
-    equations = sample.evaluation.equations.own
-    if not isinstance(equations, GrazingEquations):
-        return None
-    state, of = sample.state, equations.of
-    local = state.local(of.element)
-    time = sample.instant_or_frequency / state.rate
-    value = float(sample.point.u[-1])
-    return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
-
-
-def _isola(found: Found) -> str:
-    """What happens to branches at an extremum along a curve of limit points."""
-    curve, sample = found.sample.curve, found.sample
-    if not isinstance(found.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
-        return ""
-    (beside,) = set(curve.names) - {found.test.name}
-    sizes = dict(zip(curve.names, curve.spans, strict=True))
-    extra = sample.evaluation.extra
-    extremal = extremal_of(curve.augmentation, sample.state, extra, beside, found.test.name, sizes, np.ones(len(extra)))
-    equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
-    return equations.isola
-
-
-__all__ = ["CurveTest", "Found", "as_event", "events_between", "refined", "tests_of"]
+__all__ = ["CurveTest", "Found", "events_between", "refined", "tests_of"]

@@ -1,0 +1,63 @@
+"""Events along curves of bifurcations as users get them."""
+
+from __future__ import annotations
+
+from suboctave.analysis.tracked_events import Extremum, Found
+from suboctave.analysis.tracked_sample import TrackedSample
+from suboctave.bifurcation.augmented import GrazingEquations, SingularOperator
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.extremum import LimitPointExtremal
+from suboctave.bifurcation.gaps import levels
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.stability import StabilityMethod
+
+
+def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEvent:
+    """An event as users get it; `observe`: the DOF whose amplitude is reported."""
+    sample = found.sample
+    curve, orbit = sample.curve, sample.orbit
+    return TrackedEvent(
+        found.test.kind,
+        orbit,
+        method.along(sample.state),
+        orbit.residual,
+        orbit.amplitude(observe),
+        getattr(found.test, "name", curve.names[1]),
+        sample.vectors,
+        sample.kappa,
+        arclength=sample.point.arclength,
+        curve=curve.augmentation.name,
+        names=curve.names,
+        extreme=found.extreme,
+        contact=_contact(sample),
+        isola=_isola(found),
+        turning=curve.augmentation.turning,
+    )
+
+
+def _contact(sample: TrackedSample) -> GrazingContact | None:
+    """What grazes along a curve of grazings."""
+    equations = sample.evaluation.equations.own
+    if not isinstance(equations, GrazingEquations):
+        return None
+    state, of = sample.state, equations.of
+    local = state.local(of.element)
+    time = sample.instant_or_frequency / state.rate
+    value = float(sample.point.u[-1])
+    return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
+
+
+def _isola(found: Found) -> str:
+    """What happens to branches at an extremum along a curve of limit points."""
+    curve, sample = found.sample.curve, found.sample
+    if not isinstance(found.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
+        return ""
+    (beside,) = set(curve.names) - {found.test.name}
+    base = curve.augmentation
+    assert isinstance(base, SingularOperator)
+    extremal = LimitPointExtremal(base, beside, 1.0, found.test.name)
+    equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
+    return equations.isola
+
+
+__all__ = ["as_event"]
