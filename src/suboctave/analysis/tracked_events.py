@@ -278,7 +278,12 @@ class _Stretch:
         guess = between(self.samples[low].point, self.samples[high].point, (share - low) / (high - low))
         # a fixed plane for every share, whatever the start
         ahead = share * float(row @ (weights * chord)) - float(row @ (weights * (guess - origin)))
-        solved = correct(curve, guess + ahead * row / weights, row, weights, self.newton)
+        guess = guess + ahead * row / weights
+        try:
+            solved = correct(curve, guess, row, weights, self.newton)
+        except ConvergenceError:
+            # along a corner of the equations, near a grazing, the start may be poor
+            solved = correct(curve, guess, row, weights, replace(self.newton, iterations=30, damped=True))
         return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
 
     def zero(self, resolved: float) -> TrackedSample:
