@@ -36,12 +36,12 @@ from suboctave.harmonic.selection import choose_harmonics
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
-#: share of a step to which an event is located, at once and where more harmonics are to follow
-_RESOLVED, _ROUGH = 1e-11, 1e-3
 #: component of the tangent in scaled arclength that may be rounding at both ends of a step
 _LEVEL = 1e-9
 #: share of a step within which events coincide
 _SAME = 5e-3
+#: share of a step to which an event is located, at once and where more harmonics are to follow
+_RESOLVED, _ROUGH = 1e-11, 1e-3
 
 
 class CurveTest(ABC):
@@ -278,7 +278,12 @@ class _Stretch:
         guess = between(self.samples[low].point, self.samples[high].point, (share - low) / (high - low))
         # a fixed plane for every share, whatever the start
         ahead = share * float(row @ (weights * chord)) - float(row @ (weights * (guess - origin)))
-        solved = correct(curve, guess + ahead * row / weights, row, weights, self.newton)
+        guess = guess + ahead * row / weights
+        try:
+            solved = correct(curve, guess, row, weights, self.newton)
+        except ConvergenceError:
+            # along a corner of the equations, near a grazing, the start may be poor
+            solved = correct(curve, guess, row, weights, replace(self.newton, iterations=30, damped=True))
         return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
 
     def zero(self, resolved: float) -> TrackedSample:
