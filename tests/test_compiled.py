@@ -67,8 +67,10 @@ def test_from_the_second_computation_on_less_patience_is_needed(made):
     assert not total.signatures
     compiled.computation_begins()
     total._spent = 2.0 * compiled.LESS
-    assert total(VALUES) == 30.0
-    assert len(total.signatures) == 1
+    # the kernel that it calls is compiled first, while it runs as Python
+    for compiled_already in (0, 1):
+        assert total(VALUES) == 30.0
+        assert len(total.signatures) == compiled_already
     assert isinstance(total, CPUDispatcher)
     assert not isinstance(total, compiled._Patient)
 
