@@ -24,6 +24,8 @@ from suboctave.lazy import lazy
 
 #: motions of less than this share of the reference count as rest
 _REST = 1e-8
+#: unknowns beyond which leaving harmonics out of sub-harmonic motions saves more than it costs
+_WORTH_DROPPING = 150
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -186,7 +188,8 @@ class ResponseCurve:
         assert isinstance(evaluation, ResponseEvaluation)
         basis = self.balance.basis
         if self.adaptive is not None:
-            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance, dropping=True)
+            dropping = self.balance.size * basis.size > _WORTH_DROPPING
+            basis = choose_harmonics(evaluation.state, self.adaptive, self.adaptive.tolerance, dropping)
         balance = self.balance if basis is self.balance.basis else self._in_basis(basis)
         if balance is self.balance and balance.settled:
             return self
