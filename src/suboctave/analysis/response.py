@@ -25,7 +25,7 @@ from suboctave.lazy import lazy
 #: motions of less than this share of the reference count as rest
 _REST = 1e-8
 #: unknowns beyond which leaving harmonics out of sub-harmonic motions saves more than it costs
-_WORTH_DROPPING = 150
+_WORTH_DROPPING = 90
 _TINY = float(np.finfo(float).tiny)
 
 

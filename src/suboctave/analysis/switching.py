@@ -280,9 +280,9 @@ def leave_along(
 
 def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
     """Where a branch leaves rest nothing says how large a motion is: one whose forces deviate from linear ones."""
-    if curve.size(u) > 1e-8 * curve.reference > 0.0:
-        return
     x, omega, values = curve.split(u)
+    if curve.balance.load(values, omega).any():
+        return
     balance = curve.balance.settle(x, omega, values)
     rest, phi = balance.at(x, omega, values), direction[:-1]
     change = balance.spread(phi)

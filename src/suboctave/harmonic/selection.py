@@ -235,6 +235,8 @@ class _Classes:
         if filling or self._lack(tolerance):
             wanted = self._needed(_AIM * tolerance)
             return self._with([max(pair) for pair in zip(wanted, self.ends, strict=True)], dropping)
+        if not dropping and np.linalg.norm(self.beyond[:, int(0.9 * self.basis.harmonics)]) > _AIM * tolerance:
+            return self.basis
         fewer = self._with(self._needed(_AIM * tolerance), dropping)
         return fewer if fewer.count < 0.9 * self.basis.count else self.basis
 
