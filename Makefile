@@ -19,16 +19,19 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export MPLBACKEND := Agg
 
+# Two processes, each file of tests in one of them: what a module computes once for its tests stays together.
+TOGETHER := -n 2 --dist loadfile
+
 .PHONY: demo test test-all lint format clean
 
 demo: $(STAMP)
 	@$(BIN)/suboctave demo --out $(DEMO)
 
 test: lint
-	@$(BIN)/python -m pytest -m "not slow"
+	@$(BIN)/python -m pytest $(TOGETHER) -m "not slow"
 
 test-all: lint
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest $(TOGETHER)
 
 lint: $(STAMP)
 	@$(BIN)/ruff check .
