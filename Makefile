@@ -1,4 +1,4 @@
-# make demo      response curves of the reference oscillator: a table and pictures, in ./demo
+# make demo      responses, branches, a border and an isola of the reference oscillator: tables, pictures in ./demo
 # make test      lint, then the tests (a few minutes at most)
 # make test-all  lint, then all tests, the long ones too
 # make lint      ruff and mypy

@@ -191,6 +191,12 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
     figures = list(demo.draw(curves, out))
     for path in figures:
         screen.print(f"figure: {path}", markup=False, soft_wrap=True)
+    if not curves[-1].interrupted:
+        with bar("what hides beside them") as report:
+            hidden = demo.sequel(out, report)
+        for text, path in hidden:
+            screen.print(f"\n{text}\nfigure: {path}", markup=False, soft_wrap=True)
+            figures.append(path)
     if json_wanted:
         found = [
             {

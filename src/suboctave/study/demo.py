@@ -13,12 +13,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from suboctave.pictures import plot_panels, plot_response
+from suboctave.pictures import plot_boundaries, plot_panels, plot_response
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["CASES", "OMEGA", "REGULARIZATION", "Case", "Curve", "compute", "draw", "event_lines"]
+__all__ = ["CASES", "OMEGA", "REGULARIZATION", "Case", "Curve", "compute", "draw", "event_lines", "sequel"]
 
 OMEGA = (4.5, 1.25)
 REGULARIZATION = 3000.0
@@ -82,6 +82,43 @@ def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:
         files.append(folder / "strong_forcing.png")
         plot_response([curve.dataset for curve in strong], files[-1], title=title)
     return files
+
+
+def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Path]]:
+    """What hides beside the response curves: sentences, each with its figure in `folder`.
+
+    The branches that leave the strongly forced response at its period doublings; the border of the first ones over the
+    frequency and the gap, with the curve of limit points that begins on it; and, off that border, a resonance of twice
+    the period that no sweep meets.
+    """
+    from suboctave.analysis import bifurcation_diagram, continue_branch, frequency_response, track
+    from suboctave.model import library
+
+    told: list[tuple[str, Path]] = []
+    strong = library.reference_oscillator(p=1.7, j=0.0, regularization=REGULARIZATION)
+    diagram = bifurcation_diagram(strong, omega=OMEGA, depth=2, progress=progress)
+    count = len(diagram) - 1
+    told.append((f"p = 1.7, j = 0: {count} branches leave the response", folder / "cascade.png"))
+    diagram.plot(told[-1][1])
+
+    weak = library.reference_oscillator(p=0.55, j=0.0, regularization=REGULARIZATION)
+    doubling = frequency_response(weak, omega=OMEGA).bifurcations["PD"][0]
+    border = track(doubling, parameter="j", bounds=(0.0, 1.0), progress=progress)
+    limits = track(border.bifurcations["GPD"][-1], parameter="j", bounds=(0.0, 1.0), progress=progress)
+    highest = max(e.parameter("j") for e in border.extrema)
+    text = f"p = 0.55: the response doubles its period for gaps up to j = {highest:.5f}"
+    told.append((text, folder / "boundary.png"))
+    plot_boundaries([border.to_xarray(), limits.to_xarray()], told[-1][1])
+
+    fold = min(limits.orbits, key=lambda orbit: abs(orbit.values["j"] - 0.5))
+    isola = continue_branch(fold, "omega", OMEGA, progress=progress)
+    gap = fold.values["j"]
+    response = frequency_response(weak.with_parameters({"j": gap}), omega=OMEGA, progress=progress)
+    born = max(e.parameter("j") for e in limits.extrema)
+    text = f"up to j = {born:.5f} an isolated resonance of twice the period hides beside it: at j = {gap:.3f}"
+    told.append((text, folder / "isola.png"))
+    plot_response([response.to_xarray(), isola.to_xarray()], told[-1][1], title=f"p = 0.55, j = {gap:.3f}")
+    return told
 
 
 def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]:
