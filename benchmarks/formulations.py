@@ -60,8 +60,8 @@ def singular_values(found: PublishedDoubling) -> tuple[float, float]:
     matrix[: 3 * n] /= scale
     phase = np.zeros((1, 3 * n + 1))
     phase[0, n : 2 * n] = found.q
-    both = (matrix, np.vstack((matrix, phase)))
-    return tuple(float(np.linalg.svd(m, compute_uv=False)[-1]) for m in both)  # type: ignore[return-value]
+    printed, completed = (np.linalg.svd(m, compute_uv=False)[-1] for m in (matrix, np.vstack((matrix, phase))))
+    return float(printed), float(completed)
 
 
 def plain(guess: Guess, found: PublishedDoubling, tolerance: float = 1e-8) -> str:

@@ -18,6 +18,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -61,9 +62,9 @@ def counted(work: Callable[[], object]) -> Counter[str]:
     counts: Counter[str] = Counter()
     whole, rows = TrackedEvaluation.__init__, TrackedEvaluation.__dict__["jacobian"].compute
 
-    def begin(self: TrackedEvaluation, *args: object) -> None:
+    def begin(self: TrackedEvaluation, *args: Any) -> None:
         counts["evaluations"] += 1
-        whole(self, *args)  # type: ignore[arg-type]
+        whole(self, *args)
 
     def differentiate(self: TrackedEvaluation) -> np.ndarray:
         counts["jacobians"] += 1

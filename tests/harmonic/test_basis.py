@@ -129,3 +129,27 @@ def test_real_and_complex_notation_against_the_discrete_fourier_transform():
 def test_rules_for_adaptive_harmonics_that_make_no_sense_are_refused(wrong):
     with pytest.raises(InputError, match="need"):
         AdaptiveHarmonics(**wrong)
+
+
+@pytest.mark.parametrize("harmonics", [1, 2, 5, 6])
+def test_the_even_part_is_the_mean_of_a_motion_and_its_shift_by_half_a_period(harmonics):
+    """`(x(t) + x(t + T / 2)) / 2`, in the basis of half the period."""
+    basis = HarmonicBasis(harmonics, 2)
+    x = np.random.default_rng(harmonics).standard_normal((basis.size, 3))
+    half = basis.halved
+    t = np.linspace(0.0, 2.0 * np.pi, 17)
+
+    def motion(of, coefficients):
+        k = np.arange(1, of.harmonics + 1) / of.nu
+        waves = np.empty((len(t), of.size))
+        waves[:, 0], waves[:, 1::2], waves[:, 2::2] = 1.0, np.cos(np.outer(t, k)), np.sin(np.outer(t, k))
+        return waves @ coefficients
+
+    shifted = x.copy()
+    sign = (-1.0) ** np.arange(1, harmonics + 1)[:, None]
+    shifted[1::2] *= sign
+    shifted[2::2] *= sign
+    np.testing.assert_allclose(motion(half, basis.even_part(x)), motion(basis, (x + shifted) / 2), atol=1e-12)
+    assert half.doubled.nu == 2
+    with pytest.raises(InputError, match="no half"):
+        _ = HarmonicBasis(3).halved

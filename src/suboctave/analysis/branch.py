@@ -96,6 +96,11 @@ class Branch(BranchReadings):
         return len(self.points)
 
     @property
+    def interrupted(self) -> bool:
+        """Whether its user stopped it; what had been computed is there."""
+        return self.ended.startswith("interrupted")
+
+    @property
     def nu(self) -> int:
         """Period of its motions in periods of the load: 1 for T, 2 for 2T, ..."""
         return self.points[0].orbit.basis.nu if self.points else 1

@@ -192,7 +192,7 @@ def _switched(node: DiagramBranch, item: Bifurcation, options: dict[str, Any], k
 
 
 def _interrupted(branch: Branch) -> bool:
-    return branch.ended.startswith("interrupted")
+    return branch.interrupted
 
 
 def _shared(node: DiagramBranch) -> list[Junction]:

@@ -16,11 +16,11 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.analysis.checks import make_settings
+from suboctave.analysis.making import own_linear_part
 from suboctave.analysis.track_start import (
     curve_through,
     discretisation,
     is_extremum,
-    linear_part,
     spans_of,
     with_extremum,
 )
@@ -89,11 +89,11 @@ def locate_extremum(
         _, basis = discretisation(orbit.basis, max(1, orbit.basis.harmonics // orbit.basis.nu))
         if basis.harmonics < orbit.basis.harmonics:
             basis = orbit.basis.filled
-        balance = HarmonicBalance(orbit.system, basis, linear=linear_part(extremum))
+        balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit))
         curve, u = curve_through(extremum, balance, None, names, spans_of(extremum, names, None))
         options = replace(settings.newton, iterations=max(_ITERATIONS, settings.newton.iterations))
         u = newton_extremum(curve, u, extremum.parameter_name, options, chosen)
-        found = _found(curve, u, Found(Extremum(extremum.parameter_name), None, extremum.extreme), options)  # type: ignore[arg-type]
+        found = Found(Extremum(extremum.parameter_name), _sample(curve, u, options), extremum.extreme)
         event = as_event(found, settings.stability, settings.observe)
     return replace(event, arclength=extremum.arclength, context=extremum.context)
 
@@ -187,9 +187,8 @@ class _Published:
         return self.curve.evaluate(u).error
 
 
-def _found(curve: TrackedCurve, u: Array, found: Found, newton: NewtonOptions) -> Found:
-    point = nearest_point(curve, u, curve.weights(u, 0.0), newton)
-    return replace(found, sample=TrackedSample(point))
+def _sample(curve: TrackedCurve, u: Array, newton: NewtonOptions) -> TrackedSample:
+    return TrackedSample(nearest_point(curve, u, curve.weights(u, 0.0), newton))
 
 
 def polished(found: Found, newton: NewtonOptions) -> Found:
@@ -203,7 +202,7 @@ def polished(found: Found, newton: NewtonOptions) -> Found:
         u = newton_extremum(curve, point.u, found.test.name, newton)
         if length(curve.weights(u, 0.0) * (u - point.u)) > _BESIDE:
             return found
-        better = _found(curve, u, found, newton)
+        better = replace(found, sample=_sample(curve, u, newton))
     except ConvergenceError:
         return found
     return replace(better, sample=TrackedSample(replace(better.sample.point, arclength=point.arclength)))

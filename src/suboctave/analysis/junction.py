@@ -22,7 +22,7 @@ from suboctave.continuation.march import Arrival, CurvePoint, between, make_poin
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import ComplexArray, HarmonicBasis
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 from suboctave.stability import FloquetResult, floquet_multipliers
 
@@ -108,12 +108,12 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     basis = curve.balance.basis
     if basis.nu % 2 or not _turned(a, b, curve):
         return None
-    parent = _parent(curve)
+    parent = curve.with_basis(basis.halved)
     odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
     share = length(odd_a) / (length(odd_a) + length(odd_b))
     u = between(a, b, share)
     x, omega, values = curve.split(u)
-    half = x[_even_rows(parent.balance.basis)]
+    half = basis.even_part(x)
     try:
         balance = parent.balance.settle(half, omega, values)
         found = locate_singular(Guess(balance, half, omega, values, curve.name, curve.span), Kind.HALF)
@@ -139,20 +139,6 @@ def _odd(u: Array, curve: ResponseCurve, weights: Array) -> Array:
     """The weighted coefficients of odd order."""
     shaped = curve.balance.spread((weights * u)[:-1])
     return np.concatenate((shaped[1::4].ravel(), shaped[2::4].ravel()))
-
-
-def _parent(curve: ResponseCurve) -> ResponseCurve:
-    """The curve of motions of half the period with the same frequencies."""
-    basis = curve.balance.basis
-    return curve.with_basis(HarmonicBasis(max(1, basis.harmonics // 2), basis.nu // 2))
-
-
-def _even_rows(parent: HarmonicBasis) -> Array:
-    """Rows of a basis of twice the period that hold the parent's harmonics, in their order."""
-    k = np.arange(1, parent.harmonics + 1)
-    rows = np.zeros(parent.size, dtype=int)
-    rows[1::2], rows[2::2] = 4 * k - 1, 4 * k
-    return rows
 
 
 def _last_before(
@@ -182,7 +168,7 @@ def emanating(found: Singular, curve: ResponseCurve, weights: Array) -> Array:
     assert found.vectors is not None
     state, size = found.state, curve.balance.size
     scale = np.tile(state.balance.scales()[1], len(found.vectors.right) // size)
-    phi = doubled_direction(found.vectors.right * scale, state.basis, size, curve.balance.basis)
+    phi = doubled_direction(found.vectors.right * scale, size, curve.balance.basis)
     direction = curve.join(phi, 0.0)
     return direction / length(weights * direction)
 

@@ -17,13 +17,14 @@ from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.stability.arbitration import METHODS
 
-__all__ = ["Harmonics", "make_branch", "make_curve", "options_of"]
+__all__ = ["Harmonics", "make_branch", "make_curve", "options_of", "own_linear_part"]
 
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
@@ -57,6 +58,12 @@ def make_curve(
         )
     balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
     return ResponseCurve(balance, name, omega, span, adaptive)
+
+
+def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
+    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
+    linear = orbit.balance.linear
+    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
 
 
 def options_of(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[float, float]]) -> dict[str, Any]:

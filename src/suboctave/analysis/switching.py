@@ -7,7 +7,7 @@ of the algebraic branching equation (`bifurcation.branching`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_bounds, make_settings
 from suboctave.analysis.follow import follow, same_event
 from suboctave.analysis.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
-from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
+from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.trace import Settings, Trace
@@ -31,14 +31,11 @@ from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOpt
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.stability import StabilityMethod
 from suboctave.stability.arbitration import METHODS
 
-__all__ = ["Inherited", "check_left", "leave_along", "own_linear_part", "switch_branch"]
+__all__ = ["Inherited", "check_left", "leave_along", "switch_branch"]
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
@@ -179,21 +176,19 @@ class Inherited:
 
     @property
     def stability(self) -> str | None:
-        """The name of the stability method; one with options of its own has to be given again."""
-        known = self.options.get("stability")
-        return known if known in METHODS else None
+        """The name of the stability method."""
+        return self._by_name("stability", METHODS)
 
     @property
     def formulation(self) -> str | None:
-        """The name of the formulation; one with options of its own has to be given again."""
-        known = self.options.get("formulation")
-        return known if known in FORMULATIONS else None
+        """The name of the formulation."""
+        return self._by_name("formulation", FORMULATIONS)
 
-
-def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
-    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
-    linear = orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
+    def _by_name(self, option: str, names: Container[str]) -> str | None:
+        known = self.options.get(option)
+        if known is None or known in names:
+            return known
+        raise InputError(f"this {self.item.kind} was found with {option}={known}, which has options: give it again")
 
 
 # ------------------------------------------------------------------------------------------------------- departures
@@ -202,8 +197,8 @@ def _doubled(
 ) -> Trace:
     """The branch of twice the period."""
     parent = item.orbit
-    basis = HarmonicBasis(2 * parent.basis.harmonics, 2 * parent.basis.nu)
-    curve = curve.with_basis(basis if curve.adaptive is not None else curve.balance.basis)
+    if curve.adaptive is not None:
+        curve = curve.with_basis(parent.basis.doubled)
     vectors = item.null_vectors or null_vectors(parent.state(), Kind.HALF)
     u = curve.join(parent.basis.resized(parent.coefficients, curve.balance.basis), item.parameter(item.parameter_name))
     found = Singular(parent.state(), vectors, 0.0, item.residual, 0)

@@ -8,10 +8,11 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
+from suboctave.analysis.making import own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
-from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, linear_part, solved_start
+from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, solved_start
 from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
@@ -121,7 +122,7 @@ def track(
     computation_begins()
     with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[-1]}") as report:
         settings = replace(settings, report=report)
-        balance = HarmonicBalance(system, basis, linear=linear_part(bifurcation))
+        balance = HarmonicBalance(system, basis, linear=own_linear_part(orbit))
         start = solved_start(bifurcation, balance, adaptive, names, box, settings)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     options = {

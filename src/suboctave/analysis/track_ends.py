@@ -22,7 +22,6 @@ from suboctave.bifurcation.augmented import BranchPointUnfolded, SingularOperato
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 
@@ -85,11 +84,12 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
 
 def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""
-    name, operator, words = ("R2", Kind.HALF, "1:2") if double else ("R1", Kind.INTEGER, "1:1")
+    order, operator = (2, Kind.HALF) if double else (1, Kind.INTEGER)
+    words = f"1:{order}"
     if a.curve.augmentation.turning:
         return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)}")
     try:
-        found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(name), newton, _AROUND)
+        found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(order), newton, _AROUND)
     except ConvergenceError as failure:
         return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failure})")
     return End(f"the curve ends in a {words} resonance at {found.sample.curve.where(found.sample.point.u)}", found)
@@ -100,11 +100,9 @@ def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
     basis = a.curve.balance.basis
     if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
         return None
-    parent = HarmonicBasis(max(1, basis.harmonics // 2), basis.nu // 2)
-    x = np.zeros((parent.size, a.curve.balance.size))
-    x[0], x[1::2], x[2::2] = a.state.x[0], a.state.x[3::4][: parent.harmonics], a.state.x[4::4][: parent.harmonics]
+    x = basis.even_part(a.state.x)
     try:
-        balance = a.curve.balance.with_basis(parent).settle(x, a.state.omega, a.state.values)
+        balance = a.curve.balance.with_basis(basis.halved).settle(x, a.state.omega, a.state.values)
         curve = replace(a.curve, balance=balance, cache={balance.basis: balance})
         return _zero_beside(a, curve, x, Kind.HALF, GeneralisedDoubling(), newton, _BESIDE)
     except ConvergenceError:

@@ -30,7 +30,6 @@ from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.harmonic.state import BalanceState
@@ -68,12 +67,6 @@ def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics
     raise InputError(
         f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {wanted!r}'
     )
-
-
-def linear_part(item: Bifurcation) -> LinearPart | None:
-    """The linear part a bifurcation was solved with, at its parameters; None for its system's own matrices."""
-    linear = item.orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(item.orbit.values)
 
 
 def _augmentation(
@@ -208,7 +201,6 @@ __all__ = [
     "discretisation",
     "is_extremum",
     "kind_of",
-    "linear_part",
     "solved_start",
     "spans_of",
     "with_extremum",

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.analysis.making import own_linear_part
 from suboctave.analysis.refine import solved_bifurcation
 from suboctave.analysis.response import ResponseCurve
-from suboctave.analysis.switching import own_linear_part, switch_branch
+from suboctave.analysis.switching import switch_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.kinds import PERIOD_DOUBLING
 from suboctave.bifurcation.solve import Guess, Singular

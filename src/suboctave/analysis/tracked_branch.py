@@ -129,7 +129,7 @@ class TrackedBranch(Branch):
     @property
     def tracked(self) -> tuple[TrackedPoint, ...]:
         """The points, with what only tracked curves have."""
-        return self.points  # type: ignore[return-value]
+        return tuple(point for point in self.points if isinstance(point, TrackedPoint))
 
     def _others_inside(self, point: Any) -> bool:
         mu = point.floquet.multipliers

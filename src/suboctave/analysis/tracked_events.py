@@ -47,7 +47,10 @@ _RESOLVED, _ROUGH = 1e-11, 1e-3
 class CurveTest(ABC):
     """One kind of event: a function of the curve's points that changes sign."""
 
-    kind: str
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """What the events are called."""
 
     @abstractmethod
     def value(self, sample: TrackedSample) -> float:
@@ -106,7 +109,12 @@ class GeneralisedDoubling(CurveTest):
 class DoubleMultiplier(CurveTest):
     """R1 on LP curves, R2 on PD curves: a curve of Neimark-Sacker points begins."""
 
-    kind: str
+    order: int
+
+    @property
+    def kind(self) -> str:
+        """R1 or R2."""
+        return f"R{self.order}"
 
     def value(self, sample: TrackedSample) -> float:
         """See `CurveTest.value`."""
@@ -120,7 +128,7 @@ class Resonance(CurveTest):
     order: int
 
     @property
-    def kind(self) -> str:  # type: ignore[override]
+    def kind(self) -> str:
         """R3 or R4."""
         return f"R{self.order}"
 
@@ -156,8 +164,8 @@ def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
     if not isinstance(augmentation, SingularOperator):
         return turns
     own: dict[Kind, tuple[CurveTest, ...]] = {
-        Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), FoldFlip()),
-        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier("R2"), FoldFlip()),
+        Kind.INTEGER: (Cusp(), DoubleMultiplier(1), FoldFlip()),
+        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier(2), FoldFlip()),
         Kind.FREE: (Resonance(3), Resonance(4)),
     }
     return turns + own[augmentation.kind]

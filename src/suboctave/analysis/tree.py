@@ -65,7 +65,7 @@ class DiagramBranch:
 
     @property
     def label(self) -> str:
-        """Its period and where it begins and ends: "2T, PD 3.993452 to PD 2.303153"."""
+        """Its period and where it begins and ends: "2T, PD 4.1 to PD 2.5"."""
         branch = self.branch
         text = period_name(branch.nu)
         name = branch.name

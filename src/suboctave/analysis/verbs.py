@@ -11,11 +11,11 @@ import numpy as np
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, check_system, is_number, make_settings
 from suboctave.analysis.follow import follow
-from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
+from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
-from suboctave.analysis.switching import leave_along, own_linear_part
+from suboctave.analysis.switching import leave_along
 from suboctave.analysis.ways import both_ways
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.formulation import Formulation

@@ -71,12 +71,18 @@ def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[s
 class Augmentation(ABC):
     """Which scalar equations; fixed within a step."""
 
-    #: kind of bifurcation
-    name: str
-    #: number of extra unknowns
-    extras: int = 0
     #: the parameter that has an extremum along curves of these bifurcations (`extremum`), empty where none need have
     turning: str = ""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Kind of bifurcation."""
+
+    @property
+    def extras(self) -> int:
+        """Number of extra unknowns."""
+        return 0
 
     @property
     def own(self) -> Augmentation:
@@ -121,12 +127,12 @@ class SingularOperator(Augmentation):
         return cls(kind, null_vectors(state, kind, kappa), state.omega**2)
 
     @property
-    def name(self) -> str:  # type: ignore[override]
+    def name(self) -> str:
         """Kind of bifurcation."""
         return {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}[self.kind]
 
     @property
-    def extras(self) -> int:  # type: ignore[override]
+    def extras(self) -> int:
         """kappa, where it is free."""
         return 1 if self.kind is Kind.FREE else 0
 

@@ -48,7 +48,7 @@ class ExtendedOperator(SingularOperator):
         return own, own.packed(vectors.right, kappa)
 
     @property
-    def extras(self) -> int:  # type: ignore[override]
+    def extras(self) -> int:
         """kappa, where it is free, and phi in real numbers."""
         return 2 * self.rows + 1 if self.kind is Kind.FREE else self.rows
 

@@ -28,7 +28,7 @@ from suboctave.harmonic.second import Direction, second_derivative
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
 
-__all__ = ["BranchingEquation", "branching_equation", "doubled_basis", "doubled_direction"]
+__all__ = ["BranchingEquation", "branching_equation", "doubled_direction"]
 
 #: discriminant of the branching equation, relative to its coefficients, below which two branches are not told apart
 _DISTINCT = 1e-10
@@ -106,12 +106,7 @@ def branching_equation(
     return BranchingEquation(a, b, c, (found[0], found[1]), weights)
 
 
-def doubled_basis(basis: HarmonicBasis) -> HarmonicBasis:
-    """The basis of twice the period with the same highest frequency."""
-    return HarmonicBasis(2 * basis.harmonics, 2 * basis.nu)
-
-
-def doubled_direction(vector: Array, basis: HarmonicBasis, size: int, doubled: HarmonicBasis) -> Array:
+def doubled_direction(vector: Array, size: int, doubled: HarmonicBasis) -> Array:
     """A half-odd vector (2 H + 2 times size,) as coefficients (2 H' + 1, size) of a basis of twice the period.
 
     Harmonics beyond that basis are dropped.

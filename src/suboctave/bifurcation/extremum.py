@@ -56,12 +56,12 @@ class Extremal(Augmentation):
     beside: str
 
     @property
-    def name(self) -> str:  # type: ignore[override]
+    def name(self) -> str:
         """Kind of the bifurcations."""
         return self.base.name
 
     @property
-    def extras(self) -> int:  # type: ignore[override]
+    def extras(self) -> int:
         """Extra unknowns of the bifurcations."""
         return self.base.extras
 

@@ -139,6 +139,28 @@ class HarmonicBasis:
             result[2 * out] = 0.0
         return result
 
+    @property
+    def doubled(self) -> HarmonicBasis:
+        """The basis of twice the period with the same highest frequency."""
+        return HarmonicBasis(2 * self.harmonics, 2 * self.nu)
+
+    @property
+    def halved(self) -> HarmonicBasis:
+        """The basis of half the period, nu being even, with the same highest frequency."""
+        if self.nu % 2:
+            raise InputError(f"{self.nu} load periods have no half")
+        return HarmonicBasis(max(1, self.harmonics // 2), self.nu // 2)
+
+    def even_part(self, coefficients: Array) -> Array:
+        """The even harmonics of coefficients (2 H + 1, ...) in the basis `halved`: a motion of half the period."""
+        half = self.halved
+        result = np.zeros((half.size,) + coefficients.shape[1:])
+        result[0] = coefficients[0]
+        # cosines and sines of the harmonics 2, 4, ...; of one harmonic nothing is even
+        result[1::2] = coefficients[3::4][: half.harmonics] if self.harmonics > 1 else 0.0
+        result[2::2] = coefficients[4::4][: half.harmonics] if self.harmonics > 1 else 0.0
+        return result
+
     def __repr__(self) -> str:
         kept = "" if self.kept is None else f", {len(self.kept) - 1} kept"
         return f"HarmonicBasis(harmonics={self.harmonics}, nu={self.nu}{kept})"

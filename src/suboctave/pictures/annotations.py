@@ -13,6 +13,7 @@ from suboctave.pictures import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Bbox
 
 __all__ = ["annotate"]
 
@@ -86,8 +87,8 @@ def _beside(
     return x, y, x + width, y + height
 
 
-def _corners(box: object) -> tuple[float, float, float, float]:
-    return box.x0, box.y0, box.x1, box.y1  # type: ignore[attr-defined]
+def _corners(box: Bbox) -> tuple[float, float, float, float]:
+    return box.x0, box.y0, box.x1, box.y1
 
 
 def _ink(axes: Axes) -> np.ndarray:

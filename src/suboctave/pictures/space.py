@@ -362,7 +362,7 @@ def _columns(figure: Figure, entries: dict[str, Line2D], drawing: dict[str, Any]
 
 def _extent(figure: Figure, axes: Any) -> tuple[np.ndarray, np.ndarray]:
     """The lower left and the upper right corner of the frame with its labels, pixels."""
-    from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d import proj3d
 
     limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
     cube = np.array(list(product(*limits))).T

@@ -18,6 +18,8 @@ from suboctave.pictures import plot_boundaries, plot_panels, plot_response
 if TYPE_CHECKING:
     import xarray
 
+    from suboctave.analysis import BifurcationDiagram, Branch
+
 __all__ = ["CASES", "OMEGA", "REGULARIZATION", "Case", "Curve", "compute", "draw", "event_lines", "sequel"]
 
 OMEGA = (4.5, 1.25)
@@ -100,11 +102,14 @@ def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Pa
     count = len(diagram) - 1
     told.append((f"p = 1.7, j = 0: {count} branches leave the response", folder / "cascade.png"))
     diagram.plot(told[-1][1])
+    _go_on(diagram)
 
     weak = library.reference_oscillator(p=0.55, j=0.0, regularization=REGULARIZATION)
     doubling = frequency_response(weak, omega=OMEGA).bifurcations["PD"][0]
     border = track(doubling, parameter="j", bounds=(0.0, 1.0), progress=progress)
+    _go_on(border)
     limits = track(border.bifurcations["GPD"][-1], parameter="j", bounds=(0.0, 1.0), progress=progress)
+    _go_on(limits)
     highest = max(e.parameter("j") for e in border.extrema)
     text = f"p = 0.55: the response doubles its period for gaps up to j = {highest:.5f}"
     told.append((text, folder / "boundary.png"))
@@ -119,6 +124,12 @@ def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Pa
     told.append((text, folder / "isola.png"))
     plot_response([response.to_xarray(), isola.to_xarray()], told[-1][1], title=f"p = 0.55, j = {gap:.3f}")
     return told
+
+
+def _go_on(result: Branch | BifurcationDiagram) -> None:
+    """Ctrl-C, which the verbs end politely at, ends the demonstration too."""
+    if result.interrupted:
+        raise KeyboardInterrupt
 
 
 def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]:

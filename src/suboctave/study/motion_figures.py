@@ -137,7 +137,7 @@ class MotionFigure(BaseModel):
 def _interrupted(result: Result) -> bool:
     if isinstance(result, BifurcationDiagram):
         return result.interrupted
-    return isinstance(result, Branch) and result.ended.startswith("interrupted")
+    return isinstance(result, Branch) and result.interrupted
 
 
 class PhaseFigure(MotionFigure):

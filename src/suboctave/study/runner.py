@@ -227,7 +227,7 @@ def _one(
         except ArithmeticError as error:  # a size of 1e200 whose square is no number
             failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
     seconds = perf_counter() - begin
-    if isinstance(outcome, Branch) and outcome.ended.startswith("interrupted"):
+    if isinstance(outcome, Branch) and outcome.interrupted:
         interrupted = True
     if isinstance(outcome, BifurcationDiagram) and outcome.interrupted:
         interrupted = True
