@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -24,7 +25,15 @@ from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.stability.arbitration import METHODS
 
-__all__ = ["Harmonics", "make_branch", "make_curve", "options_of", "own_linear_part"]
+__all__ = [
+    "Harmonics",
+    "check_unknowns",
+    "make_branch",
+    "make_curve",
+    "options_of",
+    "own_linear_part",
+    "rule_of",
+]
 
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
@@ -35,29 +44,40 @@ Harmonics = int | str | AdaptiveHarmonics
 def make_curve(
     system: System, name: str, omega: float, span: float, harmonics: Harmonics, nu: int, linear: LinearPart | None
 ) -> ResponseCurve:
+    """The curve of a system's motions of `nu` load periods along a free parameter; InputError where it cannot be."""
     loaded = max([1] + [c.harmonic for c in system.load_components()])
-    rule = AdaptiveHarmonics() if isinstance(harmonics, str) and harmonics == "adaptive" else harmonics
-    adaptive: AdaptiveHarmonics | None = None
-    if isinstance(rule, AdaptiveHarmonics):
-        adaptive, high = rule, max(rule.minimum, loaded)
-    elif isinstance(rule, (int, np.integer)) and not isinstance(rule, bool) and rule >= 1:
-        high = int(rule)
-    else:
-        raise InputError(
-            f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
-        )
+    rule = rule_of(harmonics)
+    adaptive = rule if isinstance(rule, AdaptiveHarmonics) else None
+    high = rule if isinstance(rule, int) else max(rule.minimum, loaded)
     if linear is not None and not isinstance(linear, LinearPart):
         raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
     size = system.n if linear is None else linear.size
-    unknowns = size * (2 * high * nu + 1)
+    basis = HarmonicBasis(high * nu, nu)
+    check_unknowns(size, basis)
+    return ResponseCurve(HarmonicBalance(system, basis, linear=linear), name, omega, span, adaptive)
+
+
+def rule_of(harmonics: Any) -> AdaptiveHarmonics | int:
+    """How harmonics are chosen, or how many of omega are kept: the argument `harmonics` of the verbs, checked."""
+    rule = AdaptiveHarmonics() if isinstance(harmonics, str) and harmonics == "adaptive" else harmonics
+    if isinstance(rule, AdaptiveHarmonics):
+        return rule
+    if isinstance(rule, (int, np.integer)) and not isinstance(rule, bool) and rule >= 1:
+        return int(rule)
+    raise InputError(
+        f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
+    )
+
+
+def check_unknowns(size: int, basis: HarmonicBasis) -> None:
+    """Refuse bases whose dense matrices would not fit; `size`: unknown DOFs."""
+    unknowns = size * basis.size
     if unknowns > _DENSE_UNKNOWNS:
         raise InputError(
-            f"{size} DOFs with {high} harmonics are {unknowns} unknowns with dense matrices, more than "
-            f"{_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and loads touch "
-            "(linear=)"
+            f"{size} DOFs with {basis.harmonics // basis.nu} harmonics are {unknowns} unknowns with dense matrices, "
+            f"more than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and "
+            "loads touch (linear=)"
         )
-    balance = HarmonicBalance(system, HarmonicBasis(high * nu, nu), linear=linear)
-    return ResponseCurve(balance, name, omega, span, adaptive)
 
 
 def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
@@ -66,9 +86,10 @@ def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
     return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
 
 
-def options_of(settings: Settings, harmonics: Harmonics, bounds: dict[str, tuple[float, float]]) -> dict[str, Any]:
+def options_of(settings: Settings, harmonics: Harmonics, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    """What a branch says of how it was computed."""
     return {
-        "bounds": bounds,
+        "bounds": dict(bounds),
         "harmonics": asdict(harmonics) if isinstance(harmonics, AdaptiveHarmonics) else harmonics,
         "newton": asdict(settings.newton),
         "stepping": asdict(settings.stepping),

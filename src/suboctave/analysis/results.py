@@ -18,6 +18,7 @@ from suboctave.analysis.tree import BifurcationDiagram
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.store import files
+from suboctave.store.arrays import array_of, flat
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -162,13 +163,11 @@ def to_datasets(item: Result, details: Mapping[str, Any] | None = None) -> dict[
         head, *branches = diagram_to_datasets(item).items()
         told = {"": head[1].assign_attrs({**said, "contents": _DIAGRAM})}
         return told | {name: dataset.assign_attrs({"contents": _BRANCH}) for name, dataset in branches}
-    dataset = item.to_xarray()
-    for name, variable in list(dataset.variables.items()):
-        if variable.dtype.kind == "c":
-            pair = {f"{name}_real": ("row", variable.values.real), f"{name}_imag": ("row", variable.values.imag)}
-            dataset = dataset.drop_vars([name]).assign(pair)
-        elif variable.dtype.kind == "O":
-            dataset = dataset.assign({name: ("row", variable.values.astype(str))})
+    import xarray
+
+    table = item.to_xarray()
+    held = flat({name: (variable.dims, variable.values) for name, variable in table.variables.items()})
+    dataset = xarray.Dataset(dict(held), attrs=table.attrs)
     order = "\n".join(item.columns)
     return {"": dataset.assign_attrs({**said, "contents": _TABLE, "columns": order})}
 
@@ -185,12 +184,7 @@ def from_datasets(
         return diagram_from_datasets(groups, allow_code, linear), details
     if details.get("contents") != _TABLE:
         raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
-    columns: dict[str, np.ndarray] = {}
-    for name in str(details.get("columns", "")).splitlines():
-        if name in dataset:
-            columns[name] = np.asarray(dataset[name].values)
-        else:
-            columns[name] = dataset[f"{name}_real"].values + 1j * dataset[f"{name}_imag"].values
+    columns = {name: array_of(dataset, name) for name in str(details.get("columns", "")).splitlines()}
     return Table(columns, str(details.get("title", ""))), details
 
 

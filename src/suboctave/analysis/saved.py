@@ -8,7 +8,7 @@ per point nor per event is JSON in the variable `record`. docs/results.md descri
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -33,6 +33,7 @@ from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.description import build, describe
 from suboctave.model.system import System
 from suboctave.stability import FloquetResult
+from suboctave.store.arrays import array_of, flat, padded
 from suboctave.store.layout import branch_dataset
 from suboctave.store.plain import from_json, to_json
 
@@ -75,7 +76,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
     new |= _orbits("event_", "event", [e.orbit for e in events], [e.floquet for e in events])
     for side in ("right", "left"):
         rows = [() if e.null_vectors is None else getattr(e.null_vectors, side) for e in events]
-        new[f"event_null_{side}"] = (("event", "null"), _padded(rows, complex))
+        new[f"event_null_{side}"] = (("event", "null"), padded(rows, complex))
     record = {
         "points": [writer.point(p) for p in branch.points],
         "event_list": [(_PLACES[where], index) for where, index, _ in located],
@@ -105,7 +106,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
     attributes = {name: value for name, value in dataset.attrs.items() if name != "warnings"}  # they are in `record`
     if branch.seconds == branch.seconds:
         attributes["seconds"] = float(branch.seconds)
-    return xarray.Dataset(dict(_flat(variables)), attrs=attributes).set_coords(coords)
+    return xarray.Dataset(dict(flat(variables)), attrs=attributes).set_coords(coords)
 
 
 def branch_from_dataset(dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None) -> Branch:
@@ -142,30 +143,9 @@ def _orbits(
     shape = (dimension, f"{prefix}coefficient", "unknown" if orbits else f"{prefix}unknown")
     found: dict[str, tuple[tuple[str, ...], Any]] = {f"{prefix}coefficients": (shape, table)}
     numbers = (dimension, "event_floquet" if prefix else "multiplier")
-    found[f"{prefix}multipliers"] = (numbers, _padded([v.multipliers for v in verdicts], complex))
-    found[f"{prefix}multiplier_errors"] = (numbers, _padded([v.errors for v in verdicts], float))
+    found[f"{prefix}multipliers"] = (numbers, padded([v.multipliers for v in verdicts], complex))
+    found[f"{prefix}multiplier_errors"] = (numbers, padded([v.errors for v in verdicts], float))
     return found
-
-
-def _padded(rows: Sequence[Any], kind: type) -> np.ndarray:
-    table: np.ndarray = np.full((len(rows), max((len(row) for row in rows), default=0)), np.nan, dtype=kind)
-    for line, row in zip(table, rows, strict=True):
-        line[: len(row)] = row
-    return table
-
-
-def _flat(variables: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
-    """Complex variables as pairs of real ones, texts as texts whatever their number."""
-    for name, (dims, values, *attributes) in variables.items():
-        array = np.asarray(values)
-        if array.dtype.kind == "c":
-            for part in _PARTS:
-                yield f"{name}_{part}", (dims, getattr(array, part), *attributes)
-        else:
-            yield str(name), (dims, array.astype(str) if array.dtype.kind == "O" else array, *attributes)
-
-
-_PARTS = ("real", "imag")
 
 
 @dataclass(frozen=True)
@@ -302,10 +282,7 @@ class _Reader:
         return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu, d.kept), values, given, d.samples)
 
     def array(self, name: str) -> np.ndarray:
-        if name in self.dataset:
-            return np.asarray(self.dataset[name].values)
-        real, imag = (np.asarray(self.dataset[f"{name}_{part}"].values) for part in _PARTS)
-        return _joined(real, imag)
+        return array_of(self.dataset, name)
 
     def branch(self) -> Branch:
         record = self.record
@@ -393,10 +370,3 @@ class _Motions:
         adaptive = None if rule < 0 else self.reader.tables["rules"][rule]
         floquet = FloquetResult(self.multipliers[i, :count].copy(), self.errors[i, :count].copy(), **verdict)
         return PeriodicOrbit(balance, x, omega, values, residual, truncation, adaptive), floquet
-
-
-def _joined(real: np.ndarray, imag: np.ndarray) -> np.ndarray:
-    """Complex numbers of their parts; arithmetic would change zeros and spread what is not finite."""
-    joined = np.empty(real.shape, dtype=complex)
-    joined.real, joined.imag = real, imag
-    return joined

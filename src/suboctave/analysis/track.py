@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
-from suboctave.analysis.making import own_linear_part
+from suboctave.analysis.making import check_unknowns, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
@@ -17,7 +17,7 @@ from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.formulation import BorderedSystem, Formulation, written
+from suboctave.bifurcation.formulation import BorderedSystem, Formulation
 from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
@@ -114,6 +114,7 @@ def track(
     basis = orbit.basis
     wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
     adaptive, basis = discretisation(basis, wanted)
+    check_unknowns(orbit.balance.size, basis)
     second = ranges[1]
     assert second is not None
     ends = (min(second), max(second))
@@ -125,15 +126,8 @@ def track(
         balance = HarmonicBalance(system, basis, linear=own_linear_part(orbit))
         start = solved_start(bifurcation, balance, adaptive, names, box, settings)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
-    options = {
-        "bounds": {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None},
-        "harmonics": asdict(wanted) if isinstance(wanted, AdaptiveHarmonics) else wanted,
-        "newton": asdict(settings.newton),
-        "stepping": asdict(settings.stepping),
-        "stability": settings.stability.name,
-        "formulation": written(settings.formulation),
-        "observe": settings.observe,
-    }
+    bounded = {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None}
+    options = options_of(settings, wanted, bounded)
     context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
         kind_of(bifurcation),

@@ -8,6 +8,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from suboctave.analysis.making import rule_of
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import null_row
@@ -27,7 +28,7 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint
 from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.perturbation import Kind
@@ -58,15 +59,11 @@ def kind_of(item: Bifurcation) -> str:
 
 
 def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
-    if isinstance(wanted, str) and wanted == "adaptive":
-        wanted = AdaptiveHarmonics()
-    if isinstance(wanted, AdaptiveHarmonics):
-        return wanted, basis.filled
-    if isinstance(wanted, (int, np.integer)) and not isinstance(wanted, bool) and wanted >= 1:
-        return None, HarmonicBasis(int(wanted) * basis.nu, basis.nu)
-    raise InputError(
-        f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {wanted!r}'
-    )
+    """The rule for harmonics, None for a number of them, and the basis that tracking begins with."""
+    rule = rule_of(wanted)
+    if isinstance(rule, AdaptiveHarmonics):
+        return rule, basis.filled
+    return None, HarmonicBasis(rule * basis.nu, basis.nu)
 
 
 def _augmentation(
