@@ -233,8 +233,6 @@ def test_flipped_bits_never_give_another_branch(curve, saved, tmp_path, count):
 
 def test_complex_columns_of_a_table_come_back_bit_for_bit(tmp_path):
     """Negative zeros, infinities and nan among them, which arithmetic on the parts would change."""
-    from suboctave.analysis.results import Results, Table
-
     values = np.array([complex(-0.0, 1.0), complex(1.0, np.inf), complex(np.nan, -0.0), complex(-np.inf, np.nan)])
     saved = Results({"numbers": Table({"mu": values, "name": np.array(["a", "b", "c", "d"])})}).save(tmp_path / "t.nc")
     again = so.load(saved)["numbers"]["mu"]

@@ -39,3 +39,20 @@ def suboctave(monkeypatch, capsys):
         return status, said.out, said.err
 
     return call
+
+
+@pytest.fixture(scope="session")
+def equal():
+    """Compares two branches, bit for bit: points, bifurcations, multipliers, options."""
+
+    def compare(a, b):
+        assert len(a) == len(b)
+        for x, y in zip(a.points, b.points, strict=True):
+            assert x.orbit.coefficients.tobytes() == y.orbit.coefficients.tobytes()
+            assert (x.orbit.omega, dict(x.orbit.values)) == (y.orbit.omega, dict(y.orbit.values))
+            assert x.floquet.multipliers.tobytes() == y.floquet.multipliers.tobytes()
+            assert x.arclength == y.arclength
+        assert repr(a) == repr(b)
+        assert a.options == b.options
+
+    return compare
