@@ -188,12 +188,18 @@ def stable_ranges(branch: Branch) -> list[tuple[float, float]]:
     places, stable, omega = branch.arclength, branch.stable, branch.omega
     changes = sorted((b.arclength, b.omega) for b in branch.bifurcations.met if b.kind != "grazing")
     pieces = []
-    for (start, first), (stop, last) in pairwise([(places[0], omega[0]), *changes, (places[-1], omega[-1])]):
+    whole = float(places[-1])
+    if branch.closed and changes:
+        # the seam is no end
+        places, stable = (np.concatenate(pair) for pair in ((places, places[1:] + whole), (stable, stable[1:])))
+        ends = [*changes, (changes[0][0] + whole, changes[0][1])]
+    else:
+        ends = [(0.0, omega[0]), *changes, (whole, omega[-1])]
+    for (start, first), (stop, last) in pairwise(ends):
         # on a located bifurcation itself the verdict is open
         inside = (places > start) & (places < stop)
         if inside.any() and np.median(stable[inside]) > 0.5:
-            met = [first, last, *omega[inside]]
-            pieces.append((float(min(met)), float(max(met))))
+            pieces.append((float(min(first, last)), float(max(first, last))))
     joined: list[tuple[float, float]] = []
     for low, high in sorted(pieces):
         if joined and low <= joined[-1][1]:

@@ -38,11 +38,9 @@ class Life:
         """Whether a leg's limit point at a value lies on it."""
         return leg in self.legs and self.low <= value <= self.high
 
-    def has(self, event: TrackedEvent) -> bool:
-        """Whether it ends at an event."""
-        return any(event is end for end in self._events)
-
-    _events: list[TrackedEvent] = field(default_factory=list)
+    def ends_at(self, event: TrackedEvent) -> bool:
+        """Whether it ends at an event, whose orbit its end shares."""
+        return any(end is not None and end.orbit is event.orbit for end in self.ends)
 
 
 @dataclass(frozen=True)
@@ -54,17 +52,18 @@ class _End:
     centre: bool
     reason: str
 
+    def as_end(self, name: str) -> IsolaEnd | None:
+        """What happens there, where that is known."""
+        return None if self.event is None else IsolaEnd.of(self.event, name, self.centre)
+
 
 def life_of(loop: Loop, survey: Survey) -> Life:
     """The range over which a detached branch stays so."""
     life = Life(list(loop.legs), [loop])
     low, high = (_extended(loop, upper, survey, life) for upper in (False, True))
     life.low, life.high = low.value, high.value
-    life.ends = tuple(
-        None if end.event is None else IsolaEnd.of(end.event, survey.name, end.centre) for end in (low, high)
-    )
+    life.ends = (low.as_end(survey.name), high.as_end(survey.name))
     life.reasons = (low.reason, high.reason)
-    life._events = [end.event for end in (low, high) if end.event is not None]
     return life
 
 
@@ -133,7 +132,7 @@ def _culprit(events: list[TrackedEvent]) -> TrackedEvent | None:
 
 def _vanishing(value: float, events: list[TrackedEvent], name: str) -> _End:
     for event in events:
-        if event.isola == "isola_centre":
+        if event.kind == "extremum" and event.isola != "isola_merging":
             where = f"omega = {event.omega:.9g}, {name} = {value:.9g}"
             return _End(value, event, True, f"shrinks to a point (isola centre) at {where}")
     (event, *_) = events

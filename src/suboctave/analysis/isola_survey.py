@@ -13,6 +13,7 @@ from typing import Any
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.isola import closed_branch
 from suboctave.analysis.limit_curves import Leg, legs_of, same_motion
+from suboctave.analysis.making import Harmonics
 from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.bifurcation import Bifurcation
@@ -48,26 +49,31 @@ class Survey:
 
     system, name, bounds, omega
         What is looked at, `bounds` and `omega` ascending.
-    options, tracking
-        Passed to the verbs that follow branches, and to `track`.
+    harmonics, depth, options
+        For the verbs that follow branches; `depth` as in `bifurcation_diagram`.
     most
         Curves after which no more are followed.
+    curves, legs, doublings
+        Curves of limit points over the parameter, their legs, curves of period doublings.
+    met
+        Branches that bifurcate from a response, or are one, by the value of the parameter.
     """
 
     system: System
     name: str
     bounds: tuple[float, float]
     omega: tuple[float, float]
+    harmonics: Harmonics
+    depth: int
     options: dict[str, Any]
-    tracking: dict[str, Any]
     most: int
-    tell: Callable[[float, str], None] | None = None
     curves: list[TrackedBranch] = field(default_factory=list)
     doublings: list[TrackedBranch] = field(default_factory=list)
     legs: list[Leg] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    #: legs of limit points on branches that are not detached, by value
-    attached: dict[float, set[Leg]] = field(default_factory=dict)
+    met: dict[float, list[Branch]] = field(default_factory=dict)
+    report: Callable[[float, str], None] | None = None
+    _explained: set[tuple[float, int]] = field(default_factory=set)
     _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
 
     @property
@@ -80,10 +86,10 @@ class Survey:
         if text not in self.notes:
             self.notes.append(text)
 
-    def report(self, share: float, where: str) -> None:
+    def say(self, share: float, where: str) -> None:
         """Tell whoever wants to know."""
-        if self.tell is not None:
-            self.tell(share, where)
+        if self.report is not None:
+            self.report(share, where)
 
     # ------------------------------------------------------------------------------------------------- limit points
     def leg_of(self, item: Bifurcation, value: float) -> Leg | None:
@@ -103,7 +109,7 @@ class Survey:
         return None
 
     def known(self, item: Bifurcation, value: float) -> Leg | None:
-        """The leg that a limit point lies on, after following it over the parameter if it is new; None where that fails."""
+        """The leg that a limit point lies on, after following it over the parameter if it is new; None if it fails."""
         leg = self.leg_of(item, value)
         if leg is not None or any(v == value and abs(b.omega - item.omega) <= _SAME * b.omega for v, b in self._lost):
             return leg
@@ -132,7 +138,8 @@ class Survey:
             self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
             return None
         try:
-            return track(item, self.name, self.bounds, **self.tracking)
+            around = 0.5 * self.omega[0], 2.0 * self.omega[1]
+            return track(item, self.name, self.bounds, omega=around, **self.options)
         except (ConvergenceError, InputError) as failure:
             self.note(f"the {where} could not be followed over {self.name}: {failure}")
             return None
@@ -158,9 +165,15 @@ class Survey:
                 legs.append(leg)
         return Loop(value, branch, tuple(legs))
 
-    def attach(self, value: float, legs: set[Leg]) -> None:
-        """Limit points that lie on a branch which is not detached."""
-        self.attached.setdefault(value, set()).update(legs)
+    def attach(self, loop: Loop) -> None:
+        """A branch that is not detached: its limit points at that value are explained."""
+        if not loop.detached:
+            self.met.setdefault(loop.value, []).append(loop.branch)
+            self._explained |= {(loop.value, id(leg)) for leg in loop.legs}
+
+    def explained(self, leg: Leg, value: float) -> bool:
+        """Whether a leg's limit point at a value lies on a branch that is not detached."""
+        return (value, id(leg)) in self._explained
 
     # ------------------------------------------------------------------------------------------------ critical values
     def critical(self, nu: int, value: float, upper: bool) -> Iterator[tuple[float, list[TrackedEvent]]]:
