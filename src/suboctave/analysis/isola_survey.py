@@ -25,6 +25,8 @@ __all__ = ["Loop", "Survey"]
 
 #: frequencies that differ by less, relatively, are one
 _SAME = 1e-6
+#: events that are closer, in units of the range, are met together
+_TOGETHER = 1e-7
 #: a limit point lies at most this many distances between neighbours away from the curve's chord
 _BESIDE = 3.0
 
@@ -149,7 +151,8 @@ class Survey:
         """The branch through a leg's limit point at a value; None where it cannot be followed."""
         try:
             found = leg.limit_point(value)
-            branch = closed_branch(found, self.omega, [leg], self.options)
+            same = [other for other in self.legs if other.curve is leg.curve]
+            branch = closed_branch(found, self.omega, self.name, same, self.options)
         except ConvergenceError as failure:
             omega, _ = leg.omega_near(value)
             self.note(f"the branch at omega = {omega:.6g}, {self.name} = {value:.6g} could not be followed: {failure}")
@@ -187,12 +190,12 @@ class Survey:
                 events += [e for e in curve.extrema if isinstance(e, TrackedEvent) and e.parameter_name == self.name]
         sign = 1.0 if upper else -1.0
         ahead = sorted(
-            {id(e): e for e in events if sign * (e.parameter(self.name) - value) > 0.0}.values(),
+            {id(e): e for e in events if sign * (e.parameter(self.name) - value) > _TOGETHER * self.span}.values(),
             key=lambda e: sign * e.parameter(self.name),
         )
         group: list[TrackedEvent] = []
         for event in ahead:
-            if group and abs(event.parameter(self.name) - group[0].parameter(self.name)) > 1e-10 * self.span:
+            if group and abs(event.parameter(self.name) - group[0].parameter(self.name)) > _TOGETHER * self.span:
                 yield group[0].parameter(self.name), group
                 group = []
             group.append(event)
