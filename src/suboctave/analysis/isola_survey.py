@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from suboctave.analysis.branch import Branch
+from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.isola import closed_branch
 from suboctave.analysis.limit_curves import Leg, legs_of, same_motion
 from suboctave.analysis.making import Harmonics
@@ -92,6 +93,35 @@ class Survey:
         """Tell whoever wants to know."""
         if self.report is not None:
             self.report(share, where)
+
+    # ---------------------------------------------------------------------------------------------------- responses
+    def look(self, value: float) -> None:
+        """Follow responses at a value and what bifurcates from them; limit points and doublings over the parameter."""
+        for branch, level in self._branches(value):
+            if level < self.depth:
+                for item in branch.bifurcations["PD"]:
+                    self.doubling(item, value)
+            self.attach(self.loop_of(branch, value))
+            if branch.interrupted:
+                raise KeyboardInterrupt
+
+    def _branches(self, value: float) -> Iterator[tuple[Branch, int]]:
+        """Branches at a value, and how many bifurcations lead to them from the response, which begins at both ends."""
+        system = self.system.with_parameters({self.name: value})
+        low, high = self.omega
+        for ends in ((high, low), (low, high)):
+            try:
+                diagram = bifurcation_diagram(system, ends, self.depth, harmonics=self.harmonics, **self.options)
+            except ConvergenceError as failure:
+                self.note(f"at {self.name} = {value:.6g}: {failure}")
+                continue
+            for node in diagram:
+                yield node.branch, node.depth
+                for item, why in node.failures:
+                    self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+            root = diagram.root.branch
+            if len(root) and root.points[-1].orbit.omega == ends[1]:
+                return
 
     # ------------------------------------------------------------------------------------------------- limit points
     def leg_of(self, item: Bifurcation, value: float) -> Leg | None:
