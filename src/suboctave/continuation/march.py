@@ -206,6 +206,7 @@ class March:
         point = self._set_out()
         home = _Place(point)
         mark: _Place | None = None
+        marked = 0
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
@@ -239,7 +240,7 @@ class March:
                 self.closed, self.ended = True, "the curve closed on itself"
                 yield back
                 return
-            if mark is not None and mark.passed(point, new) is not None:
+            if mark is not None and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ended = (
                     f"came back to {new.curve.where(new.u)} without having passed its start: where two branches nearly "
                     "touch it went over to another one. Try a smaller max_step"
@@ -258,7 +259,7 @@ class March:
             yield new
             count += 1
             if count >= _LONG and count & (count - 1) == 0:
-                mark = _Place(new)
+                mark, marked = _Place(new), count
             step = self._next_step(point, new, new.arclength - point.arclength, deviation)
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
