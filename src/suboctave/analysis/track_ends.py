@@ -1,6 +1,8 @@
 """Where a curve of bifurcations ends although its parameters stay in range: its motions cease to be of its kind.
 
-- NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there.
+- NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there. At
+  w0/2 the harmonics left out shift the end in the equations solved, so that a curve may go on with neutral saddles: it
+  ends as well where the pair has become two real multipliers.
 - BP: the unfolding is not zero any more: the symmetry that forces branch points is broken.
 - LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
   the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
@@ -33,6 +35,8 @@ _BESIDE = 0.05
 _AROUND = 0.2
 #: kappa in units of the base frequency, from 0 or 1/2, at which an NS curve has reached its end
 _RESONANT = 2e-3
+#: the same, within which the pair is looked at
+_DOUBTFUL = 0.05
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
 
@@ -64,7 +68,8 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             )
     if isinstance(augmentation, SingularOperator) and augmentation.kind is Kind.FREE:
         share = b.kappa / b.state.rate
-        if not _RESONANT < share < 0.5 - _RESONANT:
+        distance = min(share, 0.5 - share)
+        if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)):
             return _resonance(a, share > 0.25, newton)
     if b.curve.balance.basis.nu == 1:
         return None
@@ -80,6 +85,16 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def _split(b: TrackedSample) -> bool:
+    """Whether the two multipliers nearest to the critical one are real: a neutral saddle."""
+    critical = b.evaluation.critical
+    if critical is None:
+        return False
+    mu = b.evaluation.floquet.multipliers
+    nearest = mu[np.argsort(np.abs(mu - critical), kind="stable")[:2]]
+    return bool(np.all(nearest.imag == 0.0))
 
 
 def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:

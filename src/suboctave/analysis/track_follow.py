@@ -168,7 +168,7 @@ class _Tracker:
         if end.event is not None:
             found = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(found, settings.stability, settings.observe)
-            self.trace.events.append(replace(item, arclength=arclength))
+            self.trace.events.append(replace(item, arclength=arclength, curve=a.curve.augmentation.name))
             if end.last:
                 self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability))
 
