@@ -106,7 +106,14 @@ def track(
         names, ranges = _free(bifurcation, parameter, bounds, omega)
     kind = curve_onto(bifurcation, onto)
     settings = make_settings(
-        bifurcation.orbit.system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
+        bifurcation.orbit.system,
+        max_step,
+        _observed(bifurcation, observe),
+        (),
+        newton,
+        stepping,
+        stability,
+        formulation,
     )
     if turning and not isinstance(settings.formulation, BorderedSystem):
         raise InputError(

@@ -18,8 +18,9 @@ from functools import lru_cache
 import numpy as np
 
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import CurveTest, DoubleMultiplier, Found, GeneralisedDoubling
+from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
+from suboctave.analysis.tracked_tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.bifurcation.augmented import BranchPointUnfolded, SingularOperator
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.problem import Array

@@ -14,9 +14,10 @@ from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, 
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import CurveTest, events_between, refined, tests_of
+from suboctave.analysis.tracked_events import events_between, refined
 from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.analysis.tracked_tests import CurveTest, tests_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
 from suboctave.continuation.march import between, make_point

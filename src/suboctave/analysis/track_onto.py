@@ -63,7 +63,9 @@ def curve_onto(item: Bifurcation, onto: str | None) -> str:
     if onto is None:
         return next((kind for kind in kinds if kind != item.curve), kinds[0])
     if onto not in kinds:
-        raise InputError(f"onto={onto!r}: the curves through a {item.kind} are {' and '.join(kinds)}{suggest(onto, kinds)}")
+        raise InputError(
+            f"onto={onto!r}: the curves through a {item.kind} are {' and '.join(kinds)}{suggest(onto, kinds)}"
+        )
     return onto
 
 
@@ -167,5 +169,7 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
         outside = True
     at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in item.names)
     if outside:
-        raise InputError(f"the Neimark-Sacker points that begin in the {item.kind} at {at} lie outside the ranges: widen them")
+        raise InputError(
+            f"the Neimark-Sacker points that begin in the {item.kind} at {at} lie outside the ranges: widen them"
+        )
     raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {said}")

@@ -16,10 +16,12 @@ from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations,
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.extremum import ExtremalEquations
+from suboctave.bifurcation.measures import measured
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
@@ -101,7 +103,7 @@ class TrackedSample:
         """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
         b, by_x = self.equations.bordered, self.equations.gradient[0].real
         by_motion = -by_x.reshape(self.state.x.shape)
-        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._other_factor)
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._whole)
 
     @lazy
     def coefficient(self) -> float:
@@ -128,15 +130,33 @@ class TrackedSample:
         equations = self.evaluation.equations
         return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
-    @property
-    def other(self) -> float:
-        """Sign of det J_half of an LP, of det J_0 of a PD."""
-        return self._other_factor.sign
+    def sign(self, operator: Kind) -> float:
+        """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
+        return self._whole.sign if operator is Kind.INTEGER else self._half.sign
 
     @lazy
-    def _other_factor(self) -> Factor:
-        limit = self.equations.of.kind is Kind.INTEGER
-        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
+    def _whole(self) -> Factor:
+        return Factor.of(self.state.jacobian)
+
+    @lazy
+    def _half(self) -> Factor:
+        return Factor.of(self.state.half_jacobian)
+
+    @lazy
+    def others(self) -> ComplexArray:
+        """Multipliers but the one, or the pair, that is critical all along the curve."""
+        mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
+        if critical is None:
+            return mu
+        count = 2 if self.curve.augmentation.name == "NS" else 1
+        distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        result: ComplexArray = np.delete(mu, np.argsort(distance, kind="stable")[:count])
+        return result
+
+    @lazy
+    def measures(self) -> Array:
+        """fold, double, torus of `bifurcation.measures` of the other multipliers, in columns 1 to 3, shape (2, 4)."""
+        return measured(1.0, self.others)
 
 
 def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:

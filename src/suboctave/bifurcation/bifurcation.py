@@ -32,6 +32,9 @@ KINDS = {
     "R3": "1:3 resonance",
     "R4": "1:4 resonance",
     "LPPD": "fold-flip",
+    "LPNS": "fold-Neimark-Sacker",
+    "PDNS": "flip-Neimark-Sacker",
+    "NSNS": "double Neimark-Sacker",
 }
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)
