@@ -2,7 +2,9 @@
 
 - NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there. At
   w0/2 the harmonics left out shift the end in the equations solved, so that a curve may go on with neutral saddles: it
-  ends as well where the pair has become two real multipliers.
+  ends as well where the pair has become two real multipliers. Perturbations of motions with a half-wave symmetry have
+  either even or odd multiples of w0 beside kappa. The two of a pair are then of different kinds, and pass each other
+  at w0/2 as if nothing were there: the curve goes on with kappa above it, and ends where that reaches w0.
 - BP: the unfolding is not zero any more: the symmetry that forces branch points is broken.
 - LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
   the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
@@ -38,6 +40,8 @@ _AROUND = 0.2
 _RESONANT = 2e-3
 #: the same, within which the pair is looked at
 _DOUBTFUL = 0.05
+#: share of a perturbation with waves of the other parity that is none
+_NO_PARITY = 1e-6
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
 
@@ -68,10 +72,15 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
                 f"{b.curve.where(b.point.u)}, the symmetry that forces them is broken there"
             )
     if isinstance(augmentation, SingularOperator) and augmentation.kind is Kind.FREE:
-        share = b.kappa / b.state.rate
-        distance = min(share, 0.5 - share)
+        before, share = a.kappa / a.state.rate, b.kappa / b.state.rate
+        double = abs(share - 0.5) < 0.25
+        if double and _symmetric(b):
+            return None
+        # a step may lead across
+        target = 0.5 if double else float(round(share))
+        distance = (share - target) * math.copysign(1.0, before - target)
         if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)):
-            return _resonance(a, share > 0.25, newton)
+            return _resonance(a, double, newton)
     if b.curve.balance.basis.nu == 1:
         return None
     share = subharmonic_share(b.point)
@@ -86,6 +95,13 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def _symmetric(b: TrackedSample) -> bool:
+    """Whether a perturbation has frequencies kappa + k w0 for even k alone, or for odd k alone."""
+    waves = b.equations.bordered.right.reshape(-1, b.curve.balance.size)
+    first, last = (float(np.linalg.norm(waves[i::2])) for i in (0, 1))
+    return min(first, last) < _NO_PARITY * max(first, last)
 
 
 def _split(b: TrackedSample) -> bool:

@@ -152,7 +152,9 @@ class Resonance(CurveTest):
 
     def value(self, sample: TrackedSample) -> float:
         """See `CurveTest.value`."""
-        return sample.kappa / sample.state.rate - 1.0 / self.order
+        share = sample.kappa / sample.state.rate
+        # beyond w0/2 the other one of the pair has the smaller kappa
+        return min(share, 1.0 - share) - 1.0 / self.order
 
 
 @dataclass(frozen=True)
