@@ -14,7 +14,8 @@ from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, 
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import events_between, refined
+from suboctave.analysis.tracked_events import Found, events_between, refined
+from suboctave.analysis.tracked_hidden import HiddenPairs
 from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.analysis.tracked_tests import CurveTest, tests_of
@@ -69,6 +70,7 @@ class _Tracker:
         self.trace = TrackedTrace()
         self.tests: tuple[CurveTest, ...] = tests_of(start.curve)
         self.previous: TrackedSample | None = None
+        self.hidden = HiddenPairs(self.tests, settings.newton)
         self.corners = 0
 
     def run(self) -> TrackedTrace:
@@ -83,6 +85,8 @@ class _Tracker:
                 heading = math.copysign(1.0, beyond.tangent[-1])
                 self.march = March(beyond, heading, self.box.second, self.settings.newton, stepping, self._clear)
             trace.closed = self.march.closed
+            self._take(self.hidden.rest(trace.warnings))
+            trace.events.sort(key=lambda event: event.arclength)
         except KeyboardInterrupt:
             where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
@@ -124,6 +128,9 @@ class _Tracker:
         """Take a point in; a sentence if the curve ends there or before it."""
         settings, new = self.settings, TrackedSample(point)
         if self.previous is None or point is self.march.start:
+            # beyond a corner nothing leads on from what lies behind
+            self._take(self.hidden.rest(self.trace.warnings))
+            self.hidden.passed(new, self.trace.warnings)
             self._add(new)
             self.previous = new
             return None
@@ -139,15 +146,20 @@ class _Tracker:
         if landed is None:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
-        for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
-            item = polished(refined(found, settings.newton, self.trace.warnings), settings.newton)
-            self.trace.events.append(as_event(item, settings.stability, settings.observe))
+        warnings = self.trace.warnings
+        self._take(self.hidden.passed(new, warnings) + events_between(a, new, self.tests, settings.newton, warnings))
         self._add(new)
         self.previous = new
         if settings.report is not None:
             low, high = self.box.second
             settings.report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
         return f"reached the end of the range at {new.curve.where(new.point.u)}" if outside else None
+
+    def _take(self, found: list[Found]) -> None:
+        settings, warnings = self.settings, self.trace.warnings
+        for item in found:
+            better = polished(refined(item, settings.newton, warnings), settings.newton)
+            self.trace.events.append(as_event(better, settings.stability, settings.observe))
 
     def _add(self, sample: TrackedSample) -> None:
         point = sample.point
@@ -159,6 +171,7 @@ class _Tracker:
                 self.settings.stability,
                 sample.instant_or_frequency,
                 sample.coefficient,
+                sample.multipliers_by(self.settings.stability),
                 extreme=sample.extreme,
                 isola=sample.isola,
             )

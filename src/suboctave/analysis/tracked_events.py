@@ -46,23 +46,29 @@ def events_between(
     a: TrackedSample, b: TrackedSample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
 ) -> list[Found]:
     """Every event between two neighbours in the same discretisation, in the order met."""
-    found = []
+    found: list[Found] = []
     for test in tests:
         try:
-            for low, high in _brackets(test, a, b, newton):
-                stretch = _Stretch(low, high, test.within(low, high), newton)
-                sample = stretch.zero(_ROUGH)
-                if not test.genuine(sample):
-                    continue
-                # what more harmonics will move need not be known better
-                finer = _finer(sample) is not None
-                sample = sample if finer else stretch.zero(_RESOLVED)
-                found.append(Found(test, sample, _extreme(test, low), stretch if finer else None))
+            both = [located(test, low, high, newton) for low, high in _brackets(test, a, b, newton)]
+            found += [item for item in both if item is not None]
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
     if b.curve.augmentation.turning:
         found = _without_consequences(found, b.curve, _SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: NewtonOptions) -> Found | None:
+    """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
+    own = test.within(low, high)
+    stretch = _Stretch(low, high, own, newton)
+    sample = stretch.zero(_ROUGH)
+    if not own.genuine(sample):
+        return None
+    # what more harmonics will move need not be known better
+    finer = _finer(sample) is not None
+    sample = sample if finer else stretch.zero(_RESOLVED)
+    return Found(own, sample, _extreme(test, low), stretch if finer else None)
 
 
 def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
@@ -214,4 +220,4 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
 
 
-__all__ = ["Found", "events_between", "refined"]
+__all__ = ["Found", "events_between", "located", "refined"]

@@ -27,6 +27,7 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, StabilityMethod
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
@@ -141,6 +142,11 @@ class TrackedSample:
     @lazy
     def _half(self) -> Factor:
         return Factor.of(self.state.half_jacobian)
+
+    def multipliers_by(self, method: StabilityMethod) -> FloquetResult | None:
+        """Multipliers and errors as a method would give them along a curve, None if that is still to be computed."""
+        known: FloquetResult | None = self.evaluation.__dict__.get("floquet")
+        return known if method.follows_monodromy else None
 
     @lazy
     def others(self) -> ComplexArray:
