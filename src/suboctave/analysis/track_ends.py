@@ -124,7 +124,8 @@ def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
         found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(order), newton, _AROUND)
     except ConvergenceError as failure:
         return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failure})")
-    return End(f"the curve ends in a {words} resonance at {found.sample.curve.where(found.sample.point.u)}", found)
+    where = found.sample.curve.where(found.sample.point.u)
+    return End(f"the curve ends in a {words} resonance at {where}", found, last=True)
 
 
 def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
@@ -159,8 +160,10 @@ def _zero_beside(
 
 
 def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
-    """A motion of the parent in the basis of a curve of doubled motions."""
+    """A motion in a curve's basis, where that is of another period: one of the parent of doubled motions."""
     balance = a.curve.balance
+    if orbit.basis.nu == balance.basis.nu:
+        return orbit
     return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
 
 

@@ -182,9 +182,11 @@ class _Tracker:
         if end.event is not None:
             found = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(found, settings.stability, settings.observe)
-            self.trace.events.append(replace(item, arclength=arclength, curve=a.curve.augmentation.name))
+            curve = a.curve.augmentation.name
+            self.trace.events.append(replace(item, arclength=arclength, curve=curve))
             if end.last:
-                self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability))
+                kappa = 0.5 * a.state.rate * (found.test.kind == "R2")
+                self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability, kappa))
 
     def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
         """The first point again, with the bordering vectors of the last."""

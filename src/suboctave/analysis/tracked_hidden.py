@@ -119,7 +119,12 @@ def falling(places: Array, values: Array, at: int) -> float | None:
     sign = float(np.sign(here[0]))
     if sign == 0.0 or sign * here[1] <= 0.0:
         return None
+    least = float(np.abs(here).min())
     if at > 0 and at + 2 < len(places):
+        # parabolas leave the chord by no more than this
+        bend = max(abs(_second(places, values, i)) for i in (at - 1, at)) * (places[at + 1] - places[at]) ** 2 / 4.0
+        if bend <= (1.0 - _FALLS) * least:
+            return None
         spans = [(at - 1, at + 2), (at, at + 3)]
     elif at > 0:
         spans = [(at - 1, at + 2), (max(0, at - 2), at + 2)]
@@ -128,10 +133,16 @@ def falling(places: Array, values: Array, at: int) -> float | None:
     s = places[at] + _GRID * (places[at + 1] - places[at])
     one, other = (sign * _interpolated(places[a:b], values[a:b], s) for a, b in spans)
     lower, apart = np.minimum(one, other), np.abs(one - other)
-    for least, most in ((lower, _FALLS * float(np.abs(here).min())), (lower - apart, 0.0)):
-        if least.min() < most:
-            return float(_GRID[least.argmin()])
+    for lowest, bound in ((lower, _FALLS * least), (lower - apart, 0.0)):
+        if lowest.min() < bound:
+            return float(_GRID[lowest.argmin()])
     return None
+
+
+def _second(x: Array, f: Array, i: int) -> float:
+    """The second divided difference at three points from the i-th."""
+    first, last = ((f[j + 1] - f[j]) / (x[j + 1] - x[j]) for j in (i, i + 1))
+    return float((last - first) / (x[i + 2] - x[i]))
 
 
 def _interpolated(x: Array, f: Array, s: Array) -> Array:
