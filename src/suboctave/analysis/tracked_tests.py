@@ -35,8 +35,12 @@ from suboctave.harmonic.perturbation import Kind
 _LEVEL = 1e-9
 #: distance of the other multiplier from +1 or -1 at a point where det J_0 or det J_half vanishes
 _CRITICAL = 0.1
+#: distance of the critical pair from there within which that is asked for
+_RESONANT = 0.5
 #: corrections of kappa, and their size in units of the base frequency, after which it is known
 _CORRECTIONS, _KNOWN = 6, 1e-11
+#: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair
+_STRAYED = 0.1
 
 
 class CurveTest(ABC):
@@ -189,8 +193,13 @@ class RealCrossing(CurveTest):
 
     def genuine(self, sample: TrackedSample) -> bool:
         """See `CurveTest.genuine`: close to R1 and R2 the pair that an NS curve follows is critical itself."""
+        if self.kind == "LPPD":
+            return True
         target = 1.0 if self.operator is Kind.INTEGER else -1.0
-        return self.kind == "LPPD" or bool(np.any(np.abs(sample.others - target) < _CRITICAL))
+        critical = sample.evaluation.critical
+        assert critical is not None
+        apart = abs(critical - target) > _RESONANT
+        return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL))
 
 
 @dataclass(frozen=True)
@@ -227,23 +236,21 @@ class PairCrossing(CurveTest):
         assert self.target is not None
         assert self.borders is not None
         rate = sample.state.rate
-        kappa = _frequency(sample, self.target)
+        kappa = start = _frequency(sample, self.target)
         for _ in range(_CORRECTIONS):
             border = bordered(sample.state, Kind.FREE, self.borders, kappa)
             change = border.g / border.gradient(())[2]
             if abs(change.real) <= _KNOWN * rate:
                 break
             kappa -= change.real
+            if abs(kappa - start) > _STRAYED * rate:
+                raise ConvergenceError("the harmonics kept do not tell where the pair of multipliers is")
         return float(change.imag) * 2.0 * np.pi / rate
 
     def smooth(self, sample: TrackedSample) -> Array:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
         column: Array = sample.measures[:, 3]
         return column
-
-    def genuine(self, sample: TrackedSample) -> bool:
-        """See `CurveTest.genuine`."""
-        return bool(np.any(np.abs(np.abs(sample.others[sample.others.imag > 0.0]) - 1.0) < _CRITICAL))
 
 
 def _frequency(sample: TrackedSample, target: complex) -> float:
