@@ -97,6 +97,43 @@ def test_other_parameters_than_those_of_the_curve(limits):
     assert (end.omega, end.parameter("c2")) == pytest.approx((event.omega, event.parameter("c2")), rel=1e-7)
 
 
+def test_a_one_to_two_resonance_by_shooting():
+    """One DOF: there trace M = -2 and det M = 1; the tori that begin there have det M = 1, |trace M| < 2.
+
+    A neutral saddle has det M = 1 as well, with a larger trace. The damping of a self-excited oscillator of varying
+    stiffness vanishes on average.
+    """
+    system = so.System(
+        mass=1.0,
+        damping="-e",
+        stiffness=1.0,
+        elements=[so.Expression(dof=0, expression="mu*x**2*v"), so.Expression(dof=0, expression="eps*cos(omega*t)*x")],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"e": 0.05, "mu": 1.0, "eps": 0.4, "F": 1.1},
+    )
+
+    def monodromy(orbit):
+        return shoot(orbit.system, orbit.start(), orbit.omega).monodromy
+
+    doublings = so.track(so.frequency_response(system, (1.6, 2.6), 7).bifurcations["PD"][0], "F", (0.5, 2.0))
+    (event,) = doublings.bifurcations["R2"]
+    there = monodromy(event.orbit)
+    assert (np.trace(there), np.linalg.det(there)) == pytest.approx((-2.0, 1.0), abs=1e-8)
+    tori = so.track(event, "F", (0.5, 2.0))
+    assert tori.kind == "NS"
+    assert len(tori) > 5
+    for point in tori.tracked:
+        there = monodromy(point.orbit)
+        assert np.linalg.det(there) == pytest.approx(1.0, abs=1e-8)
+        assert np.trace(there) == pytest.approx(2.0 * math.cos(point.extra * point.orbit.period), abs=1e-8)
+    (end,) = tori.bifurcations["R2"]
+    assert end.critical_multiplier() == pytest.approx(-1.0, abs=1e-4)
+    again = so.track(end, "F", (0.5, 2.0))
+    assert again.kind == "PD"
+    found, expected = (next(iter(c.bifurcations["GPD"])) for c in (again, doublings))
+    assert (found.omega, found.parameter("F")) == pytest.approx((expected.omega, expected.parameter("F")), abs=1e-8)
+
+
 def test_a_one_to_two_resonance_from_both_sides():
     """The tori of two masses with a stop end on period doublings; from there they are found again."""
     response = so.frequency_response(so.library.two_mass_unilateral(), (0.6, 0.65), harmonics=31)

@@ -185,8 +185,9 @@ class _Tracker:
             curve = a.curve.augmentation.name
             self.trace.events.append(replace(item, arclength=arclength, curve=curve))
             if end.last:
-                kappa = 0.5 * a.state.rate * (found.test.kind == "R2")
-                self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability, kappa))
+                orbit = rebased(item.orbit, a)
+                kappa = 0.5 * orbit.omega / orbit.basis.nu if found.test.kind == "R2" else 0.0
+                self.trace.points.append(TrackedPoint(orbit, arclength, 0, settings.stability, kappa))
 
     def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
         """The first point again, with the bordering vectors of the last."""
