@@ -114,6 +114,19 @@ def test_flip_neimark_sacker_from_both_curves_and_by_shooting():
     assert so.track(tori.bifurcations["PDNS"][0], "eps", (0.05, 0.6)).kind == "PD"
 
 
+def test_a_pitchfork_takes_the_place_of_limit_points():
+    """A symmetric Duffing oscillator's branch points; the equations of a limit point are singular along them."""
+    elements = [so.CubicSpring(dof=0, coefficient=1.0), so.Expression(dof=1, expression=VAN_DER_POL)]
+    system = two((1.0, 4.84), (0.1, "-e"), elements, {0: "F", 1: "0.152*F"}, F=6.0)
+    response = so.frequency_response(system, (1.6, 1.2), 7)
+    (event,) = so.track(response.bifurcations["NS"][0], "F", (4.0, 7.0)).bifurcations["LPNS"]
+    assert np.abs(shot(event) - 1.0).min() < 1e-2
+    curve = so.track(event, "F", (4.0, 7.0))
+    assert curve.kind == "BP"
+    expected = so.track(response.bifurcations["BP"][0], "F", (4.0, 7.0))
+    assert curve.omega[[0, -1]] == pytest.approx(expected.omega[[0, -1]], abs=1e-8)
+
+
 def test_double_neimark_sacker_and_a_curve_through_half_the_frequency():
     """With a half-wave symmetry two multipliers pass each other at -1: no 1:2 resonance, and no end."""
     elements = [so.Expression(dof=dof, expression=VAN_DER_POL) for dof in (0, 1)]

@@ -21,6 +21,7 @@ from suboctave.analysis.track_start import Box, curve_through, spans_of
 from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
@@ -28,6 +29,7 @@ from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.perturbation import Kind
 
 __all__ = ["aside", "curve_onto", "start_onto"]
 
@@ -35,6 +37,8 @@ __all__ = ["aside", "curve_onto", "start_onto"]
 _SHARES = (0.02, 0.01, 0.03, 0.005, 0.0025)
 #: the farthest that they lie from it, in scaled arclength, and their multipliers from the unit circle
 _NEAR, _CRITICAL = 0.2, 0.02
+#: component of the parameters' forces along the left null vector below which there is none
+_FORCED = 1e-6
 #: way along a curve from a point of codimension two, in scaled arclength, from which it is met like any other
 _ASIDE = 2e-3
 
@@ -93,11 +97,28 @@ def start_onto(
             )
         low, high = box.second
         return limit_point_beside(item, high - low)
+    if kind == "LP" and _symmetric(item, names):
+        kind = "BP"
     if kind != "NS":
         return replace(item, curve=kind, kappa=0.0)
     if item.kind in ("R1", "R2"):
         return _beside_resonance(item, names, box, newton)
     return replace(item, curve=kind, kappa=_frequency(item))
+
+
+def _symmetric(item: TrackedEvent, names: tuple[str, ...]) -> bool:
+    """Whether no parameter moves the multiplier +1: it belongs to branch points that a symmetry forces.
+
+    The equations of a limit point hold there, too, but are singular.
+    """
+    state = item.orbit.state()
+    left = null_vectors(state, Kind.INTEGER).left
+    scale = state.balance.row_weights(len(left))
+    for name in names:
+        slope = state.residual_by(name) * scale
+        if abs(float(left @ slope)) > _FORCED * length(slope):
+            return False
+    return True
 
 
 def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:
