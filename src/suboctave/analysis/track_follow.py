@@ -17,8 +17,9 @@ from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import Found, events_between, refined
 from suboctave.analysis.tracked_hidden import HiddenPairs
 from suboctave.analysis.tracked_located import as_event
+from suboctave.analysis.tracked_pairs import PairWatch
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
-from suboctave.analysis.tracked_tests import CurveTest, tests_of
+from suboctave.analysis.tracked_tests import CurveTest, PairCrossing, tests_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
 from suboctave.continuation.march import between, make_point
@@ -68,9 +69,12 @@ class _Tracker:
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
         self.trace = TrackedTrace()
-        self.tests: tuple[CurveTest, ...] = tests_of(start.curve)
+        tests = tests_of(start.curve)
+        self.tests: tuple[CurveTest, ...] = tuple(t for t in tests if not isinstance(t, PairCrossing))
         self.previous: TrackedSample | None = None
         self.hidden = HiddenPairs(self.tests, settings.newton)
+        pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
+        self.pairs = PairWatch(pairs, settings.newton)
         self.corners = 0
 
     def run(self) -> TrackedTrace:
@@ -85,7 +89,7 @@ class _Tracker:
                 heading = math.copysign(1.0, beyond.tangent[-1])
                 self.march = March(beyond, heading, self.box.second, self.settings.newton, stepping, self._clear)
             trace.closed = self.march.closed
-            self._take(self.hidden.rest(trace.warnings))
+            self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
             trace.events.sort(key=lambda event: event.arclength)
         except KeyboardInterrupt:
             where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
@@ -129,8 +133,9 @@ class _Tracker:
         settings, new = self.settings, TrackedSample(point)
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
-            self._take(self.hidden.rest(self.trace.warnings))
-            self.hidden.passed(new, self.trace.warnings)
+            for watch in (self.hidden, self.pairs):
+                self._take(watch.rest(self.trace.warnings))
+                watch.passed(new, self.trace.warnings)
             self._add(new)
             self.previous = new
             return None
@@ -147,7 +152,8 @@ class _Tracker:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
         warnings = self.trace.warnings
-        self._take(self.hidden.passed(new, warnings) + events_between(a, new, self.tests, settings.newton, warnings))
+        found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
+        self._take(found + events_between(a, new, self.tests, settings.newton, warnings))
         self._add(new)
         self.previous = new
         if settings.report is not None:

@@ -16,7 +16,6 @@ from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations,
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.extremum import ExtremalEquations
-from suboctave.bifurcation.measures import measured
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -135,6 +134,16 @@ class TrackedSample:
         """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
         return self._whole.sign if operator is Kind.INTEGER else self._half.sign
 
+    def determinant(self, operator: Kind) -> Array:
+        """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
+        state = self.state
+        factor = self._whole if operator is Kind.INTEGER else self._half
+        n = len(factor.lu)
+        rows = np.arange(n) // state.balance.size
+        f = (rows + 1) // 2 if operator is Kind.INTEGER else rows // 2 + 0.5
+        units = np.log(state.rate**2 * (1.0 + f**2)) - 2.0 * np.log(state.balance.row_weights(n))
+        return np.array([factor.sign, factor.log_determinant - float(units.sum())])
+
     @lazy
     def _whole(self) -> Factor:
         return Factor.of(self.state.jacobian)
@@ -158,11 +167,6 @@ class TrackedSample:
         distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
         result: ComplexArray = np.delete(mu, np.argsort(distance, kind="stable")[:count])
         return result
-
-    @lazy
-    def measures(self) -> Array:
-        """fold, double, torus of `bifurcation.measures` of the other multipliers, in columns 1 to 3, shape (2, 4)."""
-        return measured(1.0, self.others)
 
 
 def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:

@@ -120,11 +120,8 @@ class GeneralisedDoubling(CurveTest):
 
     def smooth(self, sample: TrackedSample) -> Array:
         """See `CurveTest.smooth`."""
-        sign, size = super().smooth(sample)
-        if sample.curve.balance.system.n == 1:
-            return np.array([sign, size])
-        fold = sample.measures[:, 1]
-        return np.array([sign * fold[0] * sample.sign(Kind.INTEGER), size + fold[1]])
+        _, size = super().smooth(sample)
+        return np.array([1.0 if self.value(sample) > 0.0 else -1.0, size + sample.determinant(Kind.INTEGER)[1]])
 
 
 @dataclass(frozen=True)
@@ -188,8 +185,7 @@ class RealCrossing(CurveTest):
 
     def smooth(self, sample: TrackedSample) -> Array:
         """See `CurveTest.smooth`."""
-        column: Array = sample.measures[:, 1 if self.operator is Kind.INTEGER else 2]
-        return column
+        return sample.determinant(self.operator)
 
     def genuine(self, sample: TrackedSample) -> bool:
         """See `CurveTest.genuine`: close to R1 and R2 the pair that an NS curve follows is critical itself."""
@@ -249,7 +245,7 @@ class PairCrossing(CurveTest):
 
     def smooth(self, sample: TrackedSample) -> Array:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
-        column: Array = sample.measures[:, 3]
+        column: Array = measures.measured(1.0, sample.others)[:, 3]
         return column
 
 
@@ -312,5 +308,6 @@ __all__ = [
     "DoubleMultiplier",
     "Extremum",
     "GeneralisedDoubling",
+    "PairCrossing",
     "tests_of",
 ]
