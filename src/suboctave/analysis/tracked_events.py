@@ -68,7 +68,7 @@ def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: Ne
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
     sample = sample if finer else stretch.zero(_RESOLVED)
-    return Found(own, sample, _extreme(test, low), stretch if finer else None)
+    return Found(own, sample, extreme_of(test, low), stretch if finer else None)
 
 
 def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
@@ -183,7 +183,8 @@ def _finer(sample: TrackedSample) -> HarmonicBasis | None:
     return basis if basis.harmonics > curve.balance.basis.harmonics else None
 
 
-def _extreme(test: CurveTest, a: TrackedSample) -> str:
+def extreme_of(test: CurveTest, a: TrackedSample) -> str:
+    """Whether a parameter that turns behind a point has a maximum or a minimum; empty for other events."""
     if not isinstance(test, Extremum):
         return ""
     return "maximum" if a.point.tangent[a.curve.index(test.name)] > 0.0 else "minimum"
@@ -220,4 +221,4 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
 
 
-__all__ = ["Found", "events_between", "located", "refined"]
+__all__ = ["Found", "events_between", "extreme_of", "located", "refined"]

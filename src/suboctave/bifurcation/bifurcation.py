@@ -35,6 +35,8 @@ KINDS = {
     "LPNS": "fold-Neimark-Sacker",
     "PDNS": "flip-Neimark-Sacker",
     "NSNS": "double Neimark-Sacker",
+    "isola_centre": "a closed branch shrinks to a point",
+    "isola_merging": "a closed branch meets another branch",
 }
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)
