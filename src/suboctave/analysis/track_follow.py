@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from suboctave.analysis.extremum import polished
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
@@ -139,7 +138,7 @@ class _Tracker:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
         for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
-            item = polished(refined(found, settings.newton, self.trace.warnings), settings.newton)
+            item = refined(found, settings.newton, self.trace.warnings)
             self.trace.events.append(as_event(item, settings.stability, settings.observe))
         self._add(new)
         self.previous = new

@@ -28,8 +28,8 @@ from suboctave.lazy import lazy
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
-#: way along a curve, in scaled arclength, that a zero may still be off by the last secant
-_AT_ZERO = 1e-10
+#: way along a curve, in scaled arclength, that a zero may still be off by the last secant, and the first secant's least
+_AT_ZERO, _SECANT = 1e-10, 1e-6
 
 
 class TrackedSample:
@@ -178,9 +178,12 @@ def zero_along(
     function: Callable[[TrackedSample], float],
     newton: NewtonOptions,
     reach: float,
+    slope: float = 0.0,
     iterations: int = 12,
 ) -> TrackedSample:
     """The zero of a function along a curve near one of its points, by secants in arclength.
+
+    `slope`: about the derivative of the function by arclength, 0 if that is not known.
 
     Raises
     ------
@@ -190,14 +193,17 @@ def zero_along(
     curve, weights = start.curve, start.weights
     row = weights * start.tangent
     row = row / length(row)
-
-    s, old = 0.02 * reach, 0.0
     value_old = function(TrackedSample(start))
+    step = -value_old / slope if slope != 0.0 else math.inf
+    # not so short that the secant would be one through rounding
+    s, old = math.copysign(min(max(abs(step), _SECANT), 0.02 * reach), step), 0.0
     guess = start.u + s * row / weights
     before = start.u
+    factor: Factor | None = None
     for _ in range(iterations):
-        solved = correct(curve, guess, row, weights, newton)
-        sample = TrackedSample(make_point(solved, curve, start.tangent, s))
+        solved = correct(curve, guess, row, weights, newton, factor)
+        factor = solved.factor
+        sample = TrackedSample(make_point(solved, curve, start.tangent, start.arclength + s))
         value = function(sample)
         if value == value_old and value != 0.0:
             break

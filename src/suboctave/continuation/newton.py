@@ -68,13 +68,18 @@ def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
     return Factor.of(filled(row, weights).T, overwrite=True)
 
 
-def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions) -> Solved:
+def correct(
+    curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions, known: Factor | None = None
+) -> Solved:
     """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
 
     Parameters
     ----------
     row
         Scaled row, shape (N + 1,): the unit tangent in scaled variables, or a unit vector to keep a parameter.
+    known
+        Factors of a point close by with the same row and weights: for a first correction, which is then made however
+        good the guess is.
 
     Raises
     ------
@@ -85,7 +90,7 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
     previous = np.inf
     contraction = 0.0
     first = 0.0
-    factor: Factor | None = None
+    factor = known
     for iteration in range(options.iterations + 1):
         evaluation = curve.evaluate(u)
         error = evaluation.error
@@ -93,13 +98,13 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
             raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
         # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
-        if error <= options.tolerance and (settled or iteration == 0):
+        if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             distance = kernels.distance(u, guess, weights)
             return Solved(u, evaluation, weights, bordered(evaluation, row, weights), iteration, distance, contraction)
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far
-        if factor is None or previous > _SHORT or contraction > 0.1:
+        if factor is None or (iteration > 0 and (previous > _SHORT or contraction > 0.1)):
             factor = bordered(evaluation, row, weights)
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
