@@ -85,6 +85,11 @@ class TrackedEvaluation:
         out[n:] *= self.curve.force
         return out
 
+    def takes_over(self, other: Evaluation) -> bool:
+        """See `Evaluation`."""
+        assert isinstance(other, TrackedEvaluation)
+        return self.equations.takes_over(other.equations)
+
     @lazy
     def error(self) -> float:
         """The larger of the residual in units of the forces that balance and the scalar equations'."""

@@ -23,6 +23,7 @@ import numpy as np
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.bifurcation.gaps import level_rate, levels
 from suboctave.bifurcation.grazing import basis_rows, read_direction
+from suboctave.harmonic import real_form
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, form_rates, parameter_gradient
 from suboctave.harmonic.selection import motion_size
@@ -56,6 +57,10 @@ class Equations(ABC):
     @abstractmethod
     def renewed(self) -> Augmentation:
         """The augmentation with bordering vectors of this motion."""
+
+    def takes_over(self, other: Equations) -> bool:
+        """Whether these keep the derivatives of the same equations at a motion that is a rounding away."""
+        return False
 
 
 def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
@@ -173,6 +178,16 @@ class SingularEquations(Equations):
     def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
         return gradient_of(self.bordered, self.names)
+
+    def takes_over(self, other: Equations) -> bool:
+        """Keep the gradient of a motion a rounding away, but for kappa: whether that vanishes is asked for."""
+        b = self.bordered
+        if type(other) is not SingularEquations or b.kind is Kind.FREE or not real_form.applies(self.state, ()):
+            return False
+        by_x, rates, _ = other.gradient
+        by_kappa = -real_form.by_kappa(self.state, b.kind is Kind.INTEGER, b.left, b.right)
+        self.__dict__["gradient"] = by_x, rates, by_kappa
+        return True
 
     @property
     def rows(self) -> Array:

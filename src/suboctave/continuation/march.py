@@ -252,7 +252,8 @@ class March:
             try:
                 guess = np.empty(len(point.u))
                 kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
-                solved = correct(point.curve, guess, point.weights * point.tangent, point.weights, self.newton)
+                row = point.weights * point.tangent
+                solved = correct(point.curve, guess, row, point.weights, self.newton, spare=True)
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)

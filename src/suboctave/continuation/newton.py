@@ -19,6 +19,8 @@ from suboctave.errors import ConvergenceError, InputError
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 _SHORT = 1e-3
+#: way in scaled arclength over which derivatives count as the same where they serve but the next prediction
+_SAME = 3e-7
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,13 @@ def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
 
 
 def correct(
-    curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions, known: Factor | None = None
+    curve: Curve,
+    guess: Array,
+    row: Array,
+    weights: Array,
+    options: NewtonOptions,
+    known: Factor | None = None,
+    spare: bool = False,
 ) -> Solved:
     """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
 
@@ -80,6 +88,8 @@ def correct(
     known
         Factors of a point close by with the same row and weights: for a first correction, which is then made however
         good the guess is.
+    spare
+        Keep the derivatives of the last iterate where it lies within `_SAME` of the point, if the evaluation can.
 
     Raises
     ------
@@ -87,6 +97,8 @@ def correct(
         If the iterations do not contract or run out.
     """
     u = guess.copy()
+    last: Evaluation | None = None
+    way = 0.0
     previous = np.inf
     contraction = 0.0
     first = 0.0
@@ -100,17 +112,22 @@ def correct(
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             distance = kernels.distance(u, guess, weights)
-            return Solved(u, evaluation, weights, bordered(evaluation, row, weights), iteration, distance, contraction)
+            takes_over = getattr(evaluation, "takes_over", None) if spare and last is not None and way <= _SAME else None
+            if factor is None or takes_over is None or not takes_over(last):
+                factor = bordered(evaluation, row, weights)
+            return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far
         if factor is None or (iteration > 0 and (previous > _SHORT or contraction > 0.1)):
             factor = bordered(evaluation, row, weights)
+            last, way = evaluation, 0.0
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         step = factor.solve(kernels.right_hand_side(evaluation.residual, row, weights, u, guess))
         share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
         u, size = kernels.moved(u, step, weights, share)
+        way += share * size
         if iteration == 0:
             first = size
         else:

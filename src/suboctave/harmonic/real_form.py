@@ -155,4 +155,12 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     return gx, by_omega, 1j * by_kappa
 
 
-__all__ = ["applies", "half_odd_values", "real_gradient", "toeplitz_part"]
+def by_kappa(state: BalanceState, mean: bool, left: Array, right: Array) -> complex:
+    """The derivative of `left^T J right` by kappa alone."""
+    assert isinstance(state.linear, StructuralMatrices)
+    u, v = (np.ascontiguousarray(one).reshape(-1, state.balance.size) for one in (left, right))
+    multiples = state.basis.multiples if mean else state.basis.half_multiples
+    return 1j * float(_linear_rates(u, v, mean, multiples, state.omega, state.linear.matrices)[1])
+
+
+__all__ = ["applies", "by_kappa", "half_odd_values", "real_gradient", "toeplitz_part"]
