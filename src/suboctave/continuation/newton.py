@@ -8,6 +8,7 @@ point.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +71,11 @@ def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
     return Factor.of(filled(row, weights).T, overwrite=True)
 
 
+def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
+    take: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
+    return take is not None and take(other)
+
+
 def correct(
     curve: Curve,
     guess: Array,
@@ -112,8 +118,7 @@ def correct(
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             distance = kernels.distance(u, guess, weights)
-            takes_over = getattr(evaluation, "takes_over", None) if spare and last is not None and way <= _SAME else None
-            if factor is None or takes_over is None or not takes_over(last):
+            if factor is None or not (spare and way <= _SAME and last is not None and _takes_over(evaluation, last)):
                 factor = bordered(evaluation, row, weights)
             return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
         if iteration == options.iterations:
