@@ -16,7 +16,7 @@ from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations,
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.extremum import ExtremalEquations
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
@@ -101,7 +101,8 @@ class TrackedSample:
         """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
         b, by_x = self.equations.bordered, self.equations.gradient[0].real
         by_motion = -by_x.reshape(self.state.x.shape)
-        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._other_factor)
+        weights = self.point.weights[: self.state.x.size]
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, lambda rhs: self._plain.solve(rhs) / weights)
 
     @lazy
     def coefficient(self) -> float:
@@ -128,15 +129,20 @@ class TrackedSample:
         equations = self.evaluation.equations
         return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
-    @property
+    @lazy
     def other(self) -> float:
         """Sign of det J_half of an LP, of det J_0 of a PD."""
-        return self._other_factor.sign
+        limit = self.equations.of.kind is Kind.INTEGER
+        return Factor.of(self.state.half_jacobian).sign if limit else self._plain.sign
 
     @lazy
-    def _other_factor(self) -> Factor:
-        limit = self.equations.of.kind is Kind.INTEGER
-        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
+    def _plain(self) -> LeadingBlock:
+        """J_0, its columns in scaled arclength: the leading block of what the point was solved with."""
+        point, size = self.point, self.state.balance.dimension
+        whole = point.factor
+        if whole is None or whole.singular or len(point.u) > size + 4:
+            whole = Factor.of(self.state.jacobian / point.weights[:size])
+        return LeadingBlock(whole, size)
 
 
 def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:

@@ -9,10 +9,11 @@ general way.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from suboctave.bifurcation.normal_form_real import Expansion
-from suboctave.continuation.linear import Factor
 from suboctave.harmonic import real_form
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.bends import bends_of
@@ -21,7 +22,9 @@ from suboctave.harmonic.state import BalanceState
 from suboctave.harmonic.third import Multilinear
 
 
-def cubic_coefficient(state: BalanceState, phi: Array, psi: Array, by_motion: Array, factor: Factor) -> float:
+def cubic_coefficient(
+    state: BalanceState, phi: Array, psi: Array, by_motion: Array, solve: Callable[[Array], Array]
+) -> float:
     """c3 of a period doubling.
 
     Parameters
@@ -30,13 +33,13 @@ def cubic_coefficient(state: BalanceState, phi: Array, psi: Array, by_motion: Ar
         Right and left null vectors of J_half, in the coefficients' own units.
     by_motion
         Gradient of `psi.J_half phi` by the motion, shape (2 H + 1, size).
-    factor
-        Factors of J_0.
+    solve
+        Solves with J_0.
     """
     moving = any(e.depends_on_velocity for e in state.balance.elements)
     if state.nodal or moving or state.compliance is not None:
         own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
-        return own.cubic(factor.solve(-0.5 * own.squared()))[0]
+        return own.cubic(solve(-0.5 * own.squared()))[0]
     size = state.balance.size
     right, left = (_waves(v.reshape(-1, size)) for v in (phi, psi))
     second = np.zeros_like(state.x)
@@ -48,7 +51,7 @@ def cubic_coefficient(state: BalanceState, phi: Array, psi: Array, by_motion: Ar
             real_form.add_doubled_form(along, *part, found)
         second += np.multiply.outer(found[:-1], bend.out)
         third += float(found[-1])
-    bent = factor.solve(-0.5 * second.ravel())
+    bent = solve(-0.5 * second.ravel())
     return float(by_motion.ravel() @ bent) + third / 6.0
 
 

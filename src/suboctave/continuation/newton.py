@@ -20,8 +20,6 @@ from suboctave.errors import ConvergenceError, InputError
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 _SHORT = 1e-3
-#: way in scaled arclength over which derivatives count as the same where they serve but the next prediction
-_SAME = 3e-7
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ def correct(
     weights: Array,
     options: NewtonOptions,
     known: Factor | None = None,
-    spare: bool = False,
+    spare: float = 0.0,
 ) -> Solved:
     """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
 
@@ -95,7 +93,8 @@ def correct(
         Factors of a point close by with the same row and weights: for a first correction, which is then made however
         good the guess is.
     spare
-        Keep the derivatives of the last iterate where it lies within `_SAME` of the point, if the evaluation can.
+        Way in scaled arclength within which the derivatives of an iterate count as those of the point, if the
+        evaluation can keep them.
 
     Raises
     ------
@@ -118,7 +117,7 @@ def correct(
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             distance = kernels.distance(u, guess, weights)
-            if factor is None or not (spare and way <= _SAME and last is not None and _takes_over(evaluation, last)):
+            if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
                 factor = bordered(evaluation, row, weights)
             return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
         if iteration == options.iterations:
