@@ -152,7 +152,7 @@ class TrackedCurve:
         """Coefficients (2 H + 1, size), extra unknowns, omega and parameter values of a vector u."""
         n = self.balance.dimension
         x = u[:n].reshape(self.balance.basis.size, self.balance.size)
-        extra, parameters = np.split(u[n:], [self.augmentation.extras])
+        extra, parameters = u[n : -len(self.names)], u[-len(self.names) :]
         free = dict(zip(self.names, parameters.tolist(), strict=True))
         omega = free.pop("omega", self.omega)
         return x, extra, omega, {**self.balance.values, **free}
@@ -237,7 +237,7 @@ class TrackedCurve:
         basis, n = self.balance.basis, self.balance.dimension
         if basis.nu == 1:
             return [u]
-        extra, parameters = np.split(u[n:], [self.augmentation.extras])
+        extra, parameters = u[n : -len(self.names)], u[-len(self.names) :]
         found = []
         for shift in range(basis.nu):
             turn = 2.0 * np.pi * shift / basis.nu

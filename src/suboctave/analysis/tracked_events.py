@@ -310,7 +310,9 @@ class _Stretch:
         """
         first, last = self.values[0.0], self.values[1.0]
         self.value(self._turn())
-        little = 0.0 if resolved else _LITTLE * min(abs(first), abs(last))
+        # components of a tangent change evenly; others may be large at one end
+        size = max if isinstance(self.test, Extremum) else min
+        little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
         share = self._root(resolved or _RESOLVED, little)
         value, way = self.value(share), self.b.point.arclength - self.a.point.arclength
         slope = last - first

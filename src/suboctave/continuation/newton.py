@@ -103,7 +103,7 @@ def correct(
     """
     u = guess.copy()
     last: Evaluation | None = None
-    way = 0.0
+    way = before = 0.0
     previous = np.inf
     contraction = 0.0
     first = 0.0
@@ -122,12 +122,15 @@ def correct(
             return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
         if iteration == options.iterations:
             break
-        # after a short step that contracts, the old factors take the next one as far
-        if factor is None or (iteration > 0 and (previous > _SHORT or contraction > 0.1)):
+        # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
+        # ones are those of the point as well
+        stale = previous > _SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
+        if factor is None or (iteration > 0 and stale):
             factor = bordered(evaluation, row, weights)
             last, way = evaluation, 0.0
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
+        before = error
         step = factor.solve(kernels.right_hand_side(evaluation.residual, row, weights, u, guess))
         share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
         u, size = kernels.moved(u, step, weights, share)
