@@ -30,6 +30,8 @@ from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 
+_NAMES = {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}
+
 
 class Equations(ABC):
     """The scalar equations at one motion, dimensionless."""
@@ -134,7 +136,7 @@ class SingularOperator(Augmentation):
     @property
     def name(self) -> str:
         """Kind of bifurcation."""
-        return {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}[self.kind]
+        return _NAMES[self.kind]
 
     @property
     def extras(self) -> int:
@@ -193,9 +195,10 @@ class SingularEquations(Equations):
     def rows(self) -> Array:
         """See `Equations.rows`."""
         by_x, rates, by_kappa = self.gradient
-        extra = [by_kappa] if self.of.extras else []
-        whole = np.concatenate((by_x, extra, [rates[name] for name in self.names])) / self.of.unit
-        return np.array([whole.real, whole.imag] if self.of.extras else [whole.real])
+        if not self.of.extras:
+            return np.append(by_x.real, [rates[name].real for name in self.names])[None] / self.of.unit
+        whole = np.concatenate((by_x, [by_kappa], [rates[name] for name in self.names])) / self.of.unit
+        return np.array([whole.real, whole.imag])
 
     def renewed(self) -> SingularOperator:
         """See `Equations.renewed`."""

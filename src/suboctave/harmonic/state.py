@@ -213,7 +213,8 @@ class BalanceState:
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
-        if not isinstance(self.linear, StructuralMatrices) or self.basis.kept is not None:
+        known = "jacobian" in self.__dict__
+        if known or not isinstance(self.linear, StructuralMatrices) or self.basis.kept is not None:
             out = np.column_stack((self.jacobian, np.zeros(self.balance.dimension)))
             out[:, -1] = self.residual_by(name)
             return out
