@@ -339,8 +339,11 @@ class _Stretch:
             found = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
         except ConvergenceError:
             found = None
-        inside = found is not None and low <= found.point.arclength <= high
-        return found if found is not None and inside else self.zero(_RESOLVED)
+        # tangents at the ends may be those of points a rounding away
+        slack = _ROUGH * (high - low)
+        if found is not None and low - slack <= found.point.arclength <= high + slack:
+            return found
+        return self.zero(_RESOLVED)
 
     def zero(self, resolved: float) -> TrackedSample:
         """Where the test vanishes, to a share of the way."""
