@@ -3,6 +3,8 @@
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
+from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isolas import find_isolas
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
@@ -15,6 +17,8 @@ __all__ = [
     "BifurcationDiagram",
     "Branch",
     "BranchPoint",
+    "Isola",
+    "Isolas",
     "Results",
     "Seeds",
     "Table",
@@ -22,6 +26,7 @@ __all__ = [
     "Verification",
     "bifurcation_diagram",
     "continue_branch",
+    "find_isolas",
     "find_subharmonics",
     "frequency_response",
     "load",

@@ -3,15 +3,16 @@
 Such a motion answers a load of frequency omega mostly at `k omega / nu`, near a nonlinear resonance there: a free
 vibration `A phi cos(k omega t / nu)` in a linear mode phi whose amplitude makes that its own frequency,
 
-    phi . [K - (k omega / nu)^2 M] phi A + (1 / pi) int_0^{2 pi} phi . f(A phi cos theta) cos theta dtheta = 0.
+    phi . [K - (k omega / nu)^2 M] phi A + (1 / pi) int_0^{2 pi} phi . f(A phi cos theta) cos theta dtheta = 0,
 
-Seeds are such vibrations, in several phases against the load, on top of the linear response; Newton's method decides
-whether there is a motion nearby. A branch is followed from each new one, both ways.
+and then with its shape free as well. Seeds are such vibrations, in several phases against the load, on top of the
+linear response; Newton's method decides whether there is a motion nearby. A branch is followed from each new one, both
+ways.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import gcd
 from typing import Any
@@ -44,10 +45,11 @@ from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.timedomain import integrate
 
-__all__ = ["Seeds", "find_subharmonics", "periodic_orbit", "subharmonic_start"]
+__all__ = ["Seeds", "find_subharmonics", "isolated_branches", "periodic_orbit", "subharmonic_start"]
 
 #: part of a motion at fractions of omega below which it is taken for a motion of the load's period
 _SUBHARMONIC = 1e-3
+_FREE_ITERATIONS = 12
 
 
 @dataclass(frozen=True)
@@ -117,23 +119,59 @@ def find_subharmonics(
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
     settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
-    low, high = min(first, last), max(first, last)
-    curve = make_curve(system, "omega", first, high - low, harmonics, order, linear)
+    curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, linear)
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
     options = options_of(settings, harmonics, {"omega": (first, last)})
     computation_begins()
-    found: list[Branch] = []
     with one_thread(), reporting(progress, f"{period_name(order)} motions") as report:
         settings = replace(settings, report=report)
-        for point in _motions(curve, (first, last), seeds or Seeds(), settings):
-            if any(_on(branch, point) for branch in found):
-                continue
-            trace = both_ways(point, float(np.sign(last - first)), (low, high), settings)
-            if trace.points:
-                found.append(make_branch(system, "omega", trace, settings, options))
-            if trace.interrupted:
-                break
-    return found
+        return list(_branches(curve, (first, last), seeds or Seeds(), settings, options))
+
+
+def isolated_branches(
+    system: System,
+    omega: tuple[float, float],
+    order: int,
+    known: Sequence[Branch],
+    harmonics: Harmonics = "adaptive",
+    *,
+    seeds: Seeds | None = None,
+    max_step: float | None = None,
+    observe: int | None = None,
+    newton: NewtonOptions | None = None,
+    stepping: SteppingOptions | None = None,
+    stability: StabilityMethod | str | None = None,
+) -> list[Branch]:
+    """As `find_subharmonics`, for any period from that of the load on, without the branches that are known."""
+    first, last = omega
+    settings = make_settings(system, max_step, observe, (), newton, stepping, stability, None)
+    curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, None)
+    curve.reference = max(curve.size(linear_response(curve, v)) for v in omega)
+    options = options_of(settings, harmonics, {"omega": omega})
+    with one_thread():
+        return list(_branches(curve, omega, seeds or Seeds(), settings, options, known))
+
+
+def _branches(
+    curve: ResponseCurve,
+    bounds: tuple[float, float],
+    seeds: Seeds,
+    settings: Settings,
+    options: dict[str, Any],
+    known: Sequence[Branch] = (),
+) -> Iterator[Branch]:
+    """The branches of the motions that a search meets, each once, without those that are known."""
+    first, last = bounds
+    found = list(known)
+    for point in _motions(curve, bounds, seeds, settings):
+        if any(_on(branch, point) for branch in found):
+            continue
+        trace = both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
+        if trace.points:
+            found.append(make_branch(curve.balance.system, "omega", trace, settings, options))
+            yield found[-1]
+        if trace.interrupted:
+            return
 
 
 def subharmonic_start(
@@ -254,15 +292,15 @@ def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array
     balance = curve.balance
     nu = balance.basis.nu
     base = linear_response(curve, value)
-    for k in range(1, nu):
+    for k in range(1, max(nu, 2)):
         if gcd(k, nu) > 1:
             continue
         for shape in _modes(balance)[: seeds.modes]:
-            for amplitude in _resonant(curve, value, value * k / nu, shape):
+            for cosines in _resonant(curve, value, value * k / nu, shape):
                 for phase in 2.0 * np.pi * k / nu * np.arange(seeds.phases) / seeds.phases:
                     x = curve.split(base)[0].copy()
-                    x[2 * k - 1] += amplitude * np.cos(phase) * shape
-                    x[2 * k] += amplitude * np.sin(phase) * shape
+                    x[2 * k - 1] += np.cos(phase) * cosines
+                    x[2 * k] += np.sin(phase) * cosines
                     yield curve.join(x, value)
 
 
@@ -277,25 +315,47 @@ def _modes(balance: HarmonicBalance) -> list[Array]:
     return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
 
 
-def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array) -> list[float]:
-    """Amplitudes at which a mode vibrates freely at a frequency, by its first harmonic; some guesses without any."""
+def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array) -> list[Array]:
+    """Free vibrations at a frequency by their first harmonic, cosines of each DOF: those that continue a linear mode.
+
+    Where there are none some guesses in the shape of the mode.
+    """
     single = HarmonicBalance(
         curve.balance.system, HarmonicBasis(5), curve.balance.values, curve.balance.linear, curve.balance.samples
     )
-    unit = curve.reference or 1.0
-    sizes = unit * np.geomspace(1e-3, 1e4, 71)
     load = single.load(single.values, frequency)
-    pull = []
-    for size in sizes:
+
+    def pull(cosines: Array) -> tuple[Array, Array]:
+        """What is left of the first harmonic's cosines without loads, and its derivative."""
         x = np.zeros((single.basis.size, single.size))
-        x[1] = size * shape
+        x[1] = cosines
         state = single.at(x, frequency)
         rest = state.residual.reshape(x.shape) + (load if state.compliance is None else 0.0)
-        pull.append(float(shape @ rest[1]) / size)
-    values = np.array(pull)
+        own = slice(single.size, 2 * single.size)
+        return rest[1], state.jacobian[own, own]
+
+    unit = curve.reference or 1.0
+    sizes = unit * np.geomspace(1e-3, 1e4, 71)
+    values = np.array([float(shape @ pull(size * shape)[0]) / size for size in sizes])
     crossed = np.flatnonzero(np.isfinite(values[1:]) & (values[:-1] * values[1:] < 0.0))
     found = [float(sizes[i] + (sizes[i + 1] - sizes[i]) * values[i] / (values[i] - values[i + 1])) for i in crossed]
-    return found or [float(s) for s in unit * np.array([0.3, 1.0, 3.0, 10.0])]
+    if not found:
+        return [float(size) * shape for size in unit * np.array([0.3, 1.0, 3.0, 10.0])]
+    return [_free(pull, size * shape) for size in found]
+
+
+def _free(pull: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
+    """The free vibration near one in the shape of a linear mode, which couples to the others; the start if none is."""
+    a = start
+    for _ in range(_FREE_ITERATIONS):
+        rest, slope = pull(a)
+        if not (np.isfinite(rest).all() and np.isfinite(slope).all()):
+            return start
+        step = np.asarray(np.linalg.lstsq(slope, rest, rcond=None)[0], dtype=np.float64)
+        a = a - step * min(1.0, 0.5 * length(a) / (length(step) or 1.0))
+        if length(step) <= 1e-6 * length(a):
+            return a if length(a) >= 0.1 * length(start) else start
+    return start
 
 
 def _lasts(curve: ResponseCurve, u: Array) -> bool:

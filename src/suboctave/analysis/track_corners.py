@@ -28,8 +28,9 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 _GRAZES = 1e-3
 #: the same, from which on it is clear on which side of the gap the curve has come
 _CLEAR = 1e-6
-#: ways in height at which the far side is looked for, and how far it may lie then, in scaled arclength
-_HEIGHTS, _NEAR = (1e-5, 1e-4, 1e-6, 1e-3, 1e-7), 0.05
+#: ways in height at which the far side is looked for, the nearest first (what happens before the point found is not
+#: seen), and how far it may lie then, in scaled arclength
+_HEIGHTS, _NEAR = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 0.05
 
 
 def beyond_corner(

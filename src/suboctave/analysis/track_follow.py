@@ -13,7 +13,7 @@ from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, 
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import CurveTest, events_between, refined, tests_of
+from suboctave.analysis.tracked_events import CurveTest, Extremum, Found, events_between, extreme_of, refined, tests_of
 from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.bifurcation.tracked import TrackedEvent
@@ -109,7 +109,23 @@ class _Tracker:
             return None
         point, note = found
         self.trace.warnings.append(note)
-        return point if point is not None and self._inside(TrackedSample(point)) else None
+        if point is None or not self._inside(TrackedSample(point)):
+            return None
+        self._turn_at_corner(last, point)
+        return point
+
+    def _turn_at_corner(self, last: TrackedSample, beyond: CurvePoint) -> None:
+        """Parameters that run the other way behind a corner have an extremum in it, known as well as the corner is."""
+        for test in self.tests:
+            if not isinstance(test, Extremum):
+                continue
+            i = last.curve.index(test.name)
+            if last.point.tangent[i] * beyond.tangent[i] < 0.0:
+                found = Found(test, last, extreme_of(test, last))
+                event = as_event(found, self.settings.stability, self.settings.observe)
+                width = abs(float(beyond.u[i] - last.point.u[i]))
+                middle = 0.5 * (last.point.arclength + beyond.arclength)
+                self.trace.events.append(replace(event, isola="", uncertainty=width, arclength=middle))
 
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:

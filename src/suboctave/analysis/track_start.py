@@ -49,8 +49,8 @@ class Box:
 
 
 def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
-    """Whether something is an extremum along a tracked curve."""
-    return isinstance(item, TrackedEvent) and item.kind == "extremum"
+    """Whether something is an extremum along a tracked curve, the ends of isolas among them."""
+    return isinstance(item, TrackedEvent) and bool(item.extreme)
 
 
 def kind_of(item: Bifurcation) -> str:

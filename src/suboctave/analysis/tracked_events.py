@@ -200,7 +200,7 @@ def events_between(
                 # what more harmonics will move need not be known better
                 finer = _finer(sample) is not None
                 sample = sample if finer else stretch.zero_from(sample, slope)
-                found.append(Found(test, sample, _extreme(test, low), stretch if finer else None, slope))
+                found.append(Found(test, sample, extreme_of(test, low), stretch if finer else None, slope))
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
     if b.curve.augmentation.turning:
@@ -376,7 +376,8 @@ def _finer(sample: TrackedSample) -> HarmonicBasis | None:
     return basis if basis.harmonics > curve.balance.basis.harmonics else None
 
 
-def _extreme(test: CurveTest, a: TrackedSample) -> str:
+def extreme_of(test: CurveTest, a: TrackedSample) -> str:
+    """Whether a parameter that turns behind a point has a maximum or a minimum; empty for other events."""
     if not isinstance(test, Extremum):
         return ""
     return "maximum" if a.point.tangent[a.curve.index(test.name)] > 0.0 else "minimum"
@@ -411,4 +412,4 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     return found if sample is found.sample else replace(found, sample=sample)
 
 
-__all__ = ["CurveTest", "Found", "events_between", "refined", "tests_of"]
+__all__ = ["CurveTest", "Extremum", "Found", "events_between", "extreme_of", "refined", "tests_of"]

@@ -32,6 +32,8 @@ KINDS = {
     "R3": "1:3 resonance",
     "R4": "1:4 resonance",
     "LPPD": "fold-flip",
+    "isola_centre": "a closed branch shrinks to a point",
+    "isola_merging": "a closed branch meets another branch",
 }
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)

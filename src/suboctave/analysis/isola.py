@@ -1,0 +1,337 @@
+"""Isolated responses over a design parameter: where they are born, where they merge, the closed branch in between."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.checks import is_number
+from suboctave.analysis.junction import period_name
+from suboctave.analysis.limit_curves import Leg, as_point
+from suboctave.analysis.tracked_branch import TrackedBranch, TrackedPoint
+from suboctave.analysis.verbs import continue_branch
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.model.system import System
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["Isola", "IsolaEnd", "Isolas"]
+
+
+class IsolaEnd(TrackedEvent, float):
+    """One end of an isola's life: the bifurcation there, and as a number the design parameter's value.
+
+    `kind` is "isola_centre" (the closed branch shrinks to a point) or "isola_merging" (it joins another branch). As any
+    extremum along a curve of bifurcations it can be tracked in a third parameter.
+    """
+
+    def __new__(cls, *positional: Any, **named: Any) -> IsolaEnd:
+        """The number; a copy is made from that alone."""
+        if not named:
+            return float.__new__(cls, *positional)
+        name, orbit = named["parameter_name"], named["orbit"]
+        return float.__new__(cls, orbit.omega if name == "omega" else orbit.values[name])
+
+    @classmethod
+    def of(cls, event: TrackedEvent, name: str, centre: bool) -> IsolaEnd:
+        """An extremum of a parameter, as an end."""
+        given = {f.name: getattr(event, f.name) for f in fields(event)}
+        return cls(**{**given, "kind": "isola_centre" if centre else "isola_merging", "parameter_name": name})
+
+    __hash__ = float.__hash__
+
+    def __repr__(self) -> str:
+        return f"{self.kind} at {self.parameter_name} = {float(self):.9g}, omega = {self.omega:.9g}"
+
+
+class Isola:
+    """A closed branch that no other branch leads to, over a range of a design parameter.
+
+    Attributes
+    ----------
+    system, parameter, omega
+        What vibrates, the design parameter's name, the range of frequencies that was asked for.
+    nu
+        Period of the motions in periods of the load.
+    born
+        Where the loop shrinks to a point (the extremum of its curve of limit points at which the quadratic form is
+        definite); None where that lies outside the bounds.
+    merges
+        Where it joins another branch; None where that lies outside the bounds, or where it shrinks to a point as well.
+    range
+        Between which values it is detached; (low, high).
+    ends
+        What happens at the lower and at the upper end, `IsolaEnd` or None; `reasons` says it in words.
+    limit_points
+        Its limit points over omega and the parameter, within the range, from end to end.
+    further
+        Curves of further limit points on it, if there are any.
+    notes
+        What could not be settled.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        parameter: str,
+        omega: tuple[float, float],
+        ends: tuple[IsolaEnd | None, IsolaEnd | None],
+        bounds: tuple[float, float],
+        reasons: tuple[str, str],
+        legs: Sequence[Leg],
+        options: dict[str, Any],
+        notes: Iterable[str] = (),
+        known: Iterable[tuple[float, Branch]] = (),
+    ) -> None:
+        self.system = system
+        self.parameter = parameter
+        self.omega = omega
+        self.ends = ends
+        self.range = bounds
+        self.reasons = reasons
+        self.legs = tuple(legs)
+        self.options = options
+        self.notes = tuple(notes)
+        self.nu = self.legs[0].nu
+        curves = curves_of(self.legs, bounds)
+        self.limit_points: TrackedBranch = curves[0]
+        self.further: tuple[TrackedBranch, ...] = tuple(curves[1:])
+        self._known = dict(known)
+
+    @property
+    def born(self) -> IsolaEnd | None:
+        """Where the closed branch shrinks to a point; None where the bounds cut that off."""
+        return next((end for end in self.ends if end is not None and end.kind == "isola_centre"), None)
+
+    @property
+    def merges(self) -> IsolaEnd | None:
+        """Where it joins another branch; None where the bounds cut that off, or where there is no such place."""
+        return next((end for end in self.ends if end is not None and end.kind == "isola_merging"), None)
+
+    def __contains__(self, value: float) -> bool:
+        return self.range[0] <= value <= self.range[1]
+
+    def at(self, value: float, *, progress: Any = None) -> Branch:
+        """The closed branch at a value of the parameter, over omega.
+
+        Raises
+        ------
+        InputError
+            Outside the range.
+        ConvergenceError
+            If its limit points are not found again, which may happen next to an end.
+        """
+        low, high = self.range
+        if not is_number(value) or not low <= value <= high:
+            raise InputError(f"this isola exists for {self.parameter} from {low:.9g} to {high:.9g}, not at {value!r}")
+        if value not in self._known:
+            self._known[value] = self._followed(float(value), progress)
+        return self._known[value]
+
+    def stable_ranges(self, value: float) -> list[tuple[float, float]]:
+        """Between which frequencies there are stable motions on the closed branch at a value; pairs of omega."""
+        return stable_ranges(self.at(value))
+
+    def _followed(self, value: float, progress: Any) -> Branch:
+        failure: ConvergenceError | None = None
+        for leg in self.legs:
+            if not leg.contains(value):
+                continue
+            try:
+                found = leg.limit_point(value)
+            except ConvergenceError as why:
+                failure = why
+                continue
+            return closed_branch(found, self.omega, self.legs, self.options, progress)
+        raise ConvergenceError(
+            f"no limit point of the isola was found at {self.parameter} = {value:.9g}"
+            + (f" ({failure})" if failure else "")
+        )
+
+    def __repr__(self) -> str:
+        low, high = self.range
+        text = f"{period_name(self.nu)} isola for {self.parameter} from {low:.7g} to {high:.7g}"
+        for reason in self.reasons:
+            text += f"\n  {reason}"
+        for note in self.notes:
+            text += f"\n  note: {note}"
+        return text
+
+
+def closed_branch(
+    limit_point: Bifurcation,
+    omega: tuple[float, float],
+    legs: Iterable[Leg],
+    options: dict[str, Any],
+    progress: Any = None,
+) -> Branch:
+    """The branch over omega through a limit point, in a range that holds the limit points of the curves known."""
+    places = [float(w) for leg in legs for w in leg.omega] + [limit_point.omega, *omega]
+    low, high = min(places), max(places)
+    margin = 0.02 * (high - low)
+    bounds = (max(low - margin, 0.5 * low), high + margin)
+    return continue_branch(limit_point, "omega", bounds, progress=progress, **options)
+
+
+def stable_ranges(branch: Branch) -> list[tuple[float, float]]:
+    """Between which frequencies a branch has stable motions; pairs of omega, ascending, overlapping ones joined."""
+    places, stable, omega = branch.arclength, branch.stable, branch.omega
+    changes = sorted((b.arclength, b.omega) for b in branch.bifurcations.met if b.kind != "grazing")
+    pieces = []
+    whole = float(places[-1])
+    if branch.closed and changes:
+        # the seam is no end
+        places, stable = (np.concatenate(pair) for pair in ((places, places[1:] + whole), (stable, stable[1:])))
+        ends = [*changes, (changes[0][0] + whole, changes[0][1])]
+    else:
+        ends = [(0.0, omega[0]), *changes, (whole, omega[-1])]
+    for (start, first), (stop, last) in pairwise(ends):
+        # on a located bifurcation itself the verdict is open
+        inside = (places > start) & (places < stop)
+        if inside.any() and np.median(stable[inside]) > 0.5:
+            pieces.append((float(min(first, last)), float(max(first, last))))
+    joined: list[tuple[float, float]] = []
+    for low, high in sorted(pieces):
+        if joined and low <= joined[-1][1]:
+            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
+        else:
+            joined.append((low, high))
+    return joined
+
+
+def curves_of(legs: Sequence[Leg], bounds: tuple[float, float]) -> list[TrackedBranch]:
+    """Curves of limit points made of legs, cut to a range of the parameter; the longest first."""
+    made = []
+    for curve in dict.fromkeys(leg.curve for leg in legs):
+        own = sorted((leg for leg in legs if leg.curve is curve), key=lambda leg: leg.nodes[0].arclength)
+        chains: list[list[Leg]] = []
+        for leg in own:
+            if chains and chains[-1][-1].ends[1] is not None and chains[-1][-1].ends[1] is leg.ends[0]:
+                chains[-1].append(leg)
+            else:
+                chains.append([leg])
+        if len(chains) > 1 and own[-1].ends[1] is not None and own[-1].ends[1] is own[0].ends[0]:
+            # across the seam of a closed curve
+            chains[0] = chains.pop() + chains[0]
+        made += [_joined(chain, bounds) for chain in chains]
+    return sorted(made, key=len, reverse=True)
+
+
+def _joined(chain: Sequence[Leg], bounds: tuple[float, float]) -> TrackedBranch:
+    """Successive legs of a curve as one, cut to a range."""
+    low, high = bounds
+    points: list[TrackedPoint] = []
+    for leg in chain:
+        inside = [node for node, value in zip(leg.nodes, leg.values, strict=True) if low <= value <= high]
+        rising = leg.values[-1] > leg.values[0]
+        for at_start in (True, False):
+            end = low if rising == at_start else high
+            if not leg.low < end < leg.high:
+                continue
+            with contextlib.suppress(ConvergenceError):
+                cut = as_point(leg.limit_point(end)).at(float(np.interp(end, *_ascending(leg))))
+                inside.insert(0 if at_start else len(inside), cut)
+        points += inside[1:] if points and inside and inside[0].orbit is points[-1].orbit else inside
+    curve = chain[0].curve
+    met = [e for e in curve.bifurcations.met if any(e.orbit is p.orbit for p in points) or _within(e, points)]
+    text = f"cut to {chain[0].name} from {low:.7g} to {high:.7g}"
+    options = curve.options
+    return TrackedBranch(
+        curve.kind, curve.names, curve.system, curve.name, points, met, [], False, text, curve.observe, options
+    )
+
+
+def _ascending(leg: Leg) -> tuple[Array, Array]:
+    """Values of a leg in ascending order, and the arclengths there."""
+    places = np.array([node.arclength for node in leg.nodes])
+    return (leg.values, places) if leg.values[-1] > leg.values[0] else (leg.values[::-1], places[::-1])
+
+
+def _within(event: Bifurcation, points: Sequence[TrackedPoint]) -> bool:
+    return bool(points) and points[0].arclength < event.arclength < points[-1].arclength
+
+
+class Isolas(Sequence[Isola]):
+    """Isolas in the order of the values at which they are born, and what was learnt on the way.
+
+    Attributes
+    ----------
+    system, parameter, bounds, omega
+        What was asked.
+    limit_points, doublings
+        All curves of limit points and of period doublings that were followed, in (omega, parameter).
+    notes
+        What could not be settled; empty if nothing was left open.
+    """
+
+    def __init__(
+        self,
+        isolas: Iterable[Isola],
+        system: System,
+        parameter: str,
+        bounds: tuple[float, float],
+        omega: tuple[float, float],
+        limit_points: Sequence[TrackedBranch] = (),
+        doublings: Sequence[TrackedBranch] = (),
+        notes: Iterable[str] = (),
+        said: str = "",
+    ) -> None:
+        self._items = tuple(sorted(isolas, key=lambda isola: (isola.born is None, isola.born or isola.range[1])))
+        self.system = system
+        self.parameter = parameter
+        self.bounds = bounds
+        self.omega = omega
+        self.limit_points = tuple(limit_points)
+        self.doublings = tuple(doublings)
+        self.notes = tuple(notes)
+        self.said = said
+        self.seconds = float("nan")
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @overload
+    def __getitem__(self, which: int) -> Isola: ...
+    @overload
+    def __getitem__(self, which: slice) -> tuple[Isola, ...]: ...
+    def __getitem__(self, which: int | slice) -> Isola | tuple[Isola, ...]:
+        return self._items[which]
+
+    def __iter__(self) -> Iterator[Isola]:
+        return iter(self._items)
+
+    def at(self, value: float) -> list[Branch]:
+        """The closed branches that exist at a value of the parameter."""
+        return [isola.at(value) for isola in self if value in isola]
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row for each isola: period, range, where it is born and merges, and the frequencies there."""
+        import pandas
+
+        name = self.parameter
+        rows = []
+        for isola in self:
+            row: dict[str, Any] = {"period": period_name(isola.nu), "from": isola.range[0], "to": isola.range[1]}
+            for word, end in (("born", isola.born), ("merges", isola.merges)):
+                row[f"{word} {name}"] = float("nan") if end is None else float(end)
+                row[f"{word} omega"] = float("nan") if end is None else end.omega
+            rows.append(row)
+        return pandas.DataFrame(rows)
+
+    def __repr__(self) -> str:
+        text = self.said
+        for isola in self:
+            text += "\n" + repr(isola)
+        for note in self.notes:
+            text += f"\nnote: {note}"
+        return text

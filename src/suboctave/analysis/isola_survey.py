@@ -1,0 +1,213 @@
+"""What a search for isolas knows: curves of limit points and period doublings, each once, and closed branches.
+
+Starting points come from the responses at several values of the design parameter and from the branches that bifurcate
+from them. Each limit point is followed over the parameter unless it lies on a curve that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.isola import closed_branch
+from suboctave.analysis.limit_curves import Leg, legs_of, same_motion
+from suboctave.analysis.making import Harmonics
+from suboctave.analysis.track import track
+from suboctave.analysis.tracked_branch import TrackedBranch
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.model.system import System
+
+__all__ = ["Loop", "Survey"]
+
+#: frequencies that differ by less, relatively, are one
+_SAME = 1e-6
+#: a limit point lies at most this many distances between neighbours away from the curve's chord
+_BESIDE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A branch over omega through a limit point, at a value of the parameter, and the legs its limit points lie on."""
+
+    value: float
+    branch: Branch
+    legs: tuple[Leg, ...]
+
+    @property
+    def detached(self) -> bool:
+        """Whether it closes on itself without meeting another branch."""
+        return self.branch.closed and self.branch.departs is None and self.branch.arrives is None
+
+
+@dataclass(eq=False)
+class Survey:
+    """Curves of limit points and period doublings of a system over a design parameter.
+
+    system, name, bounds, omega
+        What is looked at, `bounds` and `omega` ascending.
+    harmonics, depth, options
+        For the verbs that follow branches; `depth` as in `bifurcation_diagram`.
+    most
+        Curves after which no more are followed.
+    curves, legs, doublings
+        Curves of limit points over the parameter, their legs, curves of period doublings.
+    met
+        Branches that bifurcate from a response, or are one, by the value of the parameter.
+    """
+
+    system: System
+    name: str
+    bounds: tuple[float, float]
+    omega: tuple[float, float]
+    harmonics: Harmonics
+    depth: int
+    options: dict[str, Any]
+    most: int
+    curves: list[TrackedBranch] = field(default_factory=list)
+    doublings: list[TrackedBranch] = field(default_factory=list)
+    legs: list[Leg] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    met: dict[float, list[Branch]] = field(default_factory=dict)
+    report: Callable[[float, str], None] | None = None
+    _explained: set[tuple[float, int]] = field(default_factory=set)
+    _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
+
+    @property
+    def span(self) -> float:
+        """Width of the parameter's range."""
+        return self.bounds[1] - self.bounds[0]
+
+    def note(self, text: str) -> None:
+        """Something that could not be settled, told once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def say(self, share: float, where: str) -> None:
+        """Tell whoever wants to know."""
+        if self.report is not None:
+            self.report(share, where)
+
+    # ------------------------------------------------------------------------------------------------- limit points
+    def leg_of(self, item: Bifurcation, value: float) -> Leg | None:
+        """The known leg that a limit point at a value of the parameter lies on."""
+        for leg in self.legs:
+            if leg.nu != item.orbit.basis.nu or not leg.contains(value):
+                continue
+            expected, reach = leg.omega_near(value)
+            if abs(item.omega - expected) > _BESIDE * reach:
+                continue
+            try:
+                there = leg.limit_point(value)
+            except ConvergenceError:
+                continue
+            if abs(there.omega - item.omega) <= _SAME * item.omega and same_motion(there.orbit, item.orbit):
+                return leg
+        return None
+
+    def known(self, item: Bifurcation, value: float) -> Leg | None:
+        """The leg that a limit point lies on, after following it over the parameter if it is new; None if it fails."""
+        leg = self.leg_of(item, value)
+        if leg is not None or any(v == value and abs(b.omega - item.omega) <= _SAME * b.omega for v, b in self._lost):
+            return leg
+        curve = self._tracked(item, value)
+        if curve is not None:
+            self.curves.append(curve)
+            self.legs += legs_of(curve, self.name)
+            leg = self.leg_of(item, value)
+        if leg is None:
+            self._lost.append((value, item))
+            if curve is not None:
+                self.note(f"the limit point at omega = {item.omega:.6g}, {self.name} = {value:.6g} is not on its curve")
+        return leg
+
+    def doubling(self, item: Bifurcation, value: float) -> None:
+        """Follow a period doubling over the parameter, unless its curve is known."""
+        if any(_passes(curve, self.name, item, value) for curve in self.doublings):
+            return
+        curve = self._tracked(item, value)
+        if curve is not None:
+            self.doublings.append(curve)
+
+    def _tracked(self, item: Bifurcation, value: float) -> TrackedBranch | None:
+        where = f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}"
+        if len(self.curves) + len(self.doublings) >= self.most:
+            self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
+            return None
+        try:
+            around = 0.5 * self.omega[0], 2.0 * self.omega[1]
+            return track(item, self.name, self.bounds, omega=around, **self.options)
+        except (ConvergenceError, InputError) as failure:
+            self.note(f"the {where} could not be followed over {self.name}: {failure}")
+            return None
+
+    # --------------------------------------------------------------------------------------------------------- loops
+    def loop(self, leg: Leg, value: float) -> Loop | None:
+        """The branch through a leg's limit point at a value; None where it cannot be followed."""
+        try:
+            found = leg.limit_point(value)
+            branch = closed_branch(found, self.omega, [leg], self.options)
+        except ConvergenceError as failure:
+            omega, _ = leg.omega_near(value)
+            self.note(f"the branch at omega = {omega:.6g}, {self.name} = {value:.6g} could not be followed: {failure}")
+            return None
+        return self.loop_of(branch, value, leg)
+
+    def loop_of(self, branch: Branch, value: float, *known: Leg) -> Loop:
+        """A branch at a value with the legs that its limit points lie on."""
+        legs = list(known)
+        for item in branch.bifurcations["LP"]:
+            leg = self.known(item, value)
+            if leg is not None and leg not in legs:
+                legs.append(leg)
+        return Loop(value, branch, tuple(legs))
+
+    def attach(self, loop: Loop) -> None:
+        """A branch that is not detached: its limit points at that value are explained."""
+        if not loop.detached:
+            self.met.setdefault(loop.value, []).append(loop.branch)
+            self._explained |= {(loop.value, id(leg)) for leg in loop.legs}
+
+    def explained(self, leg: Leg, value: float) -> bool:
+        """Whether a leg's limit point at a value lies on a branch that is not detached."""
+        return (value, id(leg)) in self._explained
+
+    # ------------------------------------------------------------------------------------------------ critical values
+    def critical(self, nu: int, value: float, upper: bool) -> Iterator[tuple[float, list[TrackedEvent]]]:
+        """Values ahead at which branches of motions of `nu` load periods may change, with what happens there."""
+        events: list[TrackedEvent] = []
+        for leg in self.legs:
+            if leg.nu == nu:
+                events += [end for end in leg.ends if end is not None]
+        for curve in self.doublings:
+            if 2 * curve.nu == nu:
+                events += [e for e in curve.extrema if isinstance(e, TrackedEvent) and e.parameter_name == self.name]
+        sign = 1.0 if upper else -1.0
+        ahead = sorted(
+            {id(e): e for e in events if sign * (e.parameter(self.name) - value) > 0.0}.values(),
+            key=lambda e: sign * e.parameter(self.name),
+        )
+        group: list[TrackedEvent] = []
+        for event in ahead:
+            if group and abs(event.parameter(self.name) - group[0].parameter(self.name)) > 1e-10 * self.span:
+                yield group[0].parameter(self.name), group
+                group = []
+            group.append(event)
+        if group:
+            yield group[0].parameter(self.name), group
+
+
+def _passes(curve: TrackedBranch, name: str, item: Bifurcation, value: float) -> bool:
+    """Whether a curve of bifurcations passes through one at a value of the parameter."""
+    values, omega = curve.parameter(name), curve.omega
+    for i in range(len(values) - 1):
+        if (values[i] - value) * (values[i + 1] - value) > 0.0:
+            continue
+        share = (value - values[i]) / ((values[i + 1] - values[i]) or 1.0)
+        reach = 0.3 * abs(omega[i + 1] - omega[i]) + 1e-5 * item.omega
+        if abs(omega[i] + share * (omega[i + 1] - omega[i]) - item.omega) <= reach:
+            return True
+    return False

@@ -1,0 +1,167 @@
+"""Isolas over a design parameter: their ends, their closed branches, and that nothing depends on where one stands.
+
+Numbers of the reference oscillator by shooting (tests/data), those of the tuned absorber by harmonic balance with 5, 7
+and 9 harmonics alike; a Duffing oscillator under a load `F0 (1 - q^2)` against its closed form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+
+OMEGA = (1.3, 4.5)
+
+
+def reference(**values):
+    return so.library.reference_oscillator(regularization=3000.0, **values)
+
+
+@pytest.fixture(scope="module")
+def isolas():
+    return so.find_isolas(reference(j=0.0), OMEGA, "j", (0.0, 1.0))
+
+
+def test_the_isola_of_the_reference_oscillator(isolas):
+    (isola,) = isolas
+    assert (isola.nu, isolas.notes, isola.notes) == (2, (), ())
+    assert (isola.born.omega, float(isola.born)) == pytest.approx((2.355660, 0.579889), abs=2e-6)
+    assert (isola.merges.omega, float(isola.merges)) == pytest.approx((2.023364, 0.176829), abs=2e-6)
+    assert (isola.born.kind, isola.merges.kind) == ("isola_centre", "isola_merging")
+    assert isola.range == (isola.merges, isola.born)
+    # the cusp of the same curve is beside it, and is not its end
+    (curve,) = (c for c in isolas.limit_points if c.bifurcations["CP"])
+    (cusp,) = curve.bifurcations["CP"]
+    assert (cusp.omega, cusp.parameter("j")) == pytest.approx((2.022540, 0.176778), abs=2e-6)
+    assert "isola centre" in repr(isolas)
+
+
+@pytest.mark.parametrize(("gap", "folds"), [(0.3, (2.082514, 2.785675)), (0.5, (2.200149, 2.514902))])
+def test_its_limit_points_by_shooting(isolas, gap, folds):
+    branch = isolas[0].at(gap)
+    assert branch.closed
+    assert sorted(b.omega for b in branch.bifurcations["LP"]) == pytest.approx(folds, abs=2e-6)
+
+
+def test_closed_branches_between_its_ends(isolas):
+    (isola,) = isolas
+    span = isola.born - isola.merges
+    for gap in (0.2, 0.3, 0.4, 0.5, isola.merges + 1e-4 * span, isola.born - 1e-4 * span):
+        branch = isola.at(gap)
+        assert branch.closed
+        assert branch.nu == 2
+        assert branch.parameter("j") == pytest.approx(gap)
+        folds = [b.omega for b in branch.bifurcations["LP"]]
+        for low, high in isola.stable_ranges(gap):
+            assert min(folds) <= low < high <= max(folds)
+    with pytest.raises(so.InputError, match=r"from 0\.17682\d* to 0\.57988\d*"):
+        isola.at(0.6)
+    assert 0.3 in isola
+    assert 0.1 not in isola
+
+
+def test_stable_parts_by_shooting(isolas):
+    """At j = 0.2 period doublings interrupt the stable part; multipliers by shooting say the same."""
+    branch = isolas[0].at(0.2)
+    parts = isolas[0].stable_ranges(0.2)
+    assert len(parts) == 2
+    first, second = (b.omega for b in branch.bifurcations["PD"])
+    assert (parts[0][1], parts[1][0]) == pytest.approx(sorted((first, second)))
+    for index in range(3, len(branch), 17):
+        assert so.verify(branch.orbits[index]).agrees
+
+
+@pytest.mark.parametrize("gap", [0.3, 0.5, 0.9])
+def test_the_answer_does_not_depend_on_where_one_stands(isolas, gap):
+    (isola,) = so.find_isolas(reference(j=gap), OMEGA[::-1], "j", (1.0, 0.0))
+    assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "born", "merges"),
+    [((0.0, 0.45), None, 0.176829), ((0.25, 1.0), 0.579889, None), ((0.3, 0.5), None, None)],
+)
+def test_bounds_that_cut_its_range(bounds, born, merges):
+    (isola,) = so.find_isolas(reference(), OMEGA, "j", bounds, values=3)
+    assert isola.range == pytest.approx((merges or bounds[0], born or bounds[1]), abs=2e-6)
+    for end, expected in ((isola.born, born), (isola.merges, merges)):
+        assert end is None if expected is None else end == pytest.approx(expected, abs=2e-6)
+    assert sum("cuts its range" in reason for reason in isola.reasons) == (born is None) + (merges is None)
+    assert isola.at(0.4).closed
+
+
+def test_the_tuned_absorber():
+    (isola,) = so.find_isolas(so.library.nltva(F=0.11), (0.7, 4.0), "F", (0.05, 0.25))
+    assert isola.nu == 1
+    assert (float(isola.born), isola.born.omega) == pytest.approx((0.12466, 1.80265), abs=1e-5)
+    assert (float(isola.merges), isola.merges.omega) == pytest.approx((0.18562, 1.44059), abs=1e-5)
+    assert isola.at(0.15).closed
+
+
+def test_the_exact_law():
+    (isola,) = so.find_isolas(so.library.reference_oscillator(), OMEGA, "j", (0.0, 1.0))
+    assert (isola.born.omega, float(isola.born)) == pytest.approx((2.353543, 0.581107), abs=2e-6)
+    assert isola.at(0.4).closed
+
+
+def test_a_system_without_any():
+    system = so.System(
+        mass=1.0,
+        damping=0.1,
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient=1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 0.3},
+    )
+    isolas = so.find_isolas(system, (0.6, 2.5), "F", (0.05, 0.5))
+    assert list(isolas) == []
+    assert "No isola of T" in repr(isolas)
+    assert isolas.limit_points
+    assert len(isolas.to_dataframe()) == 0
+
+
+def test_a_third_of_the_frequency_is_searched_for():
+    """The 1/3 sub-harmonic isola of a Duffing oscillator: no branch leads to it; born as the load grows."""
+    system = so.System(
+        mass=1.0,
+        damping=0.02,
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient=0.05)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 5.0},
+    )
+    (isola,) = so.find_isolas(system, (2.5, 9.0), "F", (0.1, 5.0), search=(3,), values=[5.0])
+    assert isola.nu == 3
+    assert isola.born is not None
+    assert (isola.range[0], isola.range[1]) == (isola.born, 5.0)
+    folds = sorted(b.omega for b in isola.at(5.0).bifurcations["LP"])
+    assert folds == pytest.approx([3.081375, 7.310848], abs=2e-6)
+
+
+def test_ends_can_be_tracked_again(isolas):
+    curve = so.track(isolas[0].born, "p", (0.5, 0.6))
+    assert set(curve.isola) == {"isola_centre"}
+    (isola,) = so.find_isolas(reference(p=0.6), OMEGA, "j", (0.3, 0.9), values=3)
+    end = int(np.argmax(curve.parameter("p")))
+    assert isola.born == pytest.approx(curve.parameter("j")[end], abs=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"parameter": "k"}, "parameter"),
+        ({"values": 1}, "at least 2"),
+        ({"values": [0.5, 1.5]}, "within the bounds"),
+        ({"search": (0,)}, "periods"),
+        ({"search": "2"}, "periods"),
+        ({"depth": -1}, "depth"),
+        ({"max_curves": True}, "max_curves"),
+        ({"seeds": 3}, "Seeds"),
+        ({"omega": (0.0, 1.0)}, "omega"),
+    ],
+)
+def test_wrong_input_is_refused(changes, said):
+    given = {"system": reference(), "omega": OMEGA, "parameter": "j", "bounds": (0.0, 1.0), **changes}
+    with pytest.raises(so.InputError, match=said):
+        so.find_isolas(**given)
