@@ -12,7 +12,7 @@ import numpy as np
 
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.arctangent import add_step
-from suboctave.harmonic.instants import _jet, crossings_of
+from suboctave.harmonic.instants import crossings_of
 from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
 
 
@@ -106,24 +106,6 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
             pr[j] = t
 
 
-@kernel()
-def bends_of_smooth_steps(sampled, steps):
-    """Second and third derivatives of arctan steps by the displacement, times the nodes' weights, (2, N); arguments as
-    in `add_smooth_steps`.
-    """
-    n = sampled.shape[1]
-    out = np.zeros((2, n))
-    for s in range(steps.shape[0]):
-        point, sharpness = steps[s, 0], 1.0 / steps[s, 1]
-        scale = steps[s, 2] * sharpness / math.pi
-        for j in range(n):
-            ratio = (sampled[3, j] - point) * sharpness
-            share = 1.0 / (1.0 + ratio * ratio)
-            out[0, j] += sampled[2, j] * scale * share
-            out[1, j] -= 2.0 * sampled[2, j] * scale * sharpness * ratio * share * share
-    return out
-
-
 @kernel(patience=QUICK, fastmath=_FAST)
 def add_smooth_steps(sampled, steps, line, force, stiffness):
     """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.
@@ -168,29 +150,6 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         if q + 1 < force.shape[0]:
             force[q + 1] += complex(gr, -gi)
             stiffness[q + 1] += complex(tr, -ti)
-
-
-@kernel()
-def contact_comb(c, pieces, grid_r, grid_i):
-    """Instants at which the gaps of piecewise-linear pieces are crossed: cosines, sines, and the weights of `f_uu`
-    there, `side stiffness / |u'|`, with |u'| kept from zero where the motion grazes; how many of the columns count.
-    """
-    values = motion(c, grid_r, grid_i)
-    largest = 1e-300
-    for h in range(c.shape[0]):
-        largest = max(largest, abs(c[h]))
-    out = np.empty((3, 4 * grid_r.shape[0] * max(1, pieces.shape[0])))
-    count = 0
-    for p in range(pieces.shape[0]):
-        found, _above = crossings_of(c, pieces[p, 1], values)
-        for i in range(found.shape[0]):
-            zr, zi = math.cos(found[i]), math.sin(found[i])
-            speed = abs(_jet(c, zr, zi)[1])
-            out[0, count] = zr
-            out[1, count] = zi
-            out[2, count] = pieces[p, 2] * pieces[p, 0] / max(speed, 1e-12 * largest)
-            count += 1
-    return out, count
 
 
 @kernel()
