@@ -277,47 +277,51 @@ def tangent_matrix(out, stiffness, damping, moving, rate, mean, starts, dofs, sh
     """
     count = stiffness.shape[1] // 2
     first = 0 if mean else 1
+    # the mean has a cosine only: what follows it lies one place further to the left
+    shift = 1 - first
+    high = stiffness.shape[1] - 1
+    spectra = np.empty((4, 2 * high + 1))
+    lines = np.empty((2, count, 2))
     for g in range(stiffness.shape[0]):
-        begin, end = starts[g], starts[g + 1]
-        k = stiffness[g]
-        c = damping[g]
+        # of all orders -high .. high, and seen through views: no index has to be asked for its sign
+        for q in range(high + 1):
+            spectra[0, high + q] = spectra[0, high - q] = stiffness[g, q].real
+            spectra[1, high + q], spectra[1, high - q] = stiffness[g, q].imag, -stiffness[g, q].imag
+            spectra[2, high + q] = spectra[2, high - q] = damping[g, q].real
+            spectra[3, high + q], spectra[3, high - q] = damping[g, q].imag, -damping[g, q].imag
         for i in range(count):
-            row_mean = mean and i == 0
-            row = 0 if row_mean else (2 * i - 1 if mean else 2 * i)
+            # the orders j - i and i + j
+            low, top = spectra[:, high - i :], spectra[:, high + i + first :]
             for j in range(count):
-                col_mean = mean and j == 0
-                col = 0 if col_mean else (2 * j - 1 if mean else 2 * j)
-                total = i + j + first
-                gr = k[i - j].real if i >= j else k[j - i].real
-                gi = k[i - j].imag if i >= j else -k[j - i].imag
-                pr, pi = k[total].real, k[total].imag
+                gr, gi = low[0, j], -low[1, j]
+                pr, pi = top[0, j], top[1, j]
                 a = gr + pr
                 b = gi - pi
                 e = -gi - pi
                 d = gr - pr
                 if moving[g]:
                     w = (j + 0.5 * first) * rate
-                    gr = c[i - j].real if i >= j else c[j - i].real
-                    gi = c[i - j].imag if i >= j else -c[j - i].imag
-                    pr, pi = c[total].real, c[total].imag
+                    gr, gi = low[2, j], -low[3, j]
+                    pr, pi = top[2, j], top[3, j]
                     a -= w * (gi - pi)
                     b += w * (gr + pr)
                     e -= w * (gr - pr)
                     d += w * (-gi - pi)
-                if row_mean:
-                    a *= 0.5
-                    b *= 0.5
-                for s in range(begin, end):
-                    for t in range(begin, end):
-                        v = shape[s] * shape[t]
-                        r, q = row * n + dofs[s], col * n + dofs[t]
-                        out[r, q] += v * a
-                        if not col_mean:
-                            out[r, q + n] += v * b
-                        if not row_mean:
-                            out[r + n, q] += v * e
-                            if not col_mean:
-                                out[r + n, q + n] += v * d
+                lines[0, j, 0], lines[0, j, 1] = a, b
+                lines[1, j, 0], lines[1, j, 1] = e, d
+            # the row of the mean holds halves, and has no sine beside it
+            rows, half = (1, 0.5) if mean and i == 0 else (2, 1.0)
+            row = max(0, 2 * i - shift)
+            for s in range(starts[g], starts[g + 1]):
+                for t in range(starts[g], starts[g + 1]):
+                    v = half * shape[s] * shape[t]
+                    for part in range(rows):
+                        target, line = out[(row + part) * n + dofs[s], dofs[t] :], lines[part]
+                        if mean:
+                            target[0] += v * line[0, 0]
+                        for j in range(shift, count):
+                            target[(2 * j - shift) * n] += v * line[j, 0]
+                            target[(2 * j - shift + 1) * n] += v * line[j, 1]
 
 
 @kernel()
