@@ -90,7 +90,7 @@ def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, movin
             third = third * u + p * (p - 1) * (p - 2) * law.polynomial[p]
         yield _in_displacement(nodes.zr, nodes.zi, nodes.weights * third, None, moving)
     if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
+        sampled = graded_motion(motion, *law.told_places, top, moving=False)
         third = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[1]
         yield _in_displacement(sampled[0], sampled[1], third, None, moving)
     for members, points, widths in (

@@ -222,7 +222,7 @@ def add_sampled_spectra(
     """
     top, high = out[0].shape[0] - 1, motion.shape[0] - 1
     if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
+        sampled = graded_motion(motion, *law.told_places, top, moving=False)
         group_kernels.add_smooth_steps(sampled, law.smooth_steps, law.line, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
@@ -285,7 +285,7 @@ def curvature_of(
             bend = bend * u + p * (p - 1) * law.polynomial[p]
         parts.append(Curvature(nodes.zr, nodes.zi, nodes.weights * bend, None, None))
     if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
+        sampled = graded_motion(motion, *law.told_places, top, moving=False)
         bend = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[0]
         parts.append(Curvature(sampled[0], sampled[1], bend, None, None))
     for members, points, widths in (

@@ -128,7 +128,7 @@ def bends_of_smooth_steps(sampled, steps):
 def add_smooth_steps(sampled, steps, line, force, stiffness):
     """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.
 
-    sampled: what `sharp_nodes` gives, (5, N); steps: point, width, step, (S, 3); line: constant and slope.
+    sampled: what `sharp_nodes` gives, (4, N); steps: point, width, step, (S, 3); line: constant and slope.
     """
     n = sampled.shape[1]
     zr, zi, weights, u = sampled[0], sampled[1], sampled[2], sampled[3]

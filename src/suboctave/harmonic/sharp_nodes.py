@@ -19,7 +19,7 @@ import numpy as np
 
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.instants import _jet
-from suboctave.harmonic.kernels import motion
+from suboctave.harmonic.kernels import STRETCH, displacement, motion
 
 #: nodes of the Gauss-Legendre rules in the tables, from 0 to this
 ORDERS = 64
@@ -45,34 +45,43 @@ def tables() -> tuple[np.ndarray, np.ndarray]:
 @kernel(patience=QUICK, fastmath=_FAST)
 def _jets(c, zr, zi):
     """Value, first and second derivative of the motion at the points z, shape (3, N)."""
-    n = zr.shape[0]
-    top = c.shape[0] - 1
-    out = np.empty((3, n))
-    p = np.empty((3, n))
-    x, xi, dr, di, sr, si = out[0], p[0], out[1], p[1], out[2], p[2]
-    for j in range(n):
-        x[j] = c[top].real
-        xi[j] = c[top].imag
-        dr[j] = top * c[top].real
-        di[j] = top * c[top].imag
-        sr[j] = top * top * c[top].real
-        si[j] = top * top * c[top].imag
-    for k in range(top - 1, -1, -1):
-        a = c[k].real
-        b = c[k].imag
-        for j in range(n):
-            t = x[j] * zr[j] - xi[j] * zi[j] + a
-            xi[j] = x[j] * zi[j] + xi[j] * zr[j] + b
-            x[j] = t
-            t = dr[j] * zr[j] - di[j] * zi[j] + k * a
-            di[j] = dr[j] * zi[j] + di[j] * zr[j] + k * b
-            dr[j] = t
-            t = sr[j] * zr[j] - si[j] * zi[j] + k * k * a
-            si[j] = sr[j] * zi[j] + si[j] * zr[j] + k * k * b
-            sr[j] = t
-    for j in range(n):
-        dr[j] = -di[j]
-        sr[j] = -sr[j]
+    n, top = zr.shape[0], c.shape[0] - 1
+    out, work = np.empty((3, n)), np.empty((3, STRETCH))
+    # as in `kernels.motion`
+    for begin in range(0, n, STRETCH):
+        co, si = zr[begin : begin + STRETCH], zi[begin : begin + STRETCH]
+        m = co.shape[0]
+        x, d, s = out[0, begin : begin + m], out[1, begin : begin + m], out[2, begin : begin + m]
+        y, e, z = work[0, :m], work[1, :m], work[2, :m]
+        a, b = c[top].real, c[top].imag
+        for j in range(m):
+            x[j], y[j], d[j], e[j], s[j], z[j] = a, b, top * a, top * b, top * top * a, top * top * b
+        k = top - 1
+        while k > 0:
+            a, b, f, g = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
+            ka, kb, kf, kg = k * a, k * b, (k - 1) * f, (k - 1) * g
+            kka, kkb, kkf, kkg = k * ka, k * kb, (k - 1) * kf, (k - 1) * kg
+            for j in range(m):
+                t = x[j] * co[j] - y[j] * si[j] + a
+                u = x[j] * si[j] + y[j] * co[j] + b
+                x[j] = t * co[j] - u * si[j] + f
+                y[j] = t * si[j] + u * co[j] + g
+                t = d[j] * co[j] - e[j] * si[j] + ka
+                u = d[j] * si[j] + e[j] * co[j] + kb
+                d[j] = t * co[j] - u * si[j] + kf
+                e[j] = t * si[j] + u * co[j] + kg
+                t = s[j] * co[j] - z[j] * si[j] + kka
+                u = s[j] * si[j] + z[j] * co[j] + kkb
+                s[j] = t * co[j] - u * si[j] + kkf
+                z[j] = t * si[j] + u * co[j] + kkg
+            k -= 2
+        a = c[0].real
+        for j in range(m):
+            if k == 0:
+                x[j] = x[j] * co[j] - y[j] * si[j] + a
+                e[j] = d[j] * si[j] + e[j] * co[j]
+                s[j] = s[j] * co[j] - z[j] * si[j]
+            d[j], s[j] = -e[j], -s[j]
     return out
 
 
@@ -225,23 +234,24 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
 
 
 @kernel()
-def _with_motion(c, zr, zi, w):
+def _with_motion(c, zr, zi, w, moving):
     """The result of `sharp_nodes`: one array, since handing arrays over costs more than filling them."""
-    out = np.empty((5, zr.shape[0]))
-    values = motion(c, zr, zi)
+    out = np.empty((5 if moving else 4, zr.shape[0]))
     for j in range(zr.shape[0]):
         out[0, j] = zr[j]
         out[1, j] = zi[j]
         out[2, j] = w[j]
-        out[3, j] = values[0, j]
-        out[4, j] = values[1, j]
+    if moving:
+        out[3:] = motion(c, zr, zi)
+    else:
+        displacement(c, zr, zi, out[3])
     return out
 
 
 @kernel(patience=QUICK)
-def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
-    """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion and its derivative by
-    tau there; (5, N).
+def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
+    """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion there and, if `moving`,
+    its derivative by tau; (5, N) or (4, N).
 
     Parameters
     ----------
@@ -302,4 +312,4 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
                 offset,
             )
             done += piece
-    return _with_motion(c, out_r[:count], out_i[:count], w[:count])
+    return _with_motion(c, out_r[:count], out_i[:count], w[:count], moving)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.kernels import STRETCH
 from suboctave.stability.passages import depths, events_along, grown
 
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
@@ -124,36 +125,44 @@ def _panels(events, longest):
 @kernel(patience=QUICK, fastmath={"reassoc", "contract", "nsz"})
 def _series(c, f, zr, zi, scale, u, v, r):
     """`u = Re sum c_k z^k`, `v = scale du/dtau` and `r = -Re(f_0 + 2 sum f_k z^k)` at the points z; (N,) each."""
-    n = zr.shape[0]
-    top = c.shape[0] - 1
-    work = np.empty((4, n))
-    ui, vr, vi, ri = work[0], work[1], work[2], work[3]
-    for j in range(n):
-        u[j] = c[top].real
-        ui[j] = c[top].imag
-        vr[j] = top * c[top].real
-        vi[j] = top * c[top].imag
-        r[j] = f[top].real
-        ri[j] = f[top].imag
-    for k in range(top - 1, -1, -1):
-        a = c[k].real
-        b = c[k].imag
-        share = 1.0 if k > 0 else 0.5
-        e = share * f[k].real
-        g = share * f[k].imag
-        for j in range(n):
-            t = u[j] * zr[j] - ui[j] * zi[j] + a
-            ui[j] = u[j] * zi[j] + ui[j] * zr[j] + b
-            u[j] = t
-            t = vr[j] * zr[j] - vi[j] * zi[j] + k * a
-            vi[j] = vr[j] * zi[j] + vi[j] * zr[j] + k * b
-            vr[j] = t
-            t = r[j] * zr[j] - ri[j] * zi[j] + e
-            ri[j] = r[j] * zi[j] + ri[j] * zr[j] + g
-            r[j] = t
-    for j in range(n):
-        v[j] = -scale * vi[j]
-        r[j] *= -2.0
+    n, top = zr.shape[0], c.shape[0] - 1
+    work = np.empty((3, STRETCH))
+    # as in `harmonic.kernels.motion`
+    for begin in range(0, n, STRETCH):
+        end = min(n, begin + STRETCH)
+        co, si, x, d, s = zr[begin:end], zi[begin:end], u[begin:end], v[begin:end], r[begin:end]
+        m = end - begin
+        y, e, z = work[0, :m], work[1, :m], work[2, :m]
+        a, b, p, q = c[top].real, c[top].imag, f[top].real, f[top].imag
+        for j in range(m):
+            x[j], y[j], d[j], e[j], s[j], z[j] = a, b, top * a, top * b, p, q
+        k = top - 1
+        while k > 0:
+            a, b, h, g = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
+            ka, kb, kh, kg = k * a, k * b, (k - 1) * h, (k - 1) * g
+            share = 1.0 if k > 1 else 0.5
+            p, q, next_p, next_q = f[k].real, f[k].imag, share * f[k - 1].real, share * f[k - 1].imag
+            for j in range(m):
+                t = x[j] * co[j] - y[j] * si[j] + a
+                w = x[j] * si[j] + y[j] * co[j] + b
+                x[j] = t * co[j] - w * si[j] + h
+                y[j] = t * si[j] + w * co[j] + g
+                t = d[j] * co[j] - e[j] * si[j] + ka
+                w = d[j] * si[j] + e[j] * co[j] + kb
+                d[j] = t * co[j] - w * si[j] + kh
+                e[j] = t * si[j] + w * co[j] + kg
+                t = s[j] * co[j] - z[j] * si[j] + p
+                w = s[j] * si[j] + z[j] * co[j] + q
+                s[j] = t * co[j] - w * si[j] + next_p
+                z[j] = t * si[j] + w * co[j] + next_q
+            k -= 2
+        a, p = c[0].real, 0.5 * f[0].real
+        for j in range(m):
+            if k == 0:
+                x[j] = x[j] * co[j] - y[j] * si[j] + a
+                e[j] = d[j] * si[j] + e[j] * co[j]
+                s[j] = s[j] * co[j] - z[j] * si[j] + p
+            d[j], s[j] = -scale * e[j], -2.0 * s[j]
 
 
 @kernel()
