@@ -13,7 +13,7 @@ import numpy as np
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.instants import _jet, crossings_of
-from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
+from suboctave.harmonic.kernels import _FAST, contact_spectrum, displacement, motion, product_spectrum
 
 
 @kernel()
@@ -59,20 +59,49 @@ def add_polynomial(c, polynomial, zr, zi, force, stiffness):
     z: equidistant points on the circle, enough for the tangent.
     """
     n = zr.shape[0]
-    values = motion(c, zr, zi)
-    law = np.empty((2, n))
-    scale = 2.0 * math.pi / n
+    u, f, slope, weights = np.empty(n), np.zeros(n), np.zeros(n), np.full(n, 2.0 * math.pi / n)
+    displacement(c, zr, zi, u)
+    for p in range(polynomial.shape[0] - 1, -1, -1):
+        for j in range(n):
+            slope[j] = slope[j] * u[j] + f[j]
+            f[j] = f[j] * u[j] + polynomial[p]
+    add_pair(f, slope, weights, zr, zi, force, stiffness)
+
+
+@kernel(patience=QUICK, fastmath=_FAST)
+def add_pair(f, f_u, weights, zr, zi, force, stiffness):
+    """Add `1/(2 pi) sum_j weights_j g_j z_j^-q`, q = 0 .. top, of the sampled f and f_u to the spectra of force and
+    stiffness, in place.
+    """
+    n = zr.shape[0]
+    scale = 1.0 / (2.0 * math.pi)
+    pr, pi = np.empty(n), np.empty(n)
     for j in range(n):
-        f, slope = 0.0, 0.0
-        for p in range(polynomial.shape[0] - 1, -1, -1):
-            slope = slope * values[0, j] + f
-            f = f * values[0, j] + polynomial[p]
-        law[0, j] = f * scale
-        law[1, j] = slope * scale
-    found = spectra(law, zr, zi, force.shape[0] - 1)
-    for q in range(force.shape[0]):
-        force[q] += found[0, q]
-        stiffness[q] += found[1, q]
+        pr[j] = weights[j] * scale
+        pi[j] = 0.0
+    # two harmonics at a time: the arrays are read once for both
+    for q in range(0, force.shape[0], 2):
+        fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
+        gr, gi, tr, ti = 0.0, 0.0, 0.0, 0.0
+        for j in range(n):
+            a, b, c, d = pr[j], pi[j], zr[j], zi[j]
+            fr += f[j] * a
+            fi += f[j] * b
+            sr += f_u[j] * a
+            si += f_u[j] * b
+            e = a * c - b * d
+            b = a * d + b * c
+            gr += f[j] * e
+            gi += f[j] * b
+            tr += f_u[j] * e
+            ti += f_u[j] * b
+            pr[j] = e * c - b * d
+            pi[j] = e * d + b * c
+        force[q] += complex(fr, -fi)
+        stiffness[q] += complex(sr, -si)
+        if q + 1 < force.shape[0]:
+            force[q + 1] += complex(gr, -gi)
+            stiffness[q + 1] += complex(tr, -ti)
 
 
 @kernel(fastmath=_FAST)
@@ -139,35 +168,7 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         f_u[j] = line[1]
     for s in range(steps.shape[0]):
         add_step(u, steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, f, f_u)
-    scale = 1.0 / (2.0 * math.pi)
-    pr = np.empty(n)
-    pi = np.empty(n)
-    for j in range(n):
-        pr[j] = weights[j] * scale
-        pi[j] = 0.0
-    # two harmonics at a time: the arrays are read once for both
-    for q in range(0, force.shape[0], 2):
-        fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
-        gr, gi, tr, ti = 0.0, 0.0, 0.0, 0.0
-        for j in range(n):
-            a, b, c, d = pr[j], pi[j], zr[j], zi[j]
-            fr += f[j] * a
-            fi += f[j] * b
-            sr += f_u[j] * a
-            si += f_u[j] * b
-            e = a * c - b * d
-            b = a * d + b * c
-            gr += f[j] * e
-            gi += f[j] * b
-            tr += f_u[j] * e
-            ti += f_u[j] * b
-            pr[j] = e * c - b * d
-            pi[j] = e * d + b * c
-        force[q] += complex(fr, -fi)
-        stiffness[q] += complex(sr, -si)
-        if q + 1 < force.shape[0]:
-            force[q + 1] += complex(gr, -gi)
-            stiffness[q + 1] += complex(tr, -ti)
+    add_pair(f, f_u, weights, zr, zi, force, stiffness)
 
 
 @kernel()
