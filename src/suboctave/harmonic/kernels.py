@@ -14,56 +14,17 @@ from suboctave.compiled import QUICK, kernel
 
 _FAST = {"reassoc", "contract", "nsz"}
 #: points that are dealt with together
-STRETCH = 256
-
-
-@kernel(patience=QUICK, fastmath=_FAST)
-def motion(c, zr, zi):
-    """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
-    n, top = zr.shape[0], c.shape[0] - 1
-    out = np.empty((2, n))
-    work = np.empty((2, STRETCH))
-    # stretch by stretch, so that the nearest cache holds all of it
-    for begin in range(0, n, STRETCH):
-        co, si = zr[begin : begin + STRETCH], zi[begin : begin + STRETCH]
-        m = co.shape[0]
-        x, d, y, e = out[0, begin : begin + m], out[1, begin : begin + m], work[0, :m], work[1, :m]
-        a, b = c[top].real, c[top].imag
-        for j in range(m):
-            x[j], y[j], d[j], e[j] = a, b, top * a, top * b
-        # two harmonics at a time: what is between them stays in registers
-        k = top - 1
-        while k > 0:
-            a, b, f, g = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
-            ka, kb, kf, kg = k * a, k * b, (k - 1) * f, (k - 1) * g
-            for j in range(m):
-                t = x[j] * co[j] - y[j] * si[j] + a
-                u = x[j] * si[j] + y[j] * co[j] + b
-                x[j] = t * co[j] - u * si[j] + f
-                y[j] = t * si[j] + u * co[j] + g
-                t = d[j] * co[j] - e[j] * si[j] + ka
-                u = d[j] * si[j] + e[j] * co[j] + kb
-                d[j] = t * co[j] - u * si[j] + kf
-                e[j] = t * si[j] + u * co[j] + kg
-            k -= 2
-        a = c[0].real
-        for j in range(m):
-            if k == 0:
-                x[j] = x[j] * co[j] - y[j] * si[j] + a
-                e[j] = d[j] * si[j] + e[j] * co[j]
-            # of i k c_k z^k the real part
-            d[j] = -e[j]
-    return out
+_STRETCH = 256
 
 
 @kernel(patience=QUICK, fastmath=_FAST)
 def displacement(c, zr, zi, out):
     """Values of `Re sum_k c_k z^k` at the points z, into `out` (N,)."""
     n, top = zr.shape[0], c.shape[0] - 1
-    imaginary = np.empty(STRETCH)
+    imaginary = np.empty(_STRETCH)
     # stretch by stretch, so that the nearest cache holds all of it
-    for begin in range(0, n, STRETCH):
-        x, co, si = out[begin : begin + STRETCH], zr[begin : begin + STRETCH], zi[begin : begin + STRETCH]
+    for begin in range(0, n, _STRETCH):
+        x, co, si = out[begin : begin + _STRETCH], zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH]
         y = imaginary[: x.shape[0]]
         a, b = c[top].real, c[top].imag
         for j in range(x.shape[0]):
@@ -83,6 +44,24 @@ def displacement(c, zr, zi, out):
             a = c[0].real
             for j in range(x.shape[0]):
                 x[j] = x[j] * co[j] - y[j] * si[j] + a
+
+
+@kernel()
+def slope(c, factor):
+    """Complex coefficients `factor i k c_k` of the derivative with respect to tau, times a factor."""
+    out = np.empty_like(c)
+    for k in range(c.shape[0]):
+        out[k] = complex(-factor * k * c[k].imag, factor * k * c[k].real)
+    return out
+
+
+@kernel(patience=QUICK)
+def motion(c, zr, zi):
+    """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
+    out = np.empty((2, zr.shape[0]))
+    displacement(c, zr, zi, out[0])
+    displacement(slope(c, 1.0), zr, zi, out[1])
+    return out
 
 
 @kernel(patience=QUICK, fastmath=_FAST)

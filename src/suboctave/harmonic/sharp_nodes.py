@@ -19,7 +19,7 @@ import numpy as np
 
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.instants import _jet
-from suboctave.harmonic.kernels import STRETCH, displacement, motion
+from suboctave.harmonic.kernels import displacement, slope
 
 #: nodes of the Gauss-Legendre rules in the tables, from 0 to this
 ORDERS = 64
@@ -42,46 +42,14 @@ def tables() -> tuple[np.ndarray, np.ndarray]:
     return nodes, weights
 
 
-@kernel(patience=QUICK, fastmath=_FAST)
+@kernel(patience=QUICK)
 def _jets(c, zr, zi):
     """Value, first and second derivative of the motion at the points z, shape (3, N)."""
-    n, top = zr.shape[0], c.shape[0] - 1
-    out, work = np.empty((3, n)), np.empty((3, STRETCH))
-    # as in `kernels.motion`
-    for begin in range(0, n, STRETCH):
-        co, si = zr[begin : begin + STRETCH], zi[begin : begin + STRETCH]
-        m = co.shape[0]
-        x, d, s = out[0, begin : begin + m], out[1, begin : begin + m], out[2, begin : begin + m]
-        y, e, z = work[0, :m], work[1, :m], work[2, :m]
-        a, b = c[top].real, c[top].imag
-        for j in range(m):
-            x[j], y[j], d[j], e[j], s[j], z[j] = a, b, top * a, top * b, top * top * a, top * top * b
-        k = top - 1
-        while k > 0:
-            a, b, f, g = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
-            ka, kb, kf, kg = k * a, k * b, (k - 1) * f, (k - 1) * g
-            kka, kkb, kkf, kkg = k * ka, k * kb, (k - 1) * kf, (k - 1) * kg
-            for j in range(m):
-                t = x[j] * co[j] - y[j] * si[j] + a
-                u = x[j] * si[j] + y[j] * co[j] + b
-                x[j] = t * co[j] - u * si[j] + f
-                y[j] = t * si[j] + u * co[j] + g
-                t = d[j] * co[j] - e[j] * si[j] + ka
-                u = d[j] * si[j] + e[j] * co[j] + kb
-                d[j] = t * co[j] - u * si[j] + kf
-                e[j] = t * si[j] + u * co[j] + kg
-                t = s[j] * co[j] - z[j] * si[j] + kka
-                u = s[j] * si[j] + z[j] * co[j] + kkb
-                s[j] = t * co[j] - u * si[j] + kkf
-                z[j] = t * si[j] + u * co[j] + kkg
-            k -= 2
-        a = c[0].real
-        for j in range(m):
-            if k == 0:
-                x[j] = x[j] * co[j] - y[j] * si[j] + a
-                e[j] = d[j] * si[j] + e[j] * co[j]
-                s[j] = s[j] * co[j] - z[j] * si[j]
-            d[j], s[j] = -e[j], -s[j]
+    out = np.empty((3, zr.shape[0]))
+    first = slope(c, 1.0)
+    displacement(c, zr, zi, out[0])
+    displacement(first, zr, zi, out[1])
+    displacement(slope(first, 1.0), zr, zi, out[2])
     return out
 
 
@@ -241,10 +209,9 @@ def _with_motion(c, zr, zi, w, moving):
         out[0, j] = zr[j]
         out[1, j] = zi[j]
         out[2, j] = w[j]
+    displacement(c, zr, zi, out[3])
     if moving:
-        out[3:] = motion(c, zr, zi)
-    else:
-        displacement(c, zr, zi, out[3])
+        displacement(slope(c, 1.0), zr, zi, out[4])
     return out
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.kernels import STRETCH
+from suboctave.harmonic.kernels import displacement, slope
 from suboctave.stability.passages import depths, events_along, grown
 
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
@@ -122,47 +122,16 @@ def _panels(events, longest):
     return out[:count], start
 
 
-@kernel(patience=QUICK, fastmath={"reassoc", "contract", "nsz"})
+@kernel(patience=QUICK)
 def _series(c, f, zr, zi, scale, u, v, r):
     """`u = Re sum c_k z^k`, `v = scale du/dtau` and `r = -Re(f_0 + 2 sum f_k z^k)` at the points z; (N,) each."""
-    n, top = zr.shape[0], c.shape[0] - 1
-    work = np.empty((3, STRETCH))
-    # as in `harmonic.kernels.motion`
-    for begin in range(0, n, STRETCH):
-        end = min(n, begin + STRETCH)
-        co, si, x, d, s = zr[begin:end], zi[begin:end], u[begin:end], v[begin:end], r[begin:end]
-        m = end - begin
-        y, e, z = work[0, :m], work[1, :m], work[2, :m]
-        a, b, p, q = c[top].real, c[top].imag, f[top].real, f[top].imag
-        for j in range(m):
-            x[j], y[j], d[j], e[j], s[j], z[j] = a, b, top * a, top * b, p, q
-        k = top - 1
-        while k > 0:
-            a, b, h, g = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
-            ka, kb, kh, kg = k * a, k * b, (k - 1) * h, (k - 1) * g
-            share = 1.0 if k > 1 else 0.5
-            p, q, next_p, next_q = f[k].real, f[k].imag, share * f[k - 1].real, share * f[k - 1].imag
-            for j in range(m):
-                t = x[j] * co[j] - y[j] * si[j] + a
-                w = x[j] * si[j] + y[j] * co[j] + b
-                x[j] = t * co[j] - w * si[j] + h
-                y[j] = t * si[j] + w * co[j] + g
-                t = d[j] * co[j] - e[j] * si[j] + ka
-                w = d[j] * si[j] + e[j] * co[j] + kb
-                d[j] = t * co[j] - w * si[j] + kh
-                e[j] = t * si[j] + w * co[j] + kg
-                t = s[j] * co[j] - z[j] * si[j] + p
-                w = s[j] * si[j] + z[j] * co[j] + q
-                s[j] = t * co[j] - w * si[j] + next_p
-                z[j] = t * si[j] + w * co[j] + next_q
-            k -= 2
-        a, p = c[0].real, 0.5 * f[0].real
-        for j in range(m):
-            if k == 0:
-                x[j] = x[j] * co[j] - y[j] * si[j] + a
-                e[j] = d[j] * si[j] + e[j] * co[j]
-                s[j] = s[j] * co[j] - z[j] * si[j] + p
-            d[j], s[j] = -scale * e[j], -2.0 * s[j]
+    displacement(c, zr, zi, u)
+    displacement(slope(c, scale), zr, zi, v)
+    within = np.empty_like(c)
+    for k in range(c.shape[0]):
+        within[k] = complex(-2.0 * f[k].real, -2.0 * f[k].imag)
+    within[0] = complex(-f[0].real, 0.0)
+    displacement(within, zr, zi, r)
 
 
 @kernel()
