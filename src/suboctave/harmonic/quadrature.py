@@ -102,8 +102,8 @@ def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -
 
 
 def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int, moving: bool = True) -> Array:
-    """These nodes with the motion there: cosines, sines, weights, values and, if `moving`, derivatives by tau, (5, N) or
-    (4, N); not to be written to: forces, curvatures and what a parameter changes ask for the same ones one after the
+    """These nodes with the motion there: cosines, sines, weights, values and, if `moving`, derivatives by tau, (5, N)
+    or (4, N); not to be written to: forces, curvatures and what a parameter changes ask for the same ones one after the
     other.
     """
     key = (motion.tobytes(), points.tobytes(), widths.tobytes(), top, moving)
