@@ -118,15 +118,17 @@ class HarmonicBalance:
 
     def with_samples(self, samples: tuple[int | None, ...]) -> HarmonicBalance:
         """The same equations with other frozen sample counts."""
-        if samples == self.samples:
-            return self
-        return HarmonicBalance(self.system, self.basis, self.values, self.linear, samples)
+        return self if samples == self.samples else self._like(self.basis, samples)
 
     def with_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         """The same equations in another basis."""
-        if basis == self.basis:
-            return self
-        return HarmonicBalance(self.system, basis, self.values, self.linear, self.samples)
+        return self if basis == self.basis else self._like(basis, self.samples)
+
+    def _like(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> HarmonicBalance:
+        other = HarmonicBalance(self.system, basis, self.values, self.linear, samples)
+        # the same mapping, so that a motion's values are known to be its own, with what the laws are there
+        other.values, other._own_coefficients = self.values, self._own_coefficients
+        return other
 
     @lazy
     def completed(self) -> HarmonicBalance:

@@ -48,7 +48,7 @@ def closed_bends(law: GroupLaw, along: ComplexArray, top: int) -> list[ClosedBen
         second, third = bends_of_polynomial(along, law.polynomial, nodes.zr, nodes.zi)
         parts.append(ClosedBends(nodes.zr, nodes.zi, second, third, _NO_SLOPE))
     if law.told:
-        sampled = graded_motion(along, *law.told_places, top)
+        sampled = graded_motion(along, *law.told_places, top, moving=False)
         second, third = bends_of_smooth_steps(sampled, law.smooth_steps)
         parts.append(ClosedBends(sampled[0], sampled[1], second, third, _NO_SLOPE))
     return parts

@@ -227,7 +227,7 @@ def add_sampled_spectra(
     """
     top, high = out[0].shape[0] - 1, motion.shape[0] - 1
     if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
+        sampled = graded_motion(motion, *law.told_places, top, moving=False)
         group_kernels.add_smooth_steps(sampled, law.smooth_steps, law.line, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
