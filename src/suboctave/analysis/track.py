@@ -11,6 +11,7 @@ from suboctave.analysis.checks import check_bounds, check_parameter, check_range
 from suboctave.analysis.making import check_unknowns, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_ends import repeats_earlier
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
 from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, solved_start
 from suboctave.analysis.track_switch import limit_point_beside
@@ -102,6 +103,12 @@ def track(
         assert ranges[1] is not None
         bifurcation = _leaving(bifurcation, names, ranges[1])
     orbit = bifurcation.orbit
+    if kind_of(bifurcation) == "LP" and repeats_earlier(orbit):
+        raise InputError(
+            f"this limit point is written with {orbit.basis.nu} load periods but repeats earlier: so written, every "
+            "period doubling is a limit point, and its curve is that of the doublings; track the PD, or a limit point "
+            "of the branch that switch_branch gives"
+        )
     system = orbit.system
     settings = make_settings(
         system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
