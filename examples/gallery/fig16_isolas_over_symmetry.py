@@ -30,10 +30,10 @@ if len(sys.argv) > 1:
     limits, every = (np.column_stack((curve.omega, curve.parameter("j"))) for curve in (isola.limit_points, right))
     beside = every[every[:, 0] > limits[:, 0].max()]
     upper = limits[np.argmax(limits[:, 0])]
-    lower = (isola.merges.omega, isola.merges)
+    lower = [(isola.merges.omega, isola.merges), (border.omega[[0, -1]].min(), 0.0)]
     for corners, colour in (
         (np.column_stack((border.omega, border.parameter("j"))), "#d9eaf3"),
-        (np.vstack((beside, upper, lower)), "#d9eaf3"),
+        (np.vstack((beside, upper, *lower)), "#d9eaf3"),
         (limits, "#ccece3"),
     ):
         axes.fill(*corners.T, color=colour, linewidth=0, zorder=1)
