@@ -25,6 +25,8 @@ if len(sys.argv) > 1:
     figure = so.plot([first, second], size="double-column", ylim=(0.0, 6.0))
     for x, stiffness, name in ((2.1, 4.0, "T"), (3.8, 2.4, "T"), (2.7, 1.7, "2T"), (2.75, 5.0, "4T and longer")):
         figure.axes[0].text(x, stiffness, name, ha="center", fontsize=8)
+    figure.axes[0].plot(2.6, 4.2, "k+")
+    figure.axes[0].text(2.62, 4.1, "B", fontsize=8)
     figure.savefig(sys.argv[1], dpi=300)
 if len(sys.argv) > 2:
     systems = [oscillator.with_parameters({"Kc": stiffness}) for stiffness in (2.0, 3.0, 4.5, 6.0)]
