@@ -192,6 +192,14 @@ def _parts(curve: TrackedCurve, u: Array) -> list[Array]:
     return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
 
 
+def repeats_earlier(orbit: PeriodicOrbit) -> bool:
+    """Whether a motion repeats after a part of the period that it is written with."""
+    basis, scales = orbit.basis, orbit.balance.scales()[0]
+    x = orbit.coefficients.reshape(basis.size, -1) * scales
+    least = min((float(np.linalg.norm(x[rows])) for rows in _rows_of_parts(basis.nu, basis.harmonics)), default=np.inf)
+    return least <= _NOTHING_LEFT * float(np.linalg.norm(x))
+
+
 @lru_cache(maxsize=64)
 def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
     k = np.append(0, np.repeat(np.arange(1, harmonics + 1), 2))
@@ -199,4 +207,4 @@ def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
     return [np.flatnonzero(k % prime) for prime in primes]
 
 
-__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]
+__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "repeats_earlier", "subharmonic_share"]
