@@ -21,10 +21,10 @@ _FIRST_STEP = 0.01
 class AdaptiveKernel:
     """The compiled integrator of a structure; `lanes` trajectories run side by side."""
 
-    def __init__(self, structure: Structure, samples: int, tolerance: float) -> None:
+    def __init__(self, structure: Structure, samples: int, tolerance: float, lanes: int | None = None) -> None:
         self.structure, self.samples, self.tolerance = structure, samples, tolerance
         rows = adaptive_rows(structure, 1).size
-        self.lanes = 16 if 16 * rows <= _ROOM // 8 else 8
+        self.lanes = lanes or (16 if 16 * rows <= _ROOM // 8 else 8)
         self.function: Any = module_of(adaptive_source(structure, self.lanes)).adaptive
         self.rows = adaptive_rows(structure, self.lanes)
         self.offsets = np.array([self.rows.begin[name] for name in FIELDS], dtype=np.int64)
@@ -57,8 +57,12 @@ class AdaptiveGroup:
         sizes: Array,
         count: int,
         address: int,
+        alive: int,
     ) -> None:
-        """`states` (lanes, 2n), `sizes` (lanes, n), `which` (lanes,) the set of parameters; `count` samples are due."""
+        """`states` (lanes, 2n), `sizes` (lanes, n), `which` (lanes,) the set of parameters; `count` samples are due.
+
+        Only the first `alive` lanes move.
+        """
         self.kernel, self.address, self.fresh = kernel, address, True
         lanes = kernel.lanes
         self.z = np.zeros(kernel.rows.size * lanes)
@@ -71,7 +75,8 @@ class AdaptiveGroup:
         self._rows("floor", sizes.shape[1])[:] = np.maximum(1e-3 * largest / weight, 1e-300).T
         period = numbers["period"][which, 0]
         self._rows("h", 1)[:] = self._rows("next", 1)[:] = np.minimum(_FIRST_STEP, 1.0 / kernel.samples) * period
-        self._rows("left", 1)[:] = count
+        self._rows("left", 1)[:, :alive] = count
+        self._rows("h", 1)[:, alive:] = 0.0
 
     def _rows(self, name: str, count: int) -> Array:
         begin, lanes = self.kernel.rows.begin[name], self.kernel.lanes

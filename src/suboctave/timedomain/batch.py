@@ -54,6 +54,8 @@ class Motions:
         (B,): trajectories that left the range of numbers; they are NaN from there on.
     unsettled
         (B,): steps of Newmark's method whose equations were not solved to the tolerance.
+    finished
+        (B,): whether the trajectory was followed to its end; not all are where the user interrupted (Ctrl-C).
     """
 
     states: Array
@@ -61,6 +63,7 @@ class Motions:
     end: Array
     failed: NDArray[np.bool_]
     unsettled: Array
+    finished: NDArray[np.bool_]
 
 
 class Flow:
@@ -76,6 +79,9 @@ class Flow:
         solved until Newton's correction is below `tolerance` (default 1e-10) of the motion.
     samples
         Instants per period at which states are given; of Newmark's method a divisor of `steps_per_period`.
+    lanes
+        Trajectories that run side by side; default what suits large batches. Few of them waste less with 8. Results with
+        different numbers may differ in the last bit.
     """
 
     def __init__(
@@ -85,6 +91,7 @@ class Flow:
         samples: int = 1,
         steps_per_period: int = 1000,
         tolerance: float | None = None,
+        lanes: int | None = None,
     ) -> None:
         if method not in METHODS:
             raise InputError(f"method={method!r}{suggest(str(method), METHODS)}")
@@ -99,9 +106,9 @@ class Flow:
         self.structure = Structure(system)
         self.kernel: NewmarkKernel | AdaptiveKernel
         if method == "newmark":
-            self.kernel = NewmarkKernel(self.structure, steps, tolerance)
+            self.kernel = NewmarkKernel(self.structure, steps, tolerance, lanes)
         else:
-            self.kernel = AdaptiveKernel(self.structure, samples, tolerance)
+            self.kernel = AdaptiveKernel(self.structure, samples, tolerance, lanes)
 
     def over(
         self,
@@ -198,11 +205,12 @@ class _Run:
         self.rows = flow.kernel.numbers(numbers)
         self.answers = Answers(flow.structure.asked)
         n, count = flow.structure.n, len(states)
-        self.out = np.empty((count, total - skip, 2 * n))
-        self.peaks = np.empty((count, total - skip, n)) if measure else None
-        self.end = np.empty((count, 2 * n))
+        self.out = np.full((count, total - skip, 2 * n), np.nan)
+        self.peaks = np.full((count, total - skip, n), np.nan) if measure else None
+        self.end = np.full((count, 2 * n), np.nan)
         self.failed = np.zeros(count, dtype=bool)
         self.unsettled = np.zeros(count)
+        self.finished = np.zeros(count, dtype=bool)
         lanes = flow.kernel.lanes
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
@@ -211,15 +219,18 @@ class _Run:
     def go(self, workers: int | None, report: Report | None) -> Motions:
         """Follow all of them."""
         many = min(workers or _processors(), len(self.groups))
-        if many <= 1:
-            for g in range(len(self.groups)):
-                self._follow(g, report)
-        else:
-            self._together(many, report)
+        try:
+            if many <= 1:
+                for g in range(len(self.groups)):
+                    self._follow(g, report)
+            else:
+                self._together(many, report)
+        except KeyboardInterrupt:
+            self.stop.set()
         if self.answers.failure is not None:
             raise self.answers.failure
-        self.failed |= ~np.isfinite(self.end).all(axis=1)
-        return Motions(self.out, self.peaks, self.end, self.failed, self.unsettled)
+        self.failed |= self.finished & ~np.isfinite(self.end).all(axis=1)
+        return Motions(self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished)
 
     def _together(self, many: int, report: Report | None) -> None:
         self._compile()
@@ -251,19 +262,19 @@ class _Run:
         else:
             group.advance(0, 0, empty, None)
 
-    def _group(self, members: NDArray[np.int_]) -> NewmarkGroup | AdaptiveGroup:
+    def _group(self, members: NDArray[np.int_], alive: int = 0) -> NewmarkGroup | AdaptiveGroup:
         kernel, states, which = self.flow.kernel, self.states[members], self.which[members]
         if isinstance(kernel, NewmarkKernel):
             return NewmarkGroup(kernel, self.rows, states, which, self.answers.address)
         sizes = self.flow.structure.sizes(self.numbers, states, which)
-        return AdaptiveGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address)
+        return AdaptiveGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address, alive)
 
     def _follow(self, g: int, report: Report | None) -> None:
         members = self.groups[g]
         lanes, n = self.flow.kernel.lanes, self.flow.structure.n
-        # what is missing from the last group is made up by its first one
+        # what is missing from the last group is made up by its first one, but stands still where it may
         filled = np.array([members[i] if i < len(members) else members[0] for i in range(lanes)])
-        group = self._group(filled)
+        group = self._group(filled, len(members))
         kept = self.total - self.skip
         out = np.full((kept, 2 * n, lanes), np.nan)
         peaks = np.full((kept, n, lanes), np.nan) if self.measure else None
@@ -272,6 +283,8 @@ class _Run:
         else:
             self._by_trials(group, g, out, peaks, report)
         if self.stop.is_set():
+            return
+        if isinstance(group, AdaptiveGroup) and group.left() > 0.0:
             return
         here, own = slice(members.start, members.stop), slice(0, len(members))
         self.out[here] = out.transpose(2, 0, 1)[own]
@@ -282,6 +295,7 @@ class _Run:
             self.unsettled[here] = group.unsettled()[own]
         else:
             self.failed[here] = group.failed()[own]
+        self.finished[here] = True
 
     def _by_steps(self, group: NewmarkGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
         kernel = group.kernel
@@ -303,7 +317,7 @@ class _Run:
             started = perf_counter()
             finished = group.advance(budget, self.skip, out, peaks)
             budget = _next_chunk(budget, perf_counter() - started)
-            self.done[g] = 1.0 - group.left() / (self.total * group.kernel.lanes)
+            self.done[g] = 1.0 - group.left() / (self.total * len(self.groups[g]))
             self._tell(report)
 
     def _stopped(self) -> bool:

@@ -20,10 +20,10 @@ _ROOM = 16384
 class NewmarkKernel:
     """The compiled integrator of a structure; `lanes` trajectories run side by side."""
 
-    def __init__(self, structure: Structure, steps: int, tolerance: float) -> None:
+    def __init__(self, structure: Structure, steps: int, tolerance: float, lanes: int | None = None) -> None:
         self.structure, self.steps, self.tolerance = structure, steps, tolerance
         rows = rows_of(structure, 1).size
-        self.lanes = next((lanes for lanes in (32, 16) if lanes * rows <= _ROOM // 8), 8)
+        self.lanes = lanes or next((lanes for lanes in (32, 16) if lanes * rows <= _ROOM // 8), 8)
         self.function: Any = module_of(newmark_source(structure, self.lanes)).newmark
         self.waves = structure.wave_table(steps)
         self.rows = rows_of(structure, self.lanes)
