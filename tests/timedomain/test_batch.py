@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 import suboctave as so
 from suboctave.timedomain import integrate
@@ -65,10 +64,13 @@ SYSTEMS = {
     "function": one(so.Callable(0, lambda x, v, k: k * np.sinh(x) + 0.1 * v**3, {"k": "p"})),
     "own element": one(Logarithmic(0, [0.7])),
     "two": several(2, [so.ElasticStop((0, 1), 6.0, 0.2), so.CubicSpring(0, 0.4)]),
-    "coupled": several(
-        2, [so.Expression(0, "0.5*x*y**2 + 0.1*x'*y", inputs={"x": 0, "y": 1}), so.Expression(1, "0.5*x**2*y", inputs={"x": 0, "y": 1})]
-    ),
-    "direction": several(3, [so.ElasticStop(direction=[1.0, -0.5, 0.25], stiffness=6.0, gap=0.1), so.CubicSpring(2, 0.5)]),
+    "coupled": several(2, [
+        so.Expression(0, "0.5*x*y**2 + 0.1*x'*y", inputs={"x": 0, "y": 1}),
+        so.Expression(1, "0.5*x**2*y", inputs={"x": 0, "y": 1}),
+    ]),
+    "direction": several(3, [
+        so.ElasticStop(direction=[1.0, -0.5, 0.25], stiffness=6.0, gap=0.1), so.CubicSpring(2, 0.5),
+    ]),
     "seven": several(7, [so.ElasticStop((i, i + 1), 4.0, 0.15) for i in range(6)]),
 }  # fmt: skip
 TIMED = 1.7
@@ -101,5 +103,3 @@ def test_newmark_tends_to_it_with_the_square_of_the_step(name):
     assert errors[1] < 2e-3
     # corners are met between two steps: their part of the error comes and goes
     assert 6.0 < errors[0] / errors[1] < 45.0
-
-

@@ -1,7 +1,8 @@
 """`brute_force_diagram`: what trajectories settle on while a parameter is varied; it knows of no branch.
 
-The state is carried on from value to value, upwards and downwards, or every value begins anew, from rest or from states
-that are given. Only attracting motions are seen, and only those whose basins are met; nothing that is found is left out.
+The state is carried on from value to value, upwards and downwards, or every value begins anew, from rest or from
+states that are given. Only attracting motions are seen, and only those whose basins are met; nothing that is found is
+left out.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ class BruteForceDiagram:
             coords={
                 "start": list(self.starts),
                 "value": self.values,
-                "dof": list(self.system.dof_names) or list(range(n)),
+                "dof": list(self.system.dof_names or range(n)),
                 "parameter": list(self.system.parameters),
             },
             attrs={
@@ -321,7 +322,9 @@ def _starts(start: str | Sequence[str]) -> list[str]:
     listed = [start] if isinstance(start, str) else list(start) if isinstance(start, Iterable) else [start]
     for one in listed:
         if one not in _STARTS:
-            raise InputError(f"start is one of {', '.join(_STARTS)}, or several of them, not {one!r}{suggest(str(one), _STARTS)}")
+            raise InputError(
+                f"start is one of {', '.join(_STARTS)}, or several of them, not {one!r}{suggest(str(one), _STARTS)}"
+            )
     return list(dict.fromkeys(listed))
 
 

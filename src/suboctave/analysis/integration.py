@@ -80,7 +80,7 @@ class Trajectory:
         """Displacement and velocity on (time, dof), and what produced them."""
         import xarray
 
-        names = list(self.system.dof_names) or list(range(self.system.n))
+        names: Any = self.system.dof_names or range(self.system.n)
         return xarray.Dataset(
             {
                 "displacement": (("time", "dof"), self.displacement),
@@ -88,7 +88,7 @@ class Trajectory:
                 "largest": (("dof",), self.largest),
                 "parameters": (("parameter",), np.array(list(self.parameters.values()), dtype=float)),
             },
-            coords={"time": self.time, "dof": names, "parameter": list(self.parameters)},
+            coords={"time": self.time, "dof": list(names), "parameter": list(self.parameters)},
             attrs={
                 "contents": "trajectory",
                 "omega": self.omega,
@@ -185,7 +185,7 @@ def integrate(
         states = np.vstack([start[None], states])
     n = system.n
     return Trajectory(
-        time=np.arange(len(states)) * (2.0 * np.pi / float(omega) / samples),
+        time=np.arange(len(states), dtype=float) * (2.0 * np.pi / float(omega) / samples),
         displacement=states[:, :n].copy(),
         velocity=states[:, n:].copy(),
         largest=np.maximum(np.abs(states[0, :n]), peaks.max(axis=0)),

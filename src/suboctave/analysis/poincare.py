@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.analysis.attractors import TOLERANCE, Attractor, attractor_of, distinct
 from suboctave.analysis.integration import _not_negative, _samples, start_state
 from suboctave.analysis.progress import reporting, timed
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow, check_count
@@ -39,8 +39,8 @@ class PoincareSections:
     varied
         (B,) each: the parameters that differ from the system's, by name.
     failed
-        (B,): trajectories that left the range of numbers (their points are NaN), or some steps of which Newmark's method
-        did not solve.
+        (B,): trajectories that left the range of numbers (their points are NaN), or some steps of which Newmark's
+        method did not solve.
     finished
         (B,): False for those that an interruption (Ctrl-C) left out; their points are NaN.
     tolerance
@@ -103,7 +103,7 @@ class PoincareSections:
         import xarray
 
         n = self.system.n
-        names = list(self.system.dof_names) or list(range(n))
+        names: Any = self.system.dof_names or range(n)
         return xarray.Dataset(
             {
                 "displacement": (("trajectory", "section", "dof"), self.points[:, :, :n]),
@@ -115,7 +115,7 @@ class PoincareSections:
                 "finished": (("trajectory",), self.finished),
                 **{name: (("trajectory",), column) for name, column in self.varied.items()},
             },
-            coords={"dof": names},
+            coords={"dof": list(names)},
             attrs={
                 "contents": "poincare sections",
                 "transient": self.transient,
@@ -225,11 +225,6 @@ def check_tolerance(tolerance: float) -> None:
 def check_observe(system: System, observe: int | None) -> int:
     """The observed degree of freedom, or `InputError`."""
     dof = system.observed_dof if observe is None else observe
-    if isinstance(dof, str):
-        known = list(system.dof_names)
-        if dof not in known:
-            raise InputError(f"there is no degree of freedom {dof!r}{suggest(dof, known)}")
-        dof = known.index(dof)
     if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or not 0 <= dof < system.n:
         raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
     return int(dof)

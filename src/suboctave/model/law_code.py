@@ -227,7 +227,7 @@ class Law:
         import sympy
 
         names = {state.name: states[i] for i, state in enumerate(self.q)}
-        names |= {one.name: number(i) for i, one in enumerate(self.c)} | {_THETA: "theta"} | more
+        names |= {one.name: number(i) for i, one in enumerate(self.c)} | {_THETA: "theta", **more}
         parts = [_off_corners(part) for part in parts]
         common, reduced = sympy.cse(parts, symbols=sympy.numbered_symbols("(common)"))
         lines = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.model.element import Array
 from suboctave.timedomain.adaptive_code import adaptive_rows, adaptive_source
@@ -53,7 +54,7 @@ class AdaptiveGroup:
         kernel: AdaptiveKernel,
         numbers: dict[str, Array],
         states: Array,
-        which: Array,
+        which: NDArray[np.int_],
         sizes: Array,
         count: int,
         address: int,
@@ -100,6 +101,6 @@ class AdaptiveGroup:
         """Where they are, (lanes, 2n)."""
         return self._rows("y", 2 * self.kernel.structure.n).T.copy()
 
-    def failed(self) -> Array:
+    def failed(self) -> NDArray[np.bool_]:
         """Which of them came to an end: their steps became too short, or their numbers too large."""
         return self._rows("failed", 1)[0] > 0.0

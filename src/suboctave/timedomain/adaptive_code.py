@@ -1,21 +1,21 @@
 """Code of an adaptive Runge-Kutta method of order 8 for one structure, several trajectories side by side.
 
-`y = (x, x')`, `x'' = M^-1 (p - C x' - K x - e F)`, with the corners of the laws frozen within a step. Every trajectory has
-its own time and its own step; what is decided between two steps is in `adaptive_control`. Numbers lie side by side as in
-`newmark_code`.
+`y = (x, x')`, `x'' = M^-1 (p - C x' - K x - e F)`, with the corners of the laws frozen within a step. Every
+trajectory has its own time and its own step; what is decided between two steps is in `adaptive_control`. Numbers lie
+side by side as in `newmark_code`.
 """
 
 from __future__ import annotations
 
 from suboctave.timedomain.adaptive_control import FIELDS
+from suboctave.timedomain.lanes import HEADER, MOST_UNROLLED, Lanes, Rows, add_asked, asked_states
 from suboctave.timedomain.laws import AskedLaw, Names
-from suboctave.timedomain.newmark_code import HEADER, MOST_UNROLLED, Lanes, Rows
 from suboctave.timedomain.structure import Structure
 
 __all__ = ["adaptive_rows", "adaptive_source"]
 
 _IMPORT = "from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control\n"
-_DRIVER = '''
+_DRIVER = """
 @njit(cache=True, nogil=True, error_model="numpy")
 def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks, measure):
     if start:
@@ -28,7 +28,7 @@ def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks
         if done == {lanes}:
             return 1
     return 0
-'''
+"""
 
 
 def adaptive_rows(structure: Structure, lanes: int) -> Rows:
@@ -44,9 +44,7 @@ def adaptive_rows(structure: Structure, lanes: int) -> Rows:
     }  # fmt: skip
     for name, count in sizes.items():
         rows.add(name, count)
-    for i, placed in enumerate(structure.asked):
-        states = len(placed.inputs) * (2 if placed.element.depends_on_velocity else 1)
-        rows.add(f"asked{i}", states + 1 + placed.law.count + 1 + states)
+    add_asked(rows, structure)
     return rows
 
 
@@ -175,7 +173,7 @@ class _Writer:
         asked = 0
         for e, placed in enumerate(structure.laws):
             if isinstance(placed.law, AskedLaw):
-                states = len(placed.inputs) * (2 if placed.element.depends_on_velocity else 1)
+                states = asked_states(placed)
                 forces[placed.output].append(z(f"asked{asked}", states + 1 + placed.law.count))
                 asked += 1
                 continue
@@ -194,7 +192,8 @@ class _Writer:
         if n <= MOST_UNROLLED:
             for i in range(n):
                 terms = [
-                    f"{z('A', i * n + j)} * {z('trial', j)} + {z('B', i * n + j)} * {z('trial', n + j)}" for j in range(n)
+                    f"{z('A', i * n + j)} * {z('trial', j)} + {z('B', i * n + j)} * {z('trial', n + j)}"
+                    for j in range(n)
                 ]
                 terms += [f"{z('L', i * count + w)} * {wave}" for w, wave in enumerate(waves)]
                 force = "".join(f" - {z('E', i * k + o)} * {z('F', o)}" for o in range(k))
@@ -209,7 +208,8 @@ class _Writer:
         code.raw(f"for i in range({n}):")
         code.indent += 1
         loads = [
-            f"{z.at('L', f'i * {count} + {w}')} * {z('e3', w) if w < 2 * n else z('e5', w - 2 * n)}" for w in range(count)
+            f"{z.at('L', f'i * {count} + {w}')} * {z('e3', w) if w < 2 * n else z('e5', w - 2 * n)}"
+            for w in range(count)
         ]
         code.each([
             f"{z.at('rate', 'i')} = {z.at('trial', f'{n} + i')}",

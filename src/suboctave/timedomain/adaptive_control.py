@@ -1,9 +1,9 @@
 """What an adaptive integrator decides after a step has been tried, for one trajectory of many side by side.
 
-A step is accepted, repeated with another length, or cut where a corner of a law is met. Corners are located without an
-interpolant: the margin over the first interval is Hermite's cubic, a step is tried to its zero, and tried again until it
-lands there; then the flag of the corner is turned. A trial that stops short of the corner is a step like any other. A
-force that is continuous has no jump at the corner, so that landing within `e` leaves an error of order e^2.
+A step is accepted, repeated with another length, or cut where a corner of a law is met. Corners are located without
+an interpolant: the margin over the first interval is Hermite's cubic, a step is tried to its zero, and tried again
+until it lands there; then the flag of the corner is turned. A trial that stops short of the corner is a step like any
+other. A force that is continuous has no jump at the corner, so that landing within `e` leaves an error of order e^2.
 
 Step lengths follow Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5.
 """

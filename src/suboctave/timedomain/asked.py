@@ -1,5 +1,5 @@
-"""Laws that have no code, as functions of C that generated code may call: forces given as Python functions, and elements
-of a user's own.
+"""Laws that have no code, as functions of C that generated code may call: forces given as Python functions, and
+elements of a user's own.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from suboctave.model.coupled import as_coupled
 from suboctave.model.element import Array
+from suboctave.timedomain.lanes import asked_states
 from suboctave.timedomain.structure import PlacedLaw
 
 __all__ = ["Answers"]
@@ -22,15 +23,19 @@ _KIND = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 class Answers:
     """One function of C for all laws that are asked; `address` is where it is, 0 without any.
 
-    It is given the number of the law, of trajectories W, and the address of a block of rows of W numbers: the states that
-    the law reads, the phase, its numbers, then room for the force and its derivatives. What a law raises is kept in
-    `failure`: no exception passes through code of C.
+    It is given the number of the law, of trajectories W, and the address of a block of rows of W numbers: the states
+    that the law reads, the phase, its numbers, then room for the force and its derivatives. What a law raises is kept
+    in `failure`: no exception passes through code of C.
     """
 
     def __init__(self, laws: Sequence[PlacedLaw]) -> None:
         self.failure: BaseException | None = None
         self._laws = [
-            (as_coupled(placed.element), len(placed.inputs) * (2 if placed.element.depends_on_velocity else 1), placed.law)
+            (
+                as_coupled(placed.element),
+                asked_states(placed),
+                placed.law,
+            )
             for placed in laws
         ]
         self._function = _KIND(self._answer)

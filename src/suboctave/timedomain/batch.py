@@ -80,8 +80,8 @@ class Flow:
     samples
         Instants per period at which states are given; of Newmark's method a divisor of `steps_per_period`.
     lanes
-        Trajectories that run side by side; default what suits large batches. Few of them waste less with 8. Results with
-        different numbers may differ in the last bit.
+        Trajectories that run side by side; default what suits large batches. Few of them waste less with 8. Results
+        with different numbers may differ in the last bit.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """Arc tangent and logarithm in plain arithmetic, which the compiler turns into vector instructions.
 
-Calls of a library's functions cannot be put into vector registers. Here both are polynomials without a branch, fitted at
-Chebyshev nodes in high precision:
+Calls of a library's functions cannot be put into vector registers. Here both are polynomials without a branch, fitted
+at Chebyshev nodes in high precision:
 
 - `atan(z) = pi/2 - atan(1/z)` for z > 1, and `atan(t) = t A(t^2)` on 0 <= t <= 1, |error of A| < 3e-17;
 - `log(m 2^e) = e log 2 + s L(s^2)`, s = (m - 1)/(m + 1), m within a factor sqrt(2) of one, |error of L| < 1e-17.
@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
 from numba.extending import intrinsic
 
@@ -136,8 +136,7 @@ def _horner_arctan(w):
     p = ARCTAN[3] + w * p
     p = ARCTAN[2] + w * p
     p = ARCTAN[1] + w * p
-    p = ARCTAN[0] + w * p
-    return p
+    return ARCTAN[0] + w * p
 
 
 @njit(inline="always")
@@ -149,8 +148,7 @@ def _horner_logarithm(w):
     p = LOGARITHM[3] + w * p
     p = LOGARITHM[2] + w * p
     p = LOGARITHM[1] + w * p
-    p = LOGARITHM[0] + w * p
-    return p
+    return LOGARITHM[0] + w * p
 
 
 @njit(inline="always")
@@ -179,8 +177,7 @@ def _horner_sine(w):
     p = SINE[3] + w * p
     p = SINE[2] + w * p
     p = SINE[1] + w * p
-    p = SINE[0] + w * p
-    return p
+    return SINE[0] + w * p
 
 
 @njit(inline="always")
@@ -192,8 +189,7 @@ def _horner_cosine(w):
     p = COSINE[3] + w * p
     p = COSINE[2] + w * p
     p = COSINE[1] + w * p
-    p = COSINE[0] + w * p
-    return p
+    return COSINE[0] + w * p
 
 
 @njit(inline="always")

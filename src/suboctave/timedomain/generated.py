@@ -1,8 +1,8 @@
 """Generated code in files of its own, so that what Numba makes of it is kept between processes.
 
-A file is named by a digest of its content and of everything that its meaning depends on: the same text is never compiled
-twice, and never taken for another. It is written beside its place and renamed, so that several processes may do so at
-once; where nothing can be written, a directory of this process serves.
+A file is named by a digest of its content and of everything that its meaning depends on: the same text is never
+compiled twice, and never taken for another. It is written beside its place and renamed, so that several processes may
+do so at once; where nothing can be written, a directory of this process serves.
 
 The directory is `$SUBOCTAVE_CACHE`, else `suboctave` in the user's directory for caches.
 """
@@ -68,7 +68,8 @@ def module_of(source: str) -> ModuleType:
                 file.write(source)
             os.replace(temporary, path)
         spec = importlib.util.spec_from_file_location(name, path)
-        assert spec is not None and spec.loader is not None
+        assert spec is not None
+        assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
         try:

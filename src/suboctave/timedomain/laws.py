@@ -1,9 +1,9 @@
 """The laws of elements as text of scalar code, for kernels that are generated for one system.
 
-A law tells its force with all derivatives, as Newton's method needs it, or its force alone with the corners frozen: what
-lies beyond a corner is then a flag that an integrator of high order sets, and the force is smooth across the corner.
-Elements that tell their law (`sampling`), those of this package and forces given as text become code; any other is asked
-through a function of C.
+A law tells its force with all derivatives, as Newton's method needs it, or its force alone with the corners frozen:
+what lies beyond a corner is then a flag that an integrator of high order sets, and the force is smooth across the
+corner. Elements that tell their law (`sampling`), those of this package and forces given as text become code; any
+other is asked through a function of C.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ __all__ = ["AskedLaw", "LawText", "Names", "Tangent", "law_text"]
 
 @dataclass(frozen=True)
 class Names:
-    """What the arguments of a law are called: displacements, rates, their rates, numbers, and a prefix for new names."""
+    """What the arguments of a law are called: displacements, rates, their rates, numbers, and a prefix for new
+    names."""
 
     q: Sequence[str]
     r: Sequence[str]
@@ -83,7 +84,8 @@ class PolynomialLaw(LawText):
 
     def numbers(self, element: BaseElement, c: Array) -> list[float]:
         told = element.sampling(c)
-        assert isinstance(told, PolynomialSampling) and told.coefficients is not None
+        assert isinstance(told, PolynomialSampling)
+        assert told.coefficients is not None
         return list(told.coefficients)
 
     def tangent(self, names: Names) -> Tangent:
@@ -105,7 +107,8 @@ class ArctanLaw(LawText):
 
     def numbers(self, element: BaseElement, c: Array) -> list[float]:
         told = element.sampling(c)
-        assert isinstance(told, SharpSampling) and told.steps is not None
+        assert isinstance(told, SharpSampling)
+        assert told.steps is not None
         out = [told.constant, told.slope]
         for point, width, step in zip(told.points, told.widths, told.steps, strict=True):
             out += [point, 1.0 / width, step / math.pi, 0.5 * step * width / math.pi]
@@ -237,7 +240,9 @@ class WrittenLaw(LawText):
         if self.law.rough:  # a power of a half that begins at a corner does not go on beyond it
             lines, parts = self._code([self.law.expression], names)
             return lines, parts[0]
-        corner, swaps, flags = corner_functions(), {}, {}
+        corner = corner_functions()
+        swaps: dict[Any, Any] = {}
+        flags: dict[str, str] = {}
         for i, a in enumerate(self.places):
             on = sympy.Symbol(f"(on {i})")
             flags[on.name] = names.on(i)

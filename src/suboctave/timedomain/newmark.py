@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.model.element import Array
 from suboctave.timedomain.generated import module_of
@@ -53,7 +54,7 @@ class NewmarkGroup:
     """`lanes` trajectories on their way."""
 
     def __init__(
-        self, kernel: NewmarkKernel, numbers: dict[str, Array], states: Array, which: Array, address: int
+        self, kernel: NewmarkKernel, numbers: dict[str, Array], states: Array, which: NDArray[np.int_], address: int
     ) -> None:
         """`states` (lanes, 2n); `which` (lanes,) the set of parameters of each."""
         self.kernel, self.address, self.fresh = kernel, address, True

@@ -18,78 +18,15 @@ those. A trajectory takes part in an iteration only while it needs it, so that i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
 
+from suboctave.timedomain.lanes import HEADER, MOST_UNROLLED, Lanes, Rows, add_asked, asked_states
 from suboctave.timedomain.laws import AskedLaw, Names
 from suboctave.timedomain.structure import Structure
 
-__all__ = ["HEADER", "MOST_UNROLLED", "Lanes", "Rows", "newmark_source"]
+__all__ = ["newmark_source", "rows_of"]
 
-HEADER = '''"""Generated: do not edit."""
-
-from math import acos as arccos, asin as arcsin, atan as arctan
-from math import cos, cosh, exp, log, pi, sin, sinh, sqrt, tan, tanh
-
-import numpy as np
-from numba import njit
-
-from suboctave.timedomain.elementary import absolute, arctan_log, call_back, heaviside, maximum, sign, sine_cosine
-'''
-#: products of matrices of this many rows or fewer are written out
-MOST_UNROLLED = 4
 _MOST_ITERATIONS = 30
-
-
-class Rows:
-    """Where everything lies: `count` rows of W numbers under each name."""
-
-    def __init__(self, lanes: int) -> None:
-        self.lanes = lanes
-        self.begin: dict[str, int] = {}
-        self.size = 0
-
-    def add(self, name: str, count: int) -> None:
-        """Room for `count` rows."""
-        self.begin[name] = self.size
-        self.size += count
-
-    def __call__(self, name: str, i: int = 0) -> str:
-        """The entry of row i in the lane l."""
-        return f"z[{(self.begin[name] + i) * self.lanes} + l]"
-
-    def at(self, name: str, index: str) -> str:
-        """The entry in the lane l of a row whose index is computed."""
-        return f"z[({self.begin[name]} + {index}) * {self.lanes} + l]"
-
-
-class Lanes:
-    """Lines of code; statements on lanes that follow each other share one loop."""
-
-    def __init__(self, lanes: int) -> None:
-        self.lanes = lanes
-        self.lines: list[str] = []
-        self.indent = 1
-        self._pending: list[str] = []
-
-    def each(self, lines: Sequence[str]) -> None:
-        """Statements for every lane l."""
-        self._pending += lines
-
-    def raw(self, *lines: str) -> None:
-        """Statements outside of the loop over lanes."""
-        self._flush()
-        self.lines += ["    " * self.indent + line for line in lines]
-
-    def _flush(self) -> None:
-        if self._pending:
-            pending, self._pending = self._pending, []
-            self.raw(f"for l in range({self.lanes}):")
-            self.lines += ["    " * (self.indent + 1) + line for line in pending]
-
-    def text(self) -> str:
-        """All of it."""
-        self._flush()
-        return "\n".join(self.lines)
 
 
 def rows_of(structure: Structure, lanes: int) -> Rows:
@@ -107,16 +44,15 @@ def rows_of(structure: Structure, lanes: int) -> Rows:
         ("R", m),
     ):  # fmt: skip
         rows.add(name, count)
-    for i, placed in enumerate(structure.asked):
-        states = len(placed.inputs) * (2 if placed.element.depends_on_velocity else 1)
-        rows.add(f"asked{i}", states + 1 + placed.law.count + 1 + states)
+    add_asked(rows, structure)
     return rows
 
 
 def newmark_source(structure: Structure, lanes: int) -> str:
     """The module that integrates `lanes` trajectories of this structure."""
     writer = _Newmark(structure, lanes)
-    return f'{HEADER}\n\n@njit(cache=True, nogil=True, error_model="numpy", fastmath={{"contract"}})\n{writer.function()}\n'
+    decorator = '@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})'
+    return f"{HEADER}\n\n{decorator}\n{writer.function()}\n"
 
 
 class _Newmark:
@@ -156,13 +92,21 @@ class _Newmark:
         return f"{head}\n{text}\n    return slot"
 
     # ------------------------------------------------------------------------------------------------------- parts
+    def _number(self, begin: int, i: int) -> str:
+        """Number i of the law whose numbers begin there."""
+        return self.z("c", begin + i)
+
     def _dot(self, j: int, name: str, absolute: bool = False) -> str:
         """Channel j of a vector with n rows."""
         terms = []
         for i, factor in enumerate(self.structure.channels[j].tolist()):
             factor = abs(factor) if absolute else factor
             if factor:
-                entry = self.z(name, i) if not absolute else f"(abs({self.z('x', i)}) + {self.z('time')} * abs({self.z('v', i)}))"
+                entry = (
+                    self.z(name, i)
+                    if not absolute
+                    else f"(abs({self.z('x', i)}) + {self.z('time')} * abs({self.z('v', i)}))"
+                )
                 terms.append(entry if factor == 1.0 else f"{factor!r} * {entry}")
         return " + ".join(terms)
 
@@ -238,7 +182,7 @@ class _Newmark:
         asked = 0
         for e, placed in enumerate(structure.laws):
             if isinstance(placed.law, AskedLaw):
-                states = len(placed.inputs) * (2 if placed.element.depends_on_velocity else 1)
+                states = asked_states(placed)
                 name, begin = f"asked{asked}", states + 1 + placed.law.count
                 force, told = z(name, begin), [z(name, begin + 1 + i) for i in range(states)]
                 by_q, by_r = told[: len(placed.inputs)], told[len(placed.inputs) :] or [""] * len(placed.inputs)
@@ -248,7 +192,7 @@ class _Newmark:
                     Names(
                         [f"q{j}" for j in placed.inputs],
                         [f"r{j}" for j in placed.inputs],
-                        lambda i, first=placed.begin: z("c", first + i),
+                        functools.partial(self._number, placed.begin),
                         f"e{e}",
                     )
                 )
@@ -415,7 +359,9 @@ class _Newmark:
         code.each([
             # the velocity is linear within a step
             f"turns = {v} * {before} < 0.0",
-            f"top = abs({x} - 0.5 * {z('h')} * ({before} + {v}) + 0.5 * {z('h')} * {before} * {before} / (({before} - {v}) if turns else 1.0))",
+            f"half = 0.5 * {z('h')}",
+            f"share = {before} / (({before} - {v}) if turns else 1.0)",
+            f"top = abs({x} - half * ({before} + {v}) + half * {before} * share)",
             f"now = abs({x})",
             "top = top if turns & (top > now) else now",
             f"{peak} = top if top > {peak} else {peak}",

@@ -1,9 +1,9 @@
 """Which motion a trajectory has settled on, from its stroboscopic points alone.
 
-A motion has the period nT if its last points repeat after n of them, n the smallest such number:
-`|y_(k+n) - y_k| <= tolerance` of the motion's size for the last 2 n pairs. So at least 3 n points are needed. Two things
-cannot be told: a motion of twice the period whose points lie closer together than the tolerance counts as the simple one,
-and one that still creeps by less than the tolerance counts as settled.
+A motion has the period nT if its last points repeat after n of them, n the smallest such number: `|y_(k+n) - y_k| <=
+tolerance` of the motion's size for the last 2 n pairs. So at least 3 n points are needed. Two things cannot be told:
+a motion of twice the period whose points lie closer together than the tolerance counts as the simple one, and one
+that still creeps by less than the tolerance counts as settled.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Repeat:
 def extents(peaks: Array, omega: float, mass: Array) -> Array:
     """Sizes (2n,) of displacements and velocities of a motion, from its largest displacements (n,).
 
-    A degree of freedom that hardly moves counts for a thousandth of the largest one, weighted by the roots of the masses
-    `mass` (n,).
+    A degree of freedom that hardly moves counts for a thousandth of the largest one, weighted by the roots of the
+    masses `mass` (n,).
     """
     weight = np.sqrt(mass)
     floor = _SMALLEST_SHARE * np.max(peaks * weight) / weight

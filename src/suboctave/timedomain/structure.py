@@ -1,8 +1,8 @@
 """What of a system goes into generated code, and what stays a number.
 
 `M x'' + C x' + K x + sum_o e_o F_o(q, q', theta) = p(t)`: elements read the displacements `q_j = d_j . x` of a few
-channels and their rates, and act along a few directions e_o. Channels, directions and the form of every law belong to the
-code; matrices, coefficients, loads and the frequency are numbers, which may differ from trajectory to trajectory.
+channels and their rates, and act along a few directions e_o. Channels, directions and the form of every law belong to
+the code; matrices, coefficients, loads and the frequency are numbers, which may differ from trajectory to trajectory.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.model.coupled import as_coupled
@@ -146,7 +147,7 @@ class Structure:
         ) if self.waves else np.zeros((points, 0))  # fmt: skip
 
     # ------------------------------------------------------------------------------------------------------ lengths
-    def sizes(self, numbers: Numbers, states: Array, which: Array) -> Array:
+    def sizes(self, numbers: Numbers, states: Array, which: NDArray[np.int_]) -> Array:
         """Lengths (B, n): the size of states (B, 2n), and of what loads are sure to cause; see `field`."""
         n, omega = self.n, numbers.omega
         force = np.abs(numbers.loads).sum(axis=2)
