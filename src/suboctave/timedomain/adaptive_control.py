@@ -28,18 +28,20 @@ ERROR_3, ERROR_5 = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.
 FIELDS = (
     "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "h", "next", "t", "period",
     "omega", "sample", "slot", "left", "tries", "stuck", "failed", "peak", "calm", "weight",
-    "crest", "turning",
+    "crest", "turning", "spent",
 )  # fmt: skip
 (
     _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _H, _NEXT, _T, _PERIOD, _OMEGA, _SAMPLE,
     _SLOT, _LEFT, _TRIES, _STUCK, _FAILED, _PEAK, _CALM, _WEIGHT, _CREST,
-    _TURNING,
+    _TURNING, _SPENT,
 ) = range(len(FIELDS))  # fmt: skip
 _SHRINK, _GROW, _SAFETY = 0.3, 6.0, 0.9
 #: a corner is reached when it is this share of a period away, or after so many trials
 _LANDED, _TRIALS = 1e-10, 12
 #: the share of a period below which a step makes no sense
 _SHORTEST = 1e-13
+#: trials between two samples beyond which a motion is given up: it grows without bound, and quicker and quicker
+_MOST = 100000.0
 #: the share of its largest part that a degree of freedom counts for at least
 _SMALLEST_SHARE = 1e-3
 #: displacements above this share of the largest so far may be the largest
@@ -161,6 +163,10 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
     if z[at[_LEFT] * lanes + l] <= 0.0:
         return 1
     h, period = z[at[_H] * lanes + l], z[at[_PERIOD] * lanes + l]
+    z[at[_SPENT] * lanes + l] += 1.0
+    if z[at[_SPENT] * lanes + l] > _MOST:
+        _fail(z, at, l, lanes, n)
+        return 1
     t = z[at[_T] * lanes + l]
     error = _error(z, at, l, lanes, n) / tolerance
     if not error <= 1.0:
@@ -256,6 +262,7 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
         sample += 1.0
         left = z[at[_LEFT] * lanes + l] - 1.0
         z[at[_LEFT] * lanes + l] = left
+        z[at[_SPENT] * lanes + l] = 0.0
         slot = int(z[at[_SLOT] * lanes + l])
         z[at[_SLOT] * lanes + l] = slot + 1.0
         if slot >= skip:
