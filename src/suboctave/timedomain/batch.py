@@ -349,8 +349,8 @@ def check_motions(motions: Motions, flow: Flow) -> None:
         first = int(np.flatnonzero(motions.failed)[0])
         raise ConvergenceError(
             f"{int(motions.failed.sum())} of {len(motions.failed)} trajectories (the first is number {first}) left the "
-            "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite where it "
-            "goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
+            "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite where "
+            "it goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
         )
     if motions.unsettled.any():
         raise ConvergenceError(
