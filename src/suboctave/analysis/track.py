@@ -108,9 +108,9 @@ def track(
     kind = curve_onto(bifurcation, onto)
     if bifurcation.kind == "LP" and repeats_earlier(bifurcation.orbit):
         raise InputError(
-            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: so written, "
-            "every period doubling is a limit point, and its curve is that of the doublings; track the PD, or a limit "
-            "point of the branch that switch_branch gives"
+            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: so, every "
+            "period doubling is a limit point, and its curve is that of the doublings; track the PD, or a limit point "
+            "of the branch that switch_branch gives"
         )
     settings = make_settings(
         bifurcation.orbit.system,
