@@ -108,8 +108,8 @@ def track(
     kind = curve_onto(bifurcation, onto)
     if bifurcation.kind == "LP" and repeats_earlier(bifurcation.orbit):
         raise InputError(
-            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: so, every "
-            "period doubling is a limit point, and its curve is that of the doublings; track the PD, or a limit point "
+            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: thus "
+            "every period doubling is one, and its curve is that of the doublings; track the PD, or a limit point "
             "of the branch that switch_branch gives"
         )
     settings = make_settings(
