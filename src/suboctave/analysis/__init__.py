@@ -1,6 +1,8 @@
 """What a user calls: response curves, curves along any parameter, stability and verification of single motions."""
 
 from suboctave.analysis.attractors import Attractor
+from suboctave.analysis.basin_attractors import BasinAttractor
+from suboctave.analysis.basins import Basins, basins
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagram
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
@@ -8,30 +10,40 @@ from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.integration import Trajectory, integrate
 from suboctave.analysis.isola import Isola, Isolas
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.lyapunov import LyapunovExponents, lyapunov_exponents
+from suboctave.analysis.lyapunov_map import LyapunovMap, lyapunov_map
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch
+from suboctave.analysis.two_trajectories import Separation, TwoTrajectories
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
 __all__ = [
     "Attractor",
+    "BasinAttractor",
+    "Basins",
     "BifurcationDiagram",
     "Branch",
     "BranchPoint",
     "BruteForceDiagram",
     "Isola",
     "Isolas",
+    "LyapunovExponents",
+    "LyapunovMap",
     "PoincareSections",
     "Results",
     "Seeds",
+    "Separation",
     "Table",
     "TrackedBranch",
     "Trajectory",
+    "TwoTrajectories",
     "Verification",
+    "basins",
     "bifurcation_diagram",
     "brute_force_diagram",
     "continue_branch",
@@ -41,6 +53,8 @@ __all__ = [
     "integrate",
     "load",
     "locate_extremum",
+    "lyapunov_exponents",
+    "lyapunov_map",
     "periodic_orbit",
     "poincare_sections",
     "stability",

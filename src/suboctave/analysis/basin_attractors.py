@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.analysis.attractors import Attractor
 from suboctave.analysis.branch import Branch
@@ -24,6 +25,8 @@ __all__ = ["BasinAttractor", "Catalogue", "given_attractors"]
 
 #: relative distance below which two periodic motions are the same
 _SAME = 1e-5
+#: by how much points that have repeated may still be away from the motion that shooting finds
+_ROUGHLY = 1e-2
 #: what a motion that is given may differ in frequency and parameters
 _NEAR = 1e-9
 
@@ -54,7 +57,7 @@ class BasinAttractor:
     period: int
     points: Array
     amplitude: float
-    multipliers: Array
+    multipliers: NDArray[np.complex128]
     given: bool
     traps: list[Trap] = field(default_factory=list, repr=False)
 
@@ -91,6 +94,10 @@ class Catalogue:
                 return i
         return None
 
+    def near(self, number: int, points: Array) -> bool:
+        """Whether these stroboscopic points are those of that one, roughly."""
+        return same_cycle(self.known[number].points, points, self._sizes[number], _ROUGHLY)
+
     def add(self, state: Array, period: int, name: str | None, given: bool) -> int | None:
         """Enter the motion near a state, found by shooting: its number, None if there is no stable one."""
         try:
@@ -112,7 +119,13 @@ class Catalogue:
         return known
 
     def enter(
-        self, name: str, points: Array, amplitude: float, multipliers: Array, given: bool, sizes: Array | None = None
+        self,
+        name: str,
+        points: Array,
+        amplitude: float,
+        multipliers: NDArray[np.complex128],
+        given: bool,
+        sizes: Array | None = None,
     ) -> None:
         """Enter a motion that is known to be one, and look for its neighbourhoods."""
         if sizes is None:
@@ -123,7 +136,7 @@ class Catalogue:
         self.known.append(BasinAttractor(name, len(points), points, amplitude, multipliers, given, traps))
         self._sizes.append(sizes)
 
-    def trapped(self, states: Array) -> Array:
+    def trapped(self, states: Array) -> NDArray[np.int_]:
         """For every state (B, 2n) the number of the attractor that it is trapped by, -1 if by none."""
         out = np.full(len(states), -1)
         for i, one in enumerate(self.known):
@@ -148,7 +161,9 @@ class Catalogue:
         base = "T" if period == 1 else f"{period}T"
         taken = {one.name for one in self.known}
         return next(
-            name for name in (base if k == 1 else f"{base} ({k})" for k in range(1, len(taken) + 2)) if name not in taken
+            name
+            for name in (base if k == 1 else f"{base} ({k})" for k in range(1, len(taken) + 2))
+            if name not in taken
         )
 
 
@@ -175,7 +190,8 @@ def given_attractors(catalogue: Catalogue, given: Any) -> None:
         entered = {number for state, nu in found if (number := catalogue.add(state, nu, name, True)) is not None}
         if not entered:
             raise InputError(
-                f"attractors: {name or repr(one)} has no stable motion at omega={catalogue.omega:g} and these parameters"
+                f"attractors: {name or repr(one)} has no stable motion at omega={catalogue.omega:g} and "
+                "these parameters"
             )
 
 
@@ -206,7 +222,7 @@ def _crossings(catalogue: Catalogue, branch: Branch) -> list[tuple[Array, int]]:
     if not orbits:
         return []
     for name, value in wanted.items():
-        if name != branch.name and name in orbits[0].values | {"omega": 0.0}:
+        if name != branch.name and name in {**orbits[0].values, "omega": 0.0}:
             has = orbits[0].omega if name == "omega" else orbits[0].values[name]
             if abs(has - value) > _NEAR * max(abs(value), 1e-300):
                 return []

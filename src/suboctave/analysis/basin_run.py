@@ -1,7 +1,7 @@
 """The work behind `basins`: states are followed until they are trapped, chunk by chunk, and kept as they come.
 
-What is known after a chunk depends on the chunks before it only; a run that goes on from a journal therefore ends as one
-that was never stopped.
+What is known after a chunk depends on the chunks before it only; a run that goes on from a journal therefore ends as
+one that was never stopped.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.analysis.attractors import attractor_of
 from suboctave.analysis.basin_attractors import Catalogue
@@ -87,7 +88,8 @@ class BasinRun:
         """A digest of everything that the result depends on."""
         c = self.catalogue
         said = to_json([
-            describe(c.system), c.omega, c.values, c.observe, c.tolerance, self.periods, self.period_tolerance, self.counts,
+            describe(c.system), c.omega, c.values, c.observe, c.tolerance,
+            self.periods, self.period_tolerance, self.counts,
         ])  # fmt: skip
         return hashlib.sha256(said.encode() + self.states.tobytes()).hexdigest()
 
@@ -95,7 +97,9 @@ class BasinRun:
         assert self.journal is not None
         for record in self.journal.records:
             if record.kind == "basins" and record.said["mark"] != mark:
-                raise InputError(f"{place} is of other basins (another system, frequency, grid or option): name another file")
+                raise InputError(
+                    f"{place} is of other basins (another system, frequency, grid or option): name another file"
+                )
             if record.kind == "attractor":
                 points, multipliers = (from_json(record.said[name]) for name in ("points", "multipliers"))
                 said = record.said
@@ -161,7 +165,7 @@ class BasinRun:
             raise KeyboardInterrupt
         return motions
 
-    def _settle(self, states: Array, told: Callable[[float], None]) -> tuple[Array, Array]:
+    def _settle(self, states: Array, told: Callable[[float], None]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
         """Labels of states (B, 2n), and the periods after which they were known."""
         labels = self.catalogue.trapped(states)
         labels[labels < 0] = OPEN
@@ -182,7 +186,7 @@ class BasinRun:
             self._look_at(active, y[active], labels)
         return labels, settling
 
-    def _look_at(self, which: Array, states: Array, labels: Array) -> None:
+    def _look_at(self, which: NDArray[np.int_], states: Array, labels: NDArray[np.int_]) -> None:
         """Tell motions that were not trapped by their next points."""
         c = self.catalogue
         motions = self._over(states, _LOOKED_AT, _LOOKED_AT, measure=True)
@@ -198,10 +202,8 @@ class BasinRun:
             number = c.find(found.points)
             if number is None:
                 number = c.add(found.state, found.period, None, False)
-            if number is None:  # it repeats, but shooting does not confirm that it is stable
-                labels[i] = APERIODIC
-                continue
-            labels[i] = number
+            # it repeats, but shooting may not confirm that it does, or that it is stable
+            labels[i] = number if number is not None and c.near(number, found.points) else APERIODIC
 
     def _follow_some(self) -> None:
         """Follow some of the trajectories that were stopped to the end."""

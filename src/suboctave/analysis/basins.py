@@ -38,7 +38,7 @@ class Basins:
     Attributes
     ----------
     x, y
-        (W,) and (V,): the middles of the cells, along the coordinates `plane`.
+        (W,) and (V,): the states' coordinates along `plane`, from end to end of the box.
     labels
         (V, W): the number of the attractor in `attractors`; -1 of motions that do not repeat, -2 where the trajectory
         left the range of numbers, -3 where nothing was computed (an interruption).
@@ -75,7 +75,7 @@ class Basins:
 
     @property
     def shares(self) -> dict[str, float]:
-        """The share of the computed cells that each has, by name."""
+        """The share of the computed states that each has, by name."""
         count = max(int((self.labels != OPEN).sum()), 1)
         return {name: float((self.labels == i).sum()) / count for i, name in self.names.items() if i != OPEN}
 
@@ -87,9 +87,10 @@ class Basins:
 
     @property
     def grid_errors(self) -> dict[str, float]:
-        """Of the shares, as areas: every cell at a boundary may be off by half a cell, and each by itself.
+        """Of the shares, as areas: the cell about a state at a boundary may belong to both sides.
 
-        Cells next to one of another label count, with a standard deviation of half a cell: `sqrt(B) / (2 N)`.
+        The B states next to one of another label count with a standard deviation of half a cell each, independently:
+        `sqrt(B) / (2 N)`. Where boundaries are finer than the grid, `standard_errors` say more.
         """
         count = max(int((self.labels != OPEN).sum()), 1)
         return {
@@ -99,7 +100,7 @@ class Basins:
         }
 
     def attractor_at(self, x: float, y: float) -> BasinAttractor | None:
-        """The attractor of the cell that holds a point of the plane; None if its motion is aperiodic or unknown."""
+        """The attractor of the state next to a point of the plane; None if its motion is aperiodic or unknown."""
         places = []
         for name, value, grid in (("x", x, self.x), ("y", y, self.y)):
             step = (grid[-1] - grid[0]) / max(len(grid) - 1, 1) or 1.0
@@ -183,9 +184,7 @@ class Basins:
         return [names.index(name) for name in self.plane]
 
     def __repr__(self) -> str:
-        told = ", ".join(
-            f"{name} {share:.4f} +- {self.grid_errors[name]:.1g}" for name, share in self.shares.items()
-        )
+        told = ", ".join(f"{name} {share:.4f} +- {self.grid_errors[name]:.1g}" for name, share in self.shares.items())
         return (
             f"Basins({len(self.x)} x {len(self.y)} states at omega={self.omega:.8g}: {told}"
             f"{'' if self.complete else ', not complete'})"
@@ -218,7 +217,7 @@ def basins(
     omega, parameters
         Of the load; other values of some parameters, by name.
     box
-        `((from, to), (from, to))` of the two coordinates; trajectories begin in the middles of `grid` cells.
+        `((from, to), (from, to))` of the two coordinates; `grid` states along each, the ends among them.
     plane, rest
         The two coordinates: names `"x_0"`, `"v_2"` (of displacements and velocities) or numbers in the state (2n,);
         default displacement and velocity of the observed degree of freedom. All others are as in `rest`, (2n,) or a
@@ -226,7 +225,7 @@ def basins(
     attractors
         Motions (of harmonic balance, of shooting, found in time), branches or diagrams of which the stable motions at
         this frequency are taken; one, several, or by name in a mapping. What else attracts is found and named: a
-        coarse sample of the cells is followed first, and every trajectory that comes to no known motion is looked at.
+        coarse sample of the states is followed first, and every trajectory that comes to no known motion is looked at.
     periods
         Periods of the load after which a trajectory that is not trapped yet is told by its last points.
     tolerance
@@ -239,8 +238,8 @@ def basins(
     observe, workers, progress
         As in `poincare_sections`. The result does not depend on the number of workers.
 
-    A trajectory is stopped as soon as it lies in an ellipsoid about a stroboscopic point of a stable motion in which the
-    map over a few periods contracts, in the norm adapted to the monodromy matrix. The derivative of the map is looked
+    A trajectory is stopped as soon as it lies in an ellipsoid about a stroboscopic point of a stable motion in which
+    the map over a few periods contracts, in the norm adapted to the monodromy matrix. The derivative of the map is looked
     at in 192 points of it, and the radius that passes is reduced by a tenth: no proof, so that up to 200 of the
     stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing contracts
     has no such neighbourhood; its trajectories are followed for all `periods`.
@@ -260,11 +259,9 @@ def basins(
     columns = _plane(system, plane, observe)
     sides, counts = _box(box), _grid(grid)
     periods = check_count("periods", periods)
-    middles = [
-        low + (np.arange(count) + 0.5) * (high - low) / count for (low, high), count in zip(sides, counts, strict=True)
-    ]
+    ends = [np.linspace(low, high, count) for (low, high), count in zip(sides, counts, strict=True)]
     states = np.repeat(state[None], counts[0] * counts[1], axis=0)
-    states[:, columns[0]], states[:, columns[1]] = np.tile(middles[0], counts[1]), np.repeat(middles[1], counts[0])
+    states[:, columns[0]], states[:, columns[1]] = np.tile(ends[0], counts[1]), np.repeat(ends[1], counts[0])
     catalogue = Catalogue(system, float(omega), values, observe, tolerance, workers)
     run = BasinRun(catalogue, states, counts, periods, period_tolerance)
     with reporting(progress, "basins") as report:
@@ -277,8 +274,8 @@ def basins(
             run.close()
     names = coordinates(system)
     return Basins(
-        x=middles[0],
-        y=middles[1],
+        x=ends[0],
+        y=ends[1],
         labels=run.labels.reshape(counts[1], counts[0]),
         settling=run.settling.reshape(counts[1], counts[0]),
         attractors=catalogue.known,
@@ -314,7 +311,9 @@ def _plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
         elif isinstance(one, int | np.integer) and not isinstance(one, bool) and 0 <= one < len(names):
             found.append(int(one))
         else:
-            raise InputError(f"plane: {one!r} is no coordinate: a name such as x_0, or a number from 0 to {len(names) - 1}")
+            raise InputError(
+                f"plane: {one!r} is no coordinate: a name such as x_0, or a number from 0 to {len(names) - 1}"
+            )
     if found[0] == found[1]:
         raise InputError(f"plane={plane!r} names one coordinate twice")
     return found[0], found[1]

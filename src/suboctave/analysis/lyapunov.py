@@ -333,7 +333,13 @@ def smooth_weights(count: int) -> Array:
 
 
 def _starts(
-    system: System, first: Array, omega: float, values: Mapping[str, float], transient: int, count: int, tol: float | None
+    system: System,
+    first: Array,
+    omega: float,
+    values: Mapping[str, float],
+    transient: int,
+    count: int,
+    tol: float | None,
 ) -> Array:
     """States (count, 2n): the end of a transient, and others about it."""
     base = Flow(system, "accurate", tolerance=tol, lanes=FEW)
@@ -369,6 +375,6 @@ def check_law(system: System, values: Mapping[str, float]) -> None:
             slope = max(abs(f[1] - f[0]), abs(f[3] - f[2]))
             if abs(f[2] - f[1]) > 10.0 * slope + 1e-6 * float(np.max(np.abs(f))):
                 raise InputError(
-                    f"{element.label}: the force jumps at {float(point):g}; the derivative of the flow does not contain "
-                    "that. Write the law with a steep but continuous passage"
+                    f"{element.label}: the force jumps at {float(point):g}; the derivative of the flow does not "
+                    "contain that. Write the law with a steep but continuous passage"
                 )

@@ -14,6 +14,7 @@ from suboctave.analysis.checks import check_parameter
 from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.lyapunov import check_law, smooth_weights
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -89,14 +90,25 @@ class LyapunovMap:
             },
         )
 
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """The map in colours, boundaries over it if any are given; saved if a path is given.
+    def plot(self, path: Any = None, curves: Any = (), **options: Any) -> Any:
+        """The map in colours, tracked curves of bifurcations over it if any are given; saved if a path is given.
 
-        Options are those of `pictures.plot_lyapunov_map`: `curves` (tracked branches), `title`, `size`.
+        Options are those of `pictures.plot_lyapunov_map`: `title`, `size`.
         """
         from suboctave.pictures.chaos import plot_lyapunov_map
 
-        return plot_lyapunov_map(self.to_xarray(), path, **options)
+        lines = []
+        for curve in [curves] if isinstance(curves, TrackedBranch) else curves:
+            if not isinstance(curve, TrackedBranch):
+                raise InputError(f"curves= takes tracked curves of bifurcations, not {type(curve).__name__}")
+            lines.append(
+                (
+                    f"{curve.kind} of {curve.nu}T" if curve.nu > 1 else f"{curve.kind} of T",
+                    curve.omega,
+                    curve.parameter(self.name),
+                )
+            )
+        return plot_lyapunov_map(self.to_xarray(), path, lines=lines, **options)
 
     def __repr__(self) -> str:
         share = float(self.chaotic.mean())
@@ -164,7 +176,7 @@ def lyapunov_map(
     check_law(at, {parameter: float(column[0])})
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=1)
     shape = len(column), len(frequencies)
-    varied = {parameter: np.repeat(column, shape[1]), **fixed}
+    varied: dict[str, Any] = {parameter: np.repeat(column, shape[1]), **fixed}
     with reporting(progress, "Lyapunov map") as report:
         motions = flow.over(
             np.repeat(first[None], shape[0] * shape[1], axis=0), np.tile(frequencies, shape[0]), transient + periods,
@@ -182,6 +194,6 @@ def lyapunov_map(
     per_time = np.tile(frequencies, shape[0]) / (2.0 * np.pi)
     mean, error = (np.where(smooth, two[1], two[0]) * per_time for two in (means, errors))
     return LyapunovMap(
-        parameter, frequencies, column, mean.reshape(shape), error.reshape(shape), bool(motions.finished.all()), periods,
-        transient, at,
+        parameter, frequencies, column, mean.reshape(shape), error.reshape(shape), bool(motions.finished.all()),
+        periods, transient, at,
     )  # fmt: skip

@@ -163,11 +163,10 @@ def separate(
     starts = np.repeat(first[None], len(offsets) + 1, axis=0)
     starts[1:, system.observed_dof] += offsets
     weight = np.sqrt(np.diagonal(system.mass.value({**system.parameters, **values})))
-    metric = np.concatenate([float(omega) * weight, weight])
+    metric: Array = np.concatenate([float(omega) * weight, weight])
     settings = how.steps_per_period if how.integrator == "newmark" else how.tolerances
     rates, told, distances = [], [], []
-    period = 2.0 * np.pi / float(omega)
-    time = period * np.arange(how.periods + 1)
+    time: Array = np.arange(how.periods + 1, dtype=float) * (2.0 * np.pi / float(omega))
     for i, setting in enumerate(settings):
         if how.integrator == "newmark":
             # what Newton's method leaves must stay below the offset

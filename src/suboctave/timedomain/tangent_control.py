@@ -34,7 +34,12 @@ def follow(z, at, l, lanes, n, m, skip, grown):
                 dot = 0.0
                 for i in range(size):
                     weight = z[(at[_METRIC] + i) * lanes + l]
-                    dot += weight * weight * z[(at[_W] + b * size + i) * lanes + l] * z[(at[_W] + c * size + i) * lanes + l]
+                    dot += (
+                        weight
+                        * weight
+                        * z[(at[_W] + b * size + i) * lanes + l]
+                        * z[(at[_W] + c * size + i) * lanes + l]
+                    )
                 for i in range(size):
                     z[(at[_W] + c * size + i) * lanes + l] -= dot * z[(at[_W] + b * size + i) * lanes + l]
             length = 0.0

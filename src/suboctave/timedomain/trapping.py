@@ -4,10 +4,10 @@ About every stroboscopic point z of the motion, an ellipsoid `|R (y - z)| <= r`,
 
     (Phi / rho')^T S (Phi / rho') - S = -1,   S = R^T R,   rho < rho' < 1,   rho the largest |multiplier|,
 
-the norm in which Phi contracts. If the map over a few periods of the motion contracts everywhere in the ellipsoid, which
-is convex, it maps it into itself and every trajectory in it tends to z (Banach). That the derivative of the map is at
-most `_BOUND` < 1 is looked at in a sample of points, half of them on the boundary, and the radius that passes is reduced
-by a tenth: strong evidence, not a proof; `basins` follows a sample of what it stopped to the end.
+the norm in which Phi contracts. If the map over a few periods of the motion contracts everywhere in the ellipsoid,
+which is convex, it maps it into itself and every trajectory in it tends to z (Banach). That the derivative of the map
+is at most `_BOUND` < 1 is looked at in a sample of points, half of them on the boundary, and the radius that passes is
+reduced by a tenth: strong evidence, not a proof; `basins` follows a sample of what it stopped to the end.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
 from suboctave.model.element import Array
@@ -41,10 +42,10 @@ class Trap:
     factor: Array
     radius: float
 
-    def holds(self, states: Array) -> Array:
+    def holds(self, states: Array) -> NDArray[np.bool_]:
         """Which of the states (B, 2n) are inside."""
         away = (states - self.point) @ self.factor.T
-        inside: Array = np.einsum("ij,ij->i", away, away) <= self.radius**2
+        inside: NDArray[np.bool_] = np.einsum("ij,ij->i", away, away) <= self.radius**2
         return inside
 
 
