@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.analysis.forces import check_forces
 from suboctave.analysis.lyapunov import averaged
 from suboctave.errors import InputError
 from suboctave.timedomain import shoot
@@ -56,7 +57,7 @@ def test_quasi_periodic_motion_has_a_zero_exponent():
     """Two uncoupled oscillators, one with van der Pol's damping, the other one loaded: one exponent vanishes."""
     system = so.System(
         np.eye(2), np.diag([0.0, 0.2]), np.diag([1.0, 3.0]),
-        elements=[so.Expression("0.3*(x**2 - 1)*x'", variables={"x": 0})],
+        elements=[so.Expression(0, "0.3*(x**2 - 1)*x'")],
         loads=[so.HarmonicLoad(1, amplitude=1.0)],
     )  # fmt: skip
     found = so.lyapunov_exponents(system, [1.0, 0.0, 0.0, 0.0], omega=1.3, periods=600, transient=200, trajectories=8)
@@ -102,14 +103,13 @@ def test_map_agrees_with_single_points():
 
 
 def test_a_force_that_jumps_is_refused():
-    def dry(x, v, c):
-        return np.sign(x)
+    def system(law):
+        return so.System(1.0, 0.1, 1.0, elements=[so.Callable(0, law)], loads=[so.HarmonicLoad(0, amplitude=1.0)])
 
-    system = so.System(
-        1.0, 0.1, 1.0, elements=[so.Callable(0, dry, corners=[0.0])], loads=[so.HarmonicLoad(0, amplitude=1.0)]
-    )
-    with pytest.raises(InputError, match="jumps"):
-        so.lyapunov_exponents(system, omega=1.0)
+    with pytest.raises(InputError, match="jumps by 0.6"):
+        check_forces(system(lambda x, v: 0.3 * np.sign(x - 0.1)), np.zeros(2), 1.0, {})
+    check_forces(system(lambda x, v: 0.3 * np.tanh(1e4 * x)), np.zeros(2), 1.0, {})
+    check_forces(system(lambda x, v: 5.0 * np.maximum(x - 0.3, 0.0)), np.zeros(2), 1.0, {})
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ SYSTEMS = {
     "stops": one(so.ElasticStop(0, 5.0, 0.3), so.ElasticStop(0, 3.0, -0.5), so.CubicSpring(0, 0.2)),
     "rounded": one(so.ElasticStop(0, 5.0, 0.3, regularization=80.0)),
     "dampers": one(so.QuadraticDamper(0, 0.3), so.TanhFriction(0, 0.2, 0.3)),
-    "text": one(so.Expression("2*max(x - 0.2, 0) + 0.1*x' * abs(x') + 0.1*x**3", variables={"x": 0})),
+    "text": one(so.Expression(0, "2*max(x - 0.2, 0) + 0.1*x' * abs(x') + 0.1*x**3")),
     "two": two(so.ElasticStop((0, 1), 4.0, 0.2), so.CubicSpring(1, 0.5)),
 }
 

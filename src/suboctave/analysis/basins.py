@@ -239,10 +239,10 @@ def basins(
         As in `poincare_sections`. The result does not depend on the number of workers.
 
     A trajectory is stopped as soon as it lies in an ellipsoid about a stroboscopic point of a stable motion in which
-    the map over a few periods contracts, in the norm adapted to the monodromy matrix. The derivative of the map is looked
-    at in 192 points of it, and the radius that passes is reduced by a tenth: no proof, so that up to 200 of the
-    stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing contracts
-    has no such neighbourhood; its trajectories are followed for all `periods`.
+    the map over a few periods contracts, in the norm adapted to the monodromy matrix. The derivative of the map is
+    looked at in 192 points of it, and the radius that passes is reduced by a tenth: no proof, so that up to 200 of
+    the stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing
+    contracts has no such neighbourhood; its trajectories are followed for all `periods`.
 
     Raises
     ------

@@ -7,7 +7,7 @@ with tangent vectors W that are made orthonormal after every step (Benettin, Gal
 stretches give the standard errors.
 
 Averages of regular motions, periodic or quasi-periodic, converge much faster with smooth weights,
-`exp(-1 / (s (1 - s)))` over a stretch 0 < s < 1, than with equal ones (Das, Sander, Yorke, SIAM J. Appl. Dyn. Syst. 2016);
+`exp(-1 / (s (1 - s)))` over a stretch 0 < s < 1, than with equal ones (Das et al., Nonlinearity 30, 2017);
 those of chaotic motions do not. Both are taken, and that with the smaller standard errors is told.
 """
 
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
+from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import FEW, _not_negative, start_state
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.two_trajectories import Separation, TwoTrajectories, separate
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["LyapunovExponents", "check_law", "lyapunov_exponents", "smooth_weights"]
+__all__ = ["LyapunovExponents", "lyapunov_exponents", "smooth_weights"]
 
 #: how far from the first trajectory the others begin, in sizes of the motion
 _APART = 1e-3
@@ -245,8 +246,8 @@ def lyapunov_exponents(
         As in `poincare_sections`.
 
     Forces must be continuous: where one jumps, neighbours part by a jump of their own that the derivative of the flow
-    does not contain. Laws of this package and forces given as text are; of a function of one's own the places that it
-    names are looked at, and a jump elsewhere is not seen.
+    does not contain. Laws of this package and forces given as text are; those of one's own are looked at along the
+    motion, and refused where they jump.
 
     Raises
     ------
@@ -270,9 +271,9 @@ def lyapunov_exponents(
         raise InputError(f"count={count}: a system of {system.n} degrees of freedom has {size} exponents")
     periods, trajectories = check_count("periods", periods), check_count("trajectories", trajectories)
     transient = _not_negative("transient", transient)
-    check_law(system, values)
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=count)
     with reporting(progress, "Lyapunov exponents") as report:
+        check_forces(system, first, float(omega), values)
         starts = _starts(system, first, omega, values, transient, trajectories, tolerance)
         motions = flow.over(starts, omega, transient + periods, values, transient, workers=workers, report=report)
     if not motions.finished.all():
@@ -353,28 +354,3 @@ def _starts(
     away = np.random.default_rng(0).normal(size=(count, 2 * system.n))
     away[0] = 0.0
     return motions.end[0] + _APART * sizes * away
-
-
-def check_law(system: System, values: Mapping[str, float]) -> None:
-    """Refuse forces that jump at a place that their element names."""
-    from suboctave.model.coupled import as_coupled
-    from suboctave.model.sampling import CornerSampling
-
-    for element in system.elements:
-        c = element.coefficient_values({**system.parameters, **values})
-        told = element.sampling(c)
-        if not isinstance(told, CornerSampling):
-            continue
-        law = as_coupled(element)
-        rows = len(law.inputs(system.n)) * (2 if element.depends_on_velocity else 1)
-        for point in told.points:
-            near = 1e-9 * max(abs(float(point)), 1e-3)
-            q = np.zeros((rows, 4))
-            q[0] = point + near * np.array([-2.0, -1.0, 1.0, 2.0])
-            f = np.asarray(law.tangent(q, np.zeros(4), c)[0], dtype=float)
-            slope = max(abs(f[1] - f[0]), abs(f[3] - f[2]))
-            if abs(f[2] - f[1]) > 10.0 * slope + 1e-6 * float(np.max(np.abs(f))):
-                raise InputError(
-                    f"{element.label}: the force jumps at {float(point):g}; the derivative of the flow does not "
-                    "contain that. Write the law with a steep but continuous passage"
-                )

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from suboctave.analysis.brute_force import _grid, _spread
 from suboctave.analysis.checks import check_parameter
+from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import _not_negative, start_state
-from suboctave.analysis.lyapunov import check_law, smooth_weights
+from suboctave.analysis.lyapunov import smooth_weights
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
@@ -173,7 +174,7 @@ def lyapunov_map(
     periods = check_count("periods", periods)
     if periods < 2 * _STRETCHES:
         raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
-    check_law(at, {parameter: float(column[0])})
+    check_forces(at, first, float(frequencies[0]), {parameter: float(column[0])})
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=1)
     shape = len(column), len(frequencies)
     varied: dict[str, Any] = {parameter: np.repeat(column, shape[1]), **fixed}
