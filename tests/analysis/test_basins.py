@@ -8,6 +8,7 @@ import pytest
 import suboctave as so
 from suboctave.analysis import basin_run
 from suboctave.errors import InputError
+from suboctave.timedomain import shoot
 
 DUFFING = so.library.duffing(c=0.1, alpha=1.0, F=0.3)
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
@@ -113,7 +114,7 @@ def test_mistakes():
         ({"grid": 5}, "grid"),
         ({"box": (-1.0, 1.0)}, "box"),
         ({"attractors": 3}, "attractors"),
-        ({"attractors": [so.periodic_orbit(DUFFING, omega=1.4)]}, "omega=1.4"),
+        ({"attractors": [shoot(DUFFING, [-0.2, 0.0], 1.4)]}, "omega=1.4"),
         ({"parameters": {"alpa": 1.0}}, "alpha"),
     ):
         with pytest.raises(InputError, match=said):

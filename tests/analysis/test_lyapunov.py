@@ -89,14 +89,14 @@ def test_two_trajectories():
 
 def test_map_agrees_with_single_points():
     chart = so.lyapunov_map(
-        CHAOTIC, [2.3, 2.6], parameter="p", values=np.array([0.3, 1.6]), periods=160, transient=100, tolerance=1e-9
+        CHAOTIC, [2.2, 2.6], parameter="p", values=np.array([0.3, 1.6]), periods=160, transient=100, tolerance=1e-9
     )
     assert chart.chaotic.tolist() == [[False, False], [False, True]]
-    motion = shoot(CHAOTIC, so.integrate(CHAOTIC, omega=2.3, periods=1, transient=300, parameters={"p": 0.3}).end, 2.3,
+    motion = shoot(CHAOTIC, so.integrate(CHAOTIC, omega=2.2, periods=1, transient=300, parameters={"p": 0.3}).end, 2.2,
                    values={"p": 0.3})  # fmt: skip
     assert chart.exponent[0, 0] == pytest.approx(np.log(np.abs(motion.multipliers[0])) / motion.period, abs=2e-4)
     alone = so.lyapunov_map(
-        CHAOTIC, [2.3, 2.6], parameter="p", values=np.array([0.3, 1.6]), periods=160, transient=100, tolerance=1e-9,
+        CHAOTIC, [2.2, 2.6], parameter="p", values=np.array([0.3, 1.6]), periods=160, transient=100, tolerance=1e-9,
         workers=1,
     )  # fmt: skip
     assert np.array_equal(chart.exponent, alone.exponent)
@@ -106,7 +106,7 @@ def test_a_force_that_jumps_is_refused():
     def system(law):
         return so.System(1.0, 0.1, 1.0, elements=[so.Callable(0, law)], loads=[so.HarmonicLoad(0, amplitude=1.0)])
 
-    with pytest.raises(InputError, match="jumps by 0.6"):
+    with pytest.raises(InputError, match=r"jumps by 0\.6"):
         check_forces(system(lambda x, v: 0.3 * np.sign(x - 0.1)), np.zeros(2), 1.0, {})
     check_forces(system(lambda x, v: 0.3 * np.tanh(1e4 * x)), np.zeros(2), 1.0, {})
     check_forces(system(lambda x, v: 5.0 * np.maximum(x - 0.3, 0.0)), np.zeros(2), 1.0, {})

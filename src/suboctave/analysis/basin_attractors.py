@@ -112,10 +112,10 @@ class Catalogue:
                 return self.add(solution.state, shorter, name, given)
         known = self.find(points)
         if known is None:
-            self.enter(name or self._name(period), points, solution.amplitude, solution.multipliers, given, sizes)
+            self.enter(self._name(name, period), points, solution.amplitude, solution.multipliers, given, sizes)
             return len(self.known) - 1
         if given and not self.known[known].given and name:
-            self.known[known] = replace(self.known[known], name=name, given=True)
+            self.known[known] = replace(self.known[known], name=self._name(name, period), given=True)
         return known
 
     def enter(
@@ -157,8 +157,9 @@ class Catalogue:
         mass = np.diagonal(self.system.mass.value({**self.system.parameters, **self.values}))
         return extents(motions.peaks[0].max(axis=0), self.omega, mass)
 
-    def _name(self, period: int) -> str:
-        base = "T" if period == 1 else f"{period}T"
+    def _name(self, name: str | None, period: int) -> str:
+        """A name that no other one has."""
+        base = name or ("T" if period == 1 else f"{period}T")
         taken = {one.name for one in self.known}
         return next(
             name

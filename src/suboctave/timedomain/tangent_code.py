@@ -2,7 +2,8 @@
 
     w' = Df(y, t) w,   Df from the laws with their corners frozen, as in the step itself
 
-with the stages and the step of the trajectory: what comes out is the derivative of the numerical flow. At a corner of a
+with the stages and the step of the trajectory: what comes out is the derivative of the numerical flow. Their errors
+count for the length of the step, too: directions that the motion does not move in may be the stiff ones. At a corner of a
 continuous force the tangent flow is continuous, so nothing is added there. Beside it goes the rate of volume,
 `div f = -trace M^-1 (C + sum e_o dF_o/dx')`, whose integral is the sum of all exponents (Liouville).
 """
@@ -16,6 +17,8 @@ from suboctave.timedomain.structure import Structure
 
 __all__ = ["tangent_rows", "tangent_source"]
 
+#: what an error of a tangent vector counts for, beside one of the motion
+_LOOSER = 1e-3
 _IMPORT = "from suboctave.timedomain.tangent_control import follow\n"
 _DRIVER = """
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -41,6 +44,7 @@ def tangent_rows(structure: Structure, lanes: int, count: int) -> Rows:
     sizes = {
         "w": 2 * n * count, "goal": 2 * n * count, "W": 24 * n * count, "dF": k, "S": 2 * m * k, "G": m * k, "trace": 1,
         "metric": 2 * n, "log": count, **dict.fromkeys(("used", "rate_of_volume", "volume", "seen", "plain"), 1),
+        **dict.fromkeys(("sum3", "sum5", "part3", "part5", "before", "after"), 1),
     }  # fmt: skip
     for name, size in sizes.items():
         rows.add(name, size)
@@ -88,8 +92,44 @@ class _TangentWriter(Writer):
         code.each([f"{z.at('e3', 'i')} += a * {k}", f"{z.at('e5', 'i')} += b * {k}"])
         code.raw("")
         code.indent -= 2
+        self._error()
         self._corners()
         return f"def attempt(z, address):\n{code.text()}\n    return 0"
+
+    def _error(self) -> None:
+        """The error of the tangent vectors, each relative to its length, in units of the motion's tolerance."""
+        n, z, code = self.n, self.z, self.code
+        size = 2 * n
+        code.each([f"{z('extra')} = 0.0"])
+        code.raw(f"for c in range({self.count}):")
+        code.indent += 1
+        code.each([f"{z(name)} = 0.0" for name in ("sum3", "sum5", "before", "after")])
+        code.raw(f"for i in range({size}):")
+        code.indent += 1
+        code.each([f"{z('part3')} = 0.0", f"{z('part5')} = 0.0"])
+        code.raw("for j in range(12):", "    a, b = ERROR_3[j], ERROR_5[j]")
+        code.indent += 1
+        rate = z.at("W", f"(j * {self.count} + c) * {size} + i")
+        code.each([f"{z('part3')} += a * {rate}", f"{z('part5')} += b * {rate}"])
+        code.raw("")
+        code.indent -= 1
+        weight = z.at("metric", "i")
+        code.each([
+            f"{z('sum3')} += ({weight} * {z('part3')}) ** 2",
+            f"{z('sum5')} += ({weight} * {z('part5')}) ** 2",
+            f"{z('before')} += ({weight} * {z.at('w', f'c * {size} + i')}) ** 2",
+            f"{z('after')} += ({weight} * {z.at('goal', f'c * {size} + i')}) ** 2",
+        ])  # fmt: skip
+        code.raw("")
+        code.indent -= 1
+        code.each([
+            f"length = {z('before')} if {z('before')} > {z('after')} else {z('after')}",
+            f"mean = ({z('sum5')} + 0.01 * {z('sum3')}) * {size} * length",
+            f"error = {_LOOSER} * {z('h')} * {z('sum5')} / sqrt(mean if mean > 0.0 else 1.0)",
+            f"{z('extra')} = error if error > {z('extra')} else {z('extra')}",
+        ])  # fmt: skip
+        code.raw("")
+        code.indent -= 1
 
     def _towards(self, goal: str, origin: str, rates: str, size: int) -> None:
         """`goal = origin + h sum_j a_sj rates_j` in stage s."""

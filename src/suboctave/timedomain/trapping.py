@@ -44,8 +44,9 @@ class Trap:
 
     def holds(self, states: Array) -> NDArray[np.bool_]:
         """Which of the states (B, 2n) are inside."""
-        away = (states - self.point) @ self.factor.T
-        inside: NDArray[np.bool_] = np.einsum("ij,ij->i", away, away) <= self.radius**2
+        with np.errstate(invalid="ignore"):
+            away = (states - self.point) @ self.factor.T
+            inside: NDArray[np.bool_] = np.einsum("ij,ij->i", away, away) <= self.radius**2
         return inside
 
 
