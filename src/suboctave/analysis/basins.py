@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["Basins", "basins"]
+__all__ = ["Basins", "basins", "check_plane"]
 
 _OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed"}
 
@@ -256,7 +256,7 @@ def basins(
     if not (is_number(omega) and omega > 0.0):
         raise InputError(f"omega must be a positive number, not {omega!r}")
     observe = check_observe(system, observe)
-    columns = _plane(system, plane, observe)
+    columns = check_plane(system, plane, observe)
     sides, counts = _box(box), _grid(grid)
     periods = check_count("periods", periods)
     ends = [np.linspace(low, high, count) for (low, high), count in zip(sides, counts, strict=True)]
@@ -296,7 +296,8 @@ def coordinates(system: System) -> list[str]:
     return [f"{kind}_{i}" for kind in "xv" for i in range(system.n)]
 
 
-def _plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
+def check_plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
+    """The two coordinates as numbers in the state, or `InputError`."""
     if plane is None:
         return observe, system.n + observe
     if not (isinstance(plane, tuple | list) and len(plane) == 2):

@@ -3,8 +3,8 @@
     w' = Df(y, t) w,   Df from the laws with their corners frozen, as in the step itself
 
 with the stages and the step of the trajectory: what comes out is the derivative of the numerical flow. Their errors
-count for the length of the step, too: directions that the motion does not move in may be the stiff ones. At a corner of a
-continuous force the tangent flow is continuous, so nothing is added there. Beside it goes the rate of volume,
+count for the length of the step, too: directions that the motion does not move in may be the stiff ones. At a corner
+of a continuous force the tangent flow is continuous, so nothing is added there. Beside it goes the rate of volume,
 `div f = -trace M^-1 (C + sum e_o dF_o/dx')`, whose integral is the sum of all exponents (Liouville).
 """
 
