@@ -1,7 +1,7 @@
 """Is it chaos? The exponents of a motion that never repeats, by the derivative of its flow and by two trajectories.
 
-An oscillator whose spring hardens beyond a stop on one side, driven hard. Neighbouring motions part by a factor of 1.4 in
-every period of the load.
+An oscillator with a stop on one side and another one further away, driven hard. Neighbouring motions part by a factor
+of 1.4 in every period of the load.
 
     python ex18_chaos.py [figure.png]
 """

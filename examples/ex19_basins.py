@@ -2,8 +2,8 @@
 
     x'' + c x' + x + alpha x^3 = F cos(omega t)
 
-Two stable motions, a large and a small one, at the same load. Their basins wind about each other, and the unstable motion in
-between lies on their border.
+Two stable motions, a large and a small one, at the same load. Their basins wind about each other, and the unstable
+motion in between lies on their border.
 
     python ex19_basins.py [figure.png]
 """

@@ -1,6 +1,6 @@
 """Alcorta et al. 2019, Fig. 12 (from de Langre and Lebreton): where the motion is chaotic, one gap closed.
 
-The largest Lyapunov exponent over frequency and forcing, and over it the border of 4T motions: chaos begins soon beyond.
+The largest Lyapunov exponent over frequency and forcing, with the border of 4T motions: chaos begins soon beyond.
 
     python fig12_chaos.py [figure.png]
 """

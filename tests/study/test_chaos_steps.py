@@ -60,7 +60,7 @@ def test_as_by_a_script(study_file):
         ("omega = 1.5\nperiods", "omega = -1.5\nperiods", "greater than 0"),
         ('branches = ["response"]', 'branches = ["respons"]', "'response'"),
         ("grid = [12, 10]\nbranches", "grid = [12, 0]\nbranches", "positive"),
-        ('what = "states"', 'what = "states"\nplane = ["x_0", "v_1"]', "v_0"),
+        ('what = "states"', 'what = "states"\ncoordinates = ["x_0", "v_1"]', "v_0"),
         ("trajectories = 4", "trajectories = 4\ncount = 3", "at most 2"),
         ("trajectories = 4", "trajectories = 4\nstate = [1.0]", "2 finite numbers"),
     ],

@@ -37,7 +37,7 @@ class Basins(Step):
     omega: float = Field(gt=0.0)
     box: list[Range] = Field(min_length=2, max_length=2)
     grid: list[int] = Field(default=[200, 200], min_length=2, max_length=2)
-    plane: list[str] | None = None
+    coordinates: list[str] | None = None
     rest: list[float] | None = None
     branches: list[Named] = Field(default_factory=list)
     periods: int = Field(default=500, ge=1)
@@ -57,7 +57,9 @@ class Basins(Step):
                 yield ("box", i), text
         if any(count < 1 for count in self.grid):
             yield ("grid",), "needs two positive numbers of states"
-        yield from tried("plane", lambda: check_plane(around.system, self.plane, around.system.observed_dof))
+        yield from tried(
+            "coordinates", lambda: check_plane(around.system, self.coordinates, around.system.observed_dof)
+        )
         yield from tried("rest", lambda: start_state(around.system, self.rest))
 
     def run(self, context: Context) -> Table:
@@ -68,7 +70,7 @@ class Basins(Step):
             given[curve.said] = chosen_branch(curve, context.results)
         found = basins(
             context.system, omega=self.omega, box=(self._side(0), self._side(1)), grid=(self.grid[0], self.grid[1]),
-            plane=None if self.plane is None else (self.plane[0], self.plane[1]), rest=self.rest,
+            plane=None if self.coordinates is None else (self.coordinates[0], self.coordinates[1]), rest=self.rest,
             attractors=given or None, periods=self.periods, tolerance=self.tolerance, progress=context.progress,
         )  # fmt: skip
         said = f"basins at omega = {self.omega:g}"
