@@ -28,7 +28,8 @@ __all__ = ["plot_basins", "plot_lyapunov", "plot_lyapunov_map", "plot_separation
 
 _EXPONENT = r"exponent $\lambda$"
 #: share of white in the colours of the first, second, ... motion of one period
-_TINTS = (0.7, 0.15, 0.45, 0.85)
+_TINTS = (0.25, 0.65, 0.05, 0.8)
+_GREYS = (0.72, 0.15, 0.45, 0.85)
 _LIGHTEST, _DARKEST = "#dbe9f4", "#08306b"
 _OTHER = {-1: ("aperiodic", "#8c8c8c"), -2: ("left the range", "#d55e00"), -3: ("not computed", "#ffffff")}
 
@@ -214,7 +215,7 @@ def _colours(periods: np.ndarray) -> list[str]:
     colours = []
     for period in periods.tolist():
         place = seen[period] = seen.get(period, -1) + 1
-        colours.append(tinted(period_colour(period), _TINTS[place % len(_TINTS)]))
+        colours.append(tinted(period_colour(period), (_GREYS if period == 1 else _TINTS)[place % 4]))
     return colours
 
 
