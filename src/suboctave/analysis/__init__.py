@@ -3,8 +3,9 @@
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
-from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isola import Isola
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch

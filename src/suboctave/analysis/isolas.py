@@ -28,9 +28,10 @@ from suboctave.analysis.checks import (
     make_settings,
 )
 from suboctave.analysis.diagram import bifurcation_diagram
-from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isola import Isola
 from suboctave.analysis.isola_life import Life, life_of
 from suboctave.analysis.isola_survey import Loop, Survey
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.limit_curves import Leg
 from suboctave.analysis.making import Harmonics, rule_of
