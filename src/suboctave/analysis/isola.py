@@ -179,7 +179,7 @@ class Isola:
         path
             Where the figure is saved, if one is given.
         values
-            At how many values of the parameter, evenly spread, its closed branch is drawn; or these values.
+            At how many values of the parameter, almost from end to end, its closed branch is drawn; or these values.
         responses
             Branches or diagrams that are drawn besides, such as responses at some of these values.
         options
@@ -195,7 +195,8 @@ class Isola:
         """Values of the parameter at which closed branches are wanted, within the range; InputError otherwise."""
         low, high = self.range
         if isinstance(values, int) and not isinstance(values, bool) and values >= 1:
-            return [low + (i + 0.5) / values * (high - low) for i in range(values)]
+            first, last = low + 0.02 * (high - low), high - 0.08 * (high - low)
+            return [float(v) for v in np.linspace(first, last, values)]
         places = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
         if not places or not all(is_number(value) and value in self for value in places):
             raise InputError(

@@ -26,6 +26,7 @@ __all__ = ["AXIS", "DASHES", "FONT", "SYMBOLS", "Words", "figure_data", "layout_
 SYMBOLS = {
     "o": "circle",
     "v": "triangle-down",
+    "^": "triangle-up",
     "s": "square",
     "D": "diamond",
     "x": "x-thin",

@@ -17,12 +17,15 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.pictures import style
-from suboctave.pictures.boundary import BORDER, SMALL, WITHIN, event_drawing, event_words, mark_events
+from suboctave.pictures.boundary import BORDER, PALE, WITHIN
 from suboctave.pictures.boundary_lines import boundary_names, boundary_styles, is_boundary, kind_of, plane_of
+from suboctave.pictures.boundary_marks import SMALL, event_drawing, event_words, mark_events
 from suboctave.pictures.legend import TIGHT
 from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
+from suboctave.pictures.regions import CENTRE, is_isolas, regions, split, with_ends
 from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import strokes
+from suboctave.pictures.surfaces import surface
 from suboctave.pictures.view import View
 from suboctave.store.layout import check_layout, coordinate
 
@@ -31,13 +34,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["SHADE", "Space", "plot_space", "space_axes", "strokes_in_space"]
+__all__ = ["CLEAR", "SHADE", "Space", "plot_space", "space_axes", "strokes_in_space", "surfaces_in_space"]
 
 _DEPTH = "_depth"
 _ASPECT = (1.5, 1.15, 0.95)
 _THIN = 0.7  # of a response curve, beside a curve of bifurcations
 #: share of white in the projection on the floor
 SHADE = 0.55
+#: opacity of the surface of an isola
+CLEAR = 0.16
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,8 @@ def plot_space(
     Parameters
     ----------
     curves
-        Branches, tracked ones among them, or their datasets, or what has `branches`, as `suboctave.plot` takes them.
+        Branches, tracked ones among them, or their datasets, isolas, or what has `branches`, as `suboctave.plot` takes
+        them. The closed branches of an isola that are known are drawn, and the surface that they lie on.
     x, y
         The axes to the right and into the depth: "omega" or parameters; default those in which bifurcations were
         tracked, or omega and the parameter that differs between the response curves.
@@ -128,7 +134,8 @@ def plot_space(
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):
             raise InputError(f"{name} is an angle in degrees, not {angle!r}")
-    group = datasets_of(curves, view)
+    given = datasets_of(curves, view)
+    group, heads = split(given)
     across, depth = space_axes(group, x, y)
     for dataset in group:
         view.check(dataset)
@@ -140,7 +147,8 @@ def plot_space(
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     every = np.concatenate([part for dataset in group for part in space.values(dataset)], axis=1)
     floor = _limit(axes, every)
-    entries = _draw(axes, group, space, floor, look)
+    entries = _shade(axes, given, space, floor)
+    entries |= _draw(axes, [with_ends(d, heads) if is_boundary(d) else d for d in group], space, floor, look)
     _dress(axes, space.labels(group[0]), zlabel, look)
     axes.view_init(float(elevation), float(azimuth))
     _place(figure, axes, entries, title, look, grow=isinstance(size, str))
@@ -212,6 +220,55 @@ def _limit(axes: Any, every: np.ndarray) -> float:
         floor = 0.0 if index == 2 and low >= 0.0 else low - margin
         limits(floor if index == 2 else low - margin, high + margin)
     return floor
+
+
+def _shade(axes: Any, given: Sequence[xarray.Dataset], space: Space, floor: float) -> dict[str, Any]:
+    """The surfaces of isolas, and their regions on the floor; their entries in the legend."""
+    from matplotlib.patches import Patch
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    entries: dict[str, Any] = {}
+    for region in regions(split(given)[1]):
+        if sorted((space.across, space.depth)) == sorted(("omega", region.parameter)):
+            parts = dict(zip(("omega", region.parameter), region.outline, strict=True))
+            x, y = (parts[n] * f for n, f in zip((space.across, space.depth), space.factors(), strict=False))
+            corners = [np.column_stack([x, y, np.full(x.size, floor)])]
+            shade = Poly3DCollection(corners, facecolor=tinted(region.colour, PALE), linewidth=0.0, gid="isola-floor")
+            shade.set_zorder(0.9)
+            axes.add_collection3d(shade)
+    for nu, grid in surfaces_in_space(given, space):
+        colour = period_colour(nu)
+        axes.plot_surface(
+            *grid, color=colour, alpha=CLEAR, shade=False, linewidth=0.0, rcount=200, ccount=200, zorder=2, gid="isola"
+        )
+        entries[f"{period_name(nu)} isola"] = Patch(facecolor=colour, alpha=2.0 * CLEAR, linewidth=0.0)
+    return entries
+
+
+def surfaces_in_space(given: Sequence[xarray.Dataset], space: Space) -> list[tuple[int, np.ndarray]]:
+    """Period and grid (3, rows, columns) of the surface of each isola whose closed branches are among the datasets.
+
+    Closed branches belong to the isolas that stand before them.
+    """
+    loops: dict[tuple[int, int], list[xarray.Dataset]] = {}
+    heads = 0
+    for dataset in given:
+        heads += is_isolas(dataset)
+        if "isola" in dataset.attrs and not is_boundary(dataset):
+            loops.setdefault((heads - 1, int(dataset.attrs["isola"])), []).append(dataset)
+    every = split(given)[1]
+    found = []
+    for (which, number), closed in loops.items():
+        tips = []
+        for dataset in given if which >= 0 else ():
+            if is_boundary(dataset):
+                kinds = with_ends(dataset, [every[which].isel(isola=[number])])["event_kind"].to_numpy()
+                tips += list(space.values(dataset)[1].T[kinds == CENTRE])
+        around = [np.hstack([piece for piece, _ in strokes_in_space(dataset, space)]) for dataset in closed]
+        grid = surface(around, tips[:1])
+        if grid is not None:
+            found.append((period_of(closed[0]), grid))
+    return found
 
 
 def _draw(
