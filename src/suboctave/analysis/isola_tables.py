@@ -139,7 +139,7 @@ def head_dataset(isolas: Isolas) -> xarray.Dataset:
 def isola_datasets(isola: Isola, values: Sequence[float], readings: Iterable[str] | bool = False) -> list[Any]:
     """What a picture of one isola is drawn from: the isola, its limit points, its closed branches at some values."""
     low, high = isola.range
-    attributes = {"isolas": isola.parameter, "bounds_low": low, "bounds_high": high}
+    attributes: dict[str, str | int | float] = {"isolas": isola.parameter, "bounds_low": low, "bounds_high": high}
     attributes |= {"omega_low": isola.omega[0], "omega_high": isola.omega[1]}
     closed = [(0, value) for value in values]
     head = isolas_dataset([isola_row(isola)], [edges_of(isola)], closed, attributes)

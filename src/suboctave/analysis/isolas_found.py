@@ -81,6 +81,11 @@ class Isolas(Sequence[Isola]):
         """Whether its user stopped the search."""
         return any(note.startswith("interrupted") for note in self.notes)
 
+    def noting(self, notes: Iterable[str]) -> Isolas:
+        """The same with more that could not be settled."""
+        self.notes = (*self.notes, *notes)
+        return self
+
     def to_dataframe(self) -> pandas.DataFrame:
         """One row for each isola: period, range, where it is born and merges, and the frequencies there."""
         from suboctave.analysis.isola_tables import isolas_frame

@@ -1,4 +1,4 @@
-"""What a study leaves: branches, diagrams, isolas and tables by name, with what produced them; and `load`, which reads them."""
+"""What a study leaves: branches, diagrams, isolas and tables by name, with their provenance; and `load`."""
 
 from __future__ import annotations
 
@@ -171,7 +171,8 @@ def to_datasets(item: Result, details: Mapping[str, Any] | None = None) -> dict[
         return {"": branch_to_dataset(item).assign_attrs({**said, "contents": _BRANCH})}
     if isinstance(item, BifurcationDiagram | Isolas):
         tree = isinstance(item, BifurcationDiagram)
-        head, *branches = (diagram_to_datasets(item) if tree else isolas_to_datasets(item)).items()
+        parts = diagram_to_datasets(item) if isinstance(item, BifurcationDiagram) else isolas_to_datasets(item)
+        head, *branches = parts.items()
         told = {"": head[1].assign_attrs({**said, "contents": _DIAGRAM if tree else _ISOLAS})}
         return told | {name: dataset.assign_attrs({"contents": _BRANCH}) for name, dataset in branches}
     import xarray

@@ -154,7 +154,7 @@ def _isola(
     omega: tuple[float, float],
     known: Sequence[tuple[float, Any]],
 ) -> Isola:
-    ends = []
+    ends: list[IsolaEnd | None] = []
     for told in given["ends"]:
         if told is None:
             ends.append(None)

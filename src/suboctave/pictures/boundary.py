@@ -144,7 +144,8 @@ def plot_boundaries(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    given, heads = split(list(curves) if isinstance(curves, list | tuple) else [curves])
+    several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
+    given, heads = split(several)
     group = [with_ends(dataset, heads) for dataset in check_boundaries(given)]
     if projected and y is not None:
         raise InputError("y= names a parameter; with a quantity= that is what is drawn upwards")
@@ -358,7 +359,7 @@ def _along(
 def _name_events(
     figure: Figure, axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane, look: style.Look
 ) -> None:
-    """Codimension-two points by their short names; extrema of what is drawn upwards, ends of isolas, by their values."""
+    """Codimension-two points by their short names; extrema of what is drawn upwards and isolas' ends by values."""
     spots, texts = [], []
     ends: list[tuple[np.ndarray, str]] = []
     extrema = []

@@ -44,7 +44,11 @@ def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, 
     curves = {label: with_ends(data, heads) for label, data in curves.items() if not any(data is h for h in heads)}
     group = list(curves.values())
     kinds = boundary_names(group)
-    data = [_region(region, across) for region in regions(heads) if sorted(("omega", region.parameter)) == sorted((across, upwards))]
+    data = [
+        _region(region, across)
+        for region in regions(heads)
+        if sorted(("omega", region.parameter)) == sorted((across, upwards))
+    ]
     events: list[dict[str, Any]] = []
     for index, (label, dataset) in enumerate(curves.items()):
         curve = boundary_styles(group, kinds)[index]

@@ -13,6 +13,9 @@ from suboctave.errors import suggest
 from suboctave.study.steps.base import Complaint, Context, Known, Range, Surroundings, chosen, tried
 from suboctave.study.steps.curves import CurveStep
 
+#: what is tracked in a third parameter: extrema along curves, the ends of isolas
+_EXTREMA = ("extremum", "isola_centre", "isola_merging")
+
 
 class Track(CurveStep):
     """`so.track`: `start` names a bifurcation of an earlier branch."""
@@ -56,9 +59,9 @@ class Track(CurveStep):
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
-        elif kind not in (*TRACKED_KINDS, "extremum"):
+        elif kind not in (*TRACKED_KINDS, *_EXTREMA):
             yield ("start", "bifurcation"), f"{kind} cannot be tracked{suggest(kind, TRACKED_KINDS)}"
-        elif kind == "extremum" and not isinstance(self.parameter, str):
+        elif kind in _EXTREMA and not isinstance(self.parameter, str):
             yield ("parameter",), "of an extremum is one name: the third parameter"
 
     def known(self, around: Surroundings) -> Known | None:
