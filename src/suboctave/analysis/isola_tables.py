@@ -112,7 +112,7 @@ def isolas_datasets(isolas: Isolas, readings: Iterable[str] | bool = False) -> d
         which = f"isola {number}" if len(isolas) > 1 else "isola"
         for value, branch in isola.known.items():
             told = f"{which} at {isolas.parameter} = {value:.6g}"
-            found[told] = branch.to_xarray(readings).assign_attrs(isola=number)
+            found[told] = branch.to_xarray(readings).assign_attrs(isola=number, at=value)
     return found
 
 
@@ -144,4 +144,4 @@ def isola_datasets(isola: Isola, values: Sequence[float], readings: Iterable[str
     closed = [(0, value) for value in values]
     head = isolas_dataset([isola_row(isola)], [edges_of(isola)], closed, attributes)
     curves = [curve.to_xarray(readings) for curve in (isola.limit_points, *isola.further)]
-    return [head, *curves, *(isola.at(value).to_xarray(readings).assign_attrs(isola=0) for value in values)]
+    return [head, *curves, *(isola.at(value).to_xarray(readings).assign_attrs(isola=0, at=value) for value in values)]

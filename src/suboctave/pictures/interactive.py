@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
 __all__ = ["AXIS", "DASHES", "FONT", "SYMBOLS", "Words", "figure_data", "layout_of", "short"]
 
-SYMBOLS = {
+SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "o": "circle",
     "v": "triangle-down",
+    (4, 1, 0): "star-diamond",
     "^": "triangle-up",
     "s": "square",
     "D": "diamond",

@@ -23,7 +23,7 @@ from suboctave.pictures.boundary_lines import (
 from suboctave.pictures.boundary_marks import event_words
 from suboctave.pictures.interactive import AXIS, DASHES, FONT, SYMBOLS, Words, layout_of, short
 from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
-from suboctave.pictures.regions import Region, regions, split, with_ends
+from suboctave.pictures.regions import CENTRE, MERGING, Region, end_text, regions, split, with_ends
 from suboctave.pictures.space import CLEAR, SHADE, Space, strokes_in_space, surfaces_in_space
 from suboctave.pictures.strokes import Line, line
 from suboctave.store.layout import coordinate
@@ -35,7 +35,15 @@ __all__ = ["plane_data", "space_data"]
 
 _UP = "_up"
 #: what symbols there are in space; circles for all others
-_SOLID_SYMBOLS = {"s": "square", "D": "diamond", "d": "diamond", "P": "cross", "x": "x", "X": "x"}
+_SOLID_SYMBOLS: dict[Any, str] = {
+    (4, 1, 0): "diamond",
+    "s": "square",
+    "D": "diamond",
+    "d": "diamond",
+    "P": "cross",
+    "x": "x",
+    "X": "x",
+}
 
 
 def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, name: str) -> dict[str, Any]:
@@ -44,11 +52,8 @@ def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, 
     curves = {label: with_ends(data, heads) for label, data in curves.items() if not any(data is h for h in heads)}
     group = list(curves.values())
     kinds = boundary_names(group)
-    data = [
-        _region(region, across)
-        for region in regions(heads)
-        if sorted(("omega", region.parameter)) == sorted((across, upwards))
-    ]
+    shaded = [region for region in regions(heads) if {"omega", region.parameter} == {across, upwards}]
+    data = [_region(region, across) for region in shaded]
     events: list[dict[str, Any]] = []
     for index, (label, dataset) in enumerate(curves.items()):
         curve = boundary_styles(group, kinds)[index]
@@ -60,6 +65,10 @@ def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, 
         data += _lines(whole, words, said, curve)
         data += _subcritical(dataset, whole, words, said, curve)
         events += _events(dataset, coordinate(dataset, across)[1], at_events, words, said)
+    named: set[str] = set()
+    for trace in events:  # a kind stands once in the legend
+        trace["showlegend"] = trace["name"] not in named
+        named.add(trace["name"])
     layout = layout_of(_spelt(across), html.escape(_spelt(upwards)))
     return {"data": data + events, "layout": layout, "name": name}
 
@@ -167,7 +176,7 @@ def _events(dataset: xarray.Dataset, x: np.ndarray, y: np.ndarray, words: Words,
                 "legendgroup": named,
                 "x": short(x[chosen].tolist()),
                 "y": short(y[chosen].tolist()),
-                "text": [html.escape(kind)] * len(chosen),
+                "text": [html.escape(end_text(kind, None) if kind in (CENTRE, MERGING) else kind)] * len(chosen),
                 "textposition": "middle right",
                 "hovertext": [words.of_event(int(i)) for i in chosen],
                 "hovertemplate": f"{said}: {named}<br>%{{hovertext}}<extra></extra>",

@@ -38,7 +38,7 @@ __all__ = ["write_report"]
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page
 _TOLD = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
-_RECORDS = {"record", "digest", "contents", "tracked", "plane", "isola"}
+_RECORDS = {"record", "digest", "contents", "tracked", "plane", "isola", "at"}
 _LONG = 400
 _BESIDE = 56  # characters in a row of a table that stands beside its figure
 

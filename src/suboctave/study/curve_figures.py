@@ -174,7 +174,7 @@ def _is_curve(item: Result) -> bool:
 class FigureSection(CurveFigure):
     """Response curves. Curves of bifurcations are drawn among them where `x` is given and they are named.
 
-    Of isolas that are named the closed branches known are drawn.
+    Of isolas that are named the closed branches known are drawn, or those at the values `at`.
     """
 
     kind: str = "response"
@@ -182,6 +182,7 @@ class FigureSection(CurveFigure):
     xlim: list[float] | None = Field(default=None, min_length=2, max_length=2)
     ylim: list[float] | None = Field(default=None, min_length=2, max_length=2)
     marks: list[str] | None = None
+    at: list[float] | None = None
 
     def drawn(self, names: Drawable) -> list[str]:
         """The analyses that it shows: all that are no curves of bifurcations, unless told."""
@@ -189,7 +190,8 @@ class FigureSection(CurveFigure):
 
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
         """See `CurveFigure.of_isolas`."""
-        return [dataset for dataset in datasets.values() if "isola" in dataset.attrs]
+        closed = [dataset for dataset in datasets.values() if "isola" in dataset.attrs]
+        return _at(self.at, closed, datasets["isolas"].attrs["isolas"])
 
     def check(
         self, curves: Drawable, system: System | None, events: Sequence[str] = (), isolas: Sequence[str] = ()
@@ -258,7 +260,10 @@ class BoundaryFigure(CurveFigure):
 
 
 class SpaceFigure(CurveFigure):
-    """Response curves at several values of a parameter, and curves of bifurcations through them, in space."""
+    """Response curves at several values of a parameter, and curves of bifurcations through them, in space.
+
+    Of isolas the closed branches known are drawn, or those at the values `at`.
+    """
 
     kind: Literal["space"]
     y: str | None = None
@@ -266,6 +271,13 @@ class SpaceFigure(CurveFigure):
     zlabel: str | None = None
     elevation: float = 24.0
     azimuth: float = -58.0
+    at: list[float] | None = None
+
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        closed = [dataset for dataset in datasets.values() if "isola" in dataset.attrs]
+        others = [dataset for dataset in datasets.values() if "isola" not in dataset.attrs]
+        return others + _at(self.at, closed, datasets["isolas"].attrs["isolas"])
 
     def check(
         self, curves: Drawable, system: System | None, events: Sequence[str] = (), isolas: Sequence[str] = ()
@@ -286,6 +298,20 @@ class SpaceFigure(CurveFigure):
         own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
         units: dict[str, Any] = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
         plot_space(datasets, path, **own, **units)
+
+
+def _at(values: Sequence[float] | None, closed: Sequence[Any], parameter: str) -> list[Any]:
+    """The closed branches at some values of the parameter; InputError where there is none."""
+    if values is None:
+        return list(closed)
+    known = [float(dataset.attrs["at"]) for dataset in closed]
+    for value in values:
+        if value not in known:
+            there = ", ".join(f"{other:.6g}" for other in sorted(set(known))) or "none"
+            raise InputError(
+                f"no closed branch at {parameter} = {value:g} is known (known: {there}): name it in at of the analysis"
+            )
+    return [dataset for dataset, value in zip(closed, known, strict=True) if value in values]
 
 
 def _same(x: str | None, y: str | None) -> Iterator[Complaint]:

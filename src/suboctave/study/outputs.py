@@ -126,7 +126,7 @@ def places(outputs: Outputs, steps: Sequence[Step], folder: Path) -> list[Path]:
 def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) -> Iterator[Path]:
     """Write what was asked for of what there is, and yield each file; what stood there is replaced.
 
-    Raises InputError, after everything else is written, for figures of motions that the finished branches do not have.
+    Raises InputError, after everything else is written, for figures of motions or branches that finished analyses lack.
     """
     yield results.save(folder / outputs.results, overwrite=True)
     if outputs.csv:

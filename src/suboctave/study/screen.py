@@ -166,7 +166,7 @@ def print_isolas(out: Console, name: str, isolas: Isolas, note: str = "") -> Non
     keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
     rows = [isola_row(isola) for isola in isolas]
     lines = [
-        [str(i), period_name(row["period"]), *(_number(row[key]) if row[key] == row[key] else "-" for key in keys)]
+        [str(i), period_name(row["period"]), *(f"{row[key]:.6g}" if row[key] == row[key] else "-" for key in keys)]
         for i, row in enumerate(rows)
     ]
     if lines:
@@ -185,7 +185,8 @@ def print_isolas(out: Console, name: str, isolas: Isolas, note: str = "") -> Non
 
 def _closed(branch: Branch) -> str:
     """A closed branch in one line: where it is, and where it is stable."""
-    text = f"omega from {min(branch.omega):.7g} to {max(branch.omega):.7g}"
+    met = [*branch.omega, *(item.omega for item in branch.bifurcations)]
+    text = f"omega from {min(met):.7g} to {max(met):.7g}"
     stable = stable_ranges(branch)
     if not stable:
         return f"{text}, nowhere stable"

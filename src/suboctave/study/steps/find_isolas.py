@@ -107,7 +107,7 @@ class FindIsolas(FollowingStep):
                     return found.noting(["interrupted: the closed branches asked for are not all here", *notes])
         for value in self.at:
             if not any(value in isola for isola in found):
-                notes.append(f"at {self.parameter} = {value:g} there is no isola that was found")
+                notes.append(f"no isola was found at {self.parameter} = {value:g}")
         return found.noting(notes)
 
 
