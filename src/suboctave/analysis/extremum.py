@@ -25,9 +25,10 @@ from suboctave.analysis.track_start import (
     with_extremum,
 )
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import Extremum, Found
+from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point
+from suboctave.analysis.tracked_tests import Extremum
 from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
 from suboctave.bifurcation.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.bifurcation.tracked import TrackedEvent

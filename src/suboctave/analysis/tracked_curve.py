@@ -244,10 +244,13 @@ class TrackedCurve:
             found.append(self.join(y, self.augmentation.shifted(extra, turn), parameters))
         return found
 
+    def named(self, u: Array) -> dict[str, float]:
+        """Values of the free parameters by name."""
+        return dict(zip(self.names, u[-len(self.names) :].tolist(), strict=True))
+
     def where(self, u: Array) -> str:
         """Where in the plane of the parameters, in words."""
-        values = u[-len(self.names) :]
-        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, values, strict=True))
+        return ", ".join(f"{name} = {value:.6g}" for name, value in self.named(u).items())
 
 
 __all__ = ["TrackedCurve", "TrackedEvaluation"]

@@ -20,11 +20,13 @@ from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, StabilityMethod
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
@@ -101,7 +103,7 @@ class TrackedSample:
         """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
         b, by_x = self.equations.bordered, self.equations.gradient[0].real
         by_motion = -by_x.reshape(self.state.x.shape)
-        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._other_factor)
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._whole)
 
     @lazy
     def coefficient(self) -> float:
@@ -128,15 +130,43 @@ class TrackedSample:
         equations = self.evaluation.equations
         return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
-    @property
-    def other(self) -> float:
-        """Sign of det J_half of an LP, of det J_0 of a PD."""
-        return self._other_factor.sign
+    def sign(self, operator: Kind) -> float:
+        """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
+        return self._whole.sign if operator is Kind.INTEGER else self._half.sign
+
+    def determinant(self, operator: Kind) -> Array:
+        """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
+        state = self.state
+        factor = self._whole if operator is Kind.INTEGER else self._half
+        n = len(factor.lu)
+        rows = np.arange(n) // state.balance.size
+        f = (rows + 1) // 2 if operator is Kind.INTEGER else rows // 2 + 0.5
+        units = np.log(state.rate**2 * (1.0 + f**2)) - 2.0 * np.log(state.balance.row_weights(n))
+        return np.array([factor.sign, factor.log_determinant - float(units.sum())])
 
     @lazy
-    def _other_factor(self) -> Factor:
-        limit = self.equations.of.kind is Kind.INTEGER
-        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
+    def _whole(self) -> Factor:
+        return Factor.of(self.state.jacobian)
+
+    @lazy
+    def _half(self) -> Factor:
+        return Factor.of(self.state.half_jacobian)
+
+    def multipliers_by(self, method: StabilityMethod) -> FloquetResult | None:
+        """Multipliers and errors as a method would give them along a curve, None if that is still to be computed."""
+        known: FloquetResult | None = self.evaluation.__dict__.get("floquet")
+        return known if method.follows_monodromy else None
+
+    @lazy
+    def others(self) -> ComplexArray:
+        """Multipliers but the one, or the pair, that is critical all along the curve."""
+        mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
+        if critical is None:
+            return mu
+        count = 2 if self.curve.augmentation.name == "NS" else 1
+        distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        result: ComplexArray = np.delete(mu, np.argsort(distance, kind="stable")[:count])
+        return result
 
 
 def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:

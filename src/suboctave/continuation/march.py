@@ -22,6 +22,8 @@ from suboctave.errors import ConvergenceError, InputError
 
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
+#: points from which on a march watches whether it goes round and round without passing its start
+_LONG = 256
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,40 @@ class CurvePoint:
     def parameter(self) -> float:
         """Value of the curve's free parameter."""
         return float(self.u[self.curve.parameter])
+
+
+class _Place:
+    """A point of a curve that a march may come back to."""
+
+    def __init__(self, point: CurvePoint) -> None:
+        self.point = point
+        #: its images in the discretisation of the last point
+        self._images: tuple[Curve, list[Array]] | None = None
+
+    def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """It again, if the step from `point` to `new` passes it in the same direction."""
+        w, own = new.weights, self.point
+        step = kernels.distance(new.u, point.u, w)
+        index = new.curve.parameter
+        if self._images is None or self._images[0] is not new.curve:
+            self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
+        images = self._images[1]
+        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
+            return None
+        heading = new.curve.transfer(own.tangent, own.curve)
+        for image, leaving in zip(images, new.curve.images(heading), strict=True):
+            from_point, to_new = w * (image - point.u), w * (new.u - image)
+            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
+                continue
+            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
+            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
+            if not (ahead and same_way):
+                continue
+            fraction = length(from_point) / (length(from_point) + length(to_new))
+            miss = length(w * (between(point, new, fraction) - image))
+            if miss < 0.05 * step + 1e-6:
+                return replace(own, arclength=point.arclength + length(from_point))
+        return None
 
 
 @dataclass(frozen=True)
@@ -163,14 +199,14 @@ class March:
         self.closed = False
         self.ended = "not started"
         self._direction = direction
-        #: the start and its images in the discretisation of the last point
-        self._images: tuple[Curve, list[Array]] | None = None
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Points in order, the start first."""
         options = self.stepping
         point = self._set_out()
-        first = point
+        home = _Place(point)
+        mark: _Place | None = None
+        marked = 0
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
@@ -199,10 +235,16 @@ class March:
                 return
             largest = max(largest, new.curve.size(new.u))
             end = self._bound_passed(point, new)
-            back = None if count < 3 else self._returns(first, point, new)
+            back = None if count < 3 else home.passed(point, new)
             if back is not None:
                 self.closed, self.ended = True, "the curve closed on itself"
                 yield back
+                return
+            if mark is not None and count > marked + 3 and mark.passed(point, new) is not None:
+                self.ended = (
+                    f"came back to {new.curve.where(new.u)} without having passed its start: where two branches nearly "
+                    "touch it went over to another one. Try a smaller max_step"
+                )
                 return
             if end is not None:
                 landed = self._land(point, new, end)
@@ -216,6 +258,8 @@ class March:
                 return
             yield new
             count += 1
+            if count >= _LONG and count & (count - 1) == 0:
+                mark, marked = _Place(new), count
             step = self._next_step(point, new, new.arclength - point.arclength, deviation)
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
@@ -338,28 +382,3 @@ class March:
         u[index] = bound
         arclength = point.arclength + length(new.weights * (u - point.u))
         return make_point(solved, new.curve, new.tangent, arclength)
-
-    def _returns(self, first: CurvePoint, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
-        """The start point again, if the step from `point` to `new` passes it in the same direction."""
-        w = new.weights
-        step = kernels.distance(new.u, point.u, w)
-        index = new.curve.parameter
-        if self._images is None or self._images[0] is not new.curve:
-            self._images = (new.curve, new.curve.images(new.curve.transfer(first.u, first.curve)))
-        images = self._images[1]
-        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
-            return None
-        heading = new.curve.transfer(first.tangent, first.curve)
-        for image, leaving in zip(images, new.curve.images(heading), strict=True):
-            from_point, to_new = w * (image - point.u), w * (new.u - image)
-            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
-                continue
-            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
-            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
-            if not (ahead and same_way):
-                continue
-            fraction = length(from_point) / (length(from_point) + length(to_new))
-            miss = length(w * (between(point, new, fraction) - image))
-            if miss < 0.05 * step + 1e-6:
-                return replace(first, arclength=point.arclength + length(from_point))
-        return None

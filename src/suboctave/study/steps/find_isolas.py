@@ -26,6 +26,7 @@ class FindIsolas(FollowingStep):
     bounds: Range
     values: int | list[float] = 5
     depth: int = Field(default=1, ge=0)
+    levels: list[float] | None = None
     search: list[int] | None = None
     seeds: dict[str, Any] | None = None
     max_curves: int = Field(default=64, ge=1)
@@ -62,8 +63,11 @@ class FindIsolas(FollowingStep):
             yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
         yield from tried("", lambda: check_system(around.system, () if wrong else tuple(self.omega)))
         for i, order in enumerate(self.search or ()):
-            if order < 1:
-                yield ("search", i), f"is a period in periods of the load, at least 1, not {order}"
+            if order < 2:
+                yield ("search", i), f"is a period of at least 2 periods of the load, not {order}"
+        for i, level in enumerate(self.levels or ()):
+            if level <= 0.0:
+                yield ("levels", i), f"is a level of the loads in units of their own, positive, not {level:g}"
 
     def _check_places(self) -> Iterator[Complaint]:
         low, high = sorted(self.bounds)
@@ -83,8 +87,9 @@ class FindIsolas(FollowingStep):
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         options |= {"values": self.values, "depth": self.depth, "max_curves": self.max_curves}
-        if self.search is not None:
-            options["search"] = tuple(self.search)
+        for name in ("levels", "search"):
+            if getattr(self, name) is not None:
+                options[name] = tuple(getattr(self, name))
         if self.seeds is not None:
             options["seeds"] = as_seeds(self.seeds)
         omega, bounds = (self.omega[0], self.omega[1]), (self.bounds[0], self.bounds[1])
