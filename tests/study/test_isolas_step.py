@@ -106,7 +106,9 @@ def test_what_starts_from_it(ran):
     births = results["births"]
     assert set(births.isola) == {"isola_centre"}
     # in units of x sqrt(alpha) one load alone counts
-    assert births.parameter("alpha") * births.parameter("F") ** 2 == pytest.approx(0.05 * results["isolas"][0].born ** 2)
+    assert births.parameter("alpha") * births.parameter("F") ** 2 == pytest.approx(
+        0.05 * results["isolas"][0].born ** 2
+    )
     assert results["beyond"].closed
 
 
