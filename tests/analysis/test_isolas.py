@@ -211,6 +211,7 @@ def test_ends_can_be_tracked_again(isolas):
     ("changes", "said"),
     [
         ({"parameter": "k"}, "parameter"),
+        ({"parameter": "omega"}, "omega varies anyway"),
         ({"values": 1}, "at least 2"),
         ({"values": [0.5, 1.5]}, "within the bounds"),
         ({"search": (0,)}, "periods"),

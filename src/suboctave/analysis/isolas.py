@@ -126,6 +126,8 @@ def find_isolas(
     widen the bounds, or search for its period.
     """
     check_parameter(system, parameter)
+    if parameter == "omega":
+        raise InputError("parameter is the design parameter; omega varies anyway, in the range omega=(from, to)")
     low, high = sorted(check_bounds(system, parameter, bounds))
     first, last = sorted(check_range("omega", omega, positive=True))
     check_system(system, (first, last))

@@ -65,6 +65,7 @@ def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, 
         data += _lines(whole, words, said, curve)
         data += _subcritical(dataset, whole, words, said, curve)
         events += _events(dataset, coordinate(dataset, across)[1], at_events, words, said)
+    events.sort(key=lambda trace: bool(trace["name"].startswith("isola")))  # the ends of isolas on top
     named: set[str] = set()
     for trace in events:  # a kind stands once in the legend
         trace["showlegend"] = trace["name"] not in named
