@@ -69,6 +69,15 @@ def test_its_birth_is_tracked_from_a_file(read):
     assert births.omega == pytest.approx(births.omega[0], rel=1e-8)
 
 
+def test_pictures_of_what_was_read(read, tmp_path):
+    for figure in (read.plot(tmp_path / "plane.png"), read[0].plot(tmp_path / "space.png", values=2)):
+        assert any(item.get_gid() == "isola" for item in figure.axes[0].get_children())
+    assert {path.name for path in tmp_path.iterdir()} == {"plane.png", "space.png"}
+    for values in (0, "3", [9.0], []):
+        with pytest.raises(so.InputError, match="values must be how many, or numbers from 2"):
+            read[0].plot(values=values)
+
+
 def test_among_the_results_of_a_study(found, tmp_path):
     path = Results({"isolas": found, "closed": found[0].at(4.0)}).save(tmp_path / "results.nc")
     results = so.load(path)

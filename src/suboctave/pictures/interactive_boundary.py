@@ -24,7 +24,8 @@ from suboctave.pictures.boundary_marks import event_words
 from suboctave.pictures.interactive import AXIS, DASHES, FONT, SYMBOLS, Words, layout_of, short
 from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
 from suboctave.pictures.regions import CENTRE, MERGING, Region, end_text, regions, split, with_ends
-from suboctave.pictures.space import CLEAR, SHADE, Space, strokes_in_space, surfaces_in_space
+from suboctave.pictures.space import CLEAR, SHADE
+from suboctave.pictures.space_view import Space, strokes_in_space, surfaces_in_space
 from suboctave.pictures.strokes import Line, line
 from suboctave.store.layout import coordinate
 

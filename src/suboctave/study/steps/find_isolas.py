@@ -94,9 +94,9 @@ class FindIsolas(FollowingStep):
             options["seeds"] = as_seeds(self.seeds)
         omega, bounds = (self.omega[0], self.omega[1]), (self.bounds[0], self.bounds[1])
         found = find_isolas(context.system, omega, self.parameter, bounds, **options)
-        return self._with_branches(found)
+        return self._with_branches(found, context.progress)
 
-    def _with_branches(self, found: Isolas) -> Isolas:
+    def _with_branches(self, found: Isolas, progress: Any) -> Isolas:
         """The closed branches at the values asked for are followed; what fails is noted."""
         notes = []
         for isola in found:
@@ -104,7 +104,7 @@ class FindIsolas(FollowingStep):
                 if found.interrupted or value not in isola:
                     continue
                 try:
-                    branch = isola.at(value)
+                    branch = isola.at(value, progress=progress)
                 except ConvergenceError as failure:
                     notes.append(f"the closed branch at {self.parameter} = {value:g}: {failure}")
                     continue
