@@ -2,8 +2,8 @@
 
     python benchmarks/integration.py
 
-The reference oscillator, 320 trajectories from different states, 1000 steps per period. Seconds are of the processor, the
-best of three; compilation is not in them. The error is that after ten periods, against integration with SciPy.
+The reference oscillator, 320 trajectories from different states, 1000 steps per period. Seconds are of the processor,
+the best of three; compilation is not in them. The error is that after ten periods, against integration with SciPy.
 """
 
 from __future__ import annotations
