@@ -11,6 +11,7 @@ from suboctave.analysis.checks import check_bounds, check_parameter, check_range
 from suboctave.analysis.making import check_unknowns, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_ends import repeats_earlier
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
 from suboctave.analysis.track_onto import aside, curve_onto, start_onto
 from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, solved_start
@@ -105,6 +106,12 @@ def track(
     else:
         names, ranges = _free(bifurcation, parameter, bounds, omega)
     kind = curve_onto(bifurcation, onto)
+    if bifurcation.kind == "LP" and repeats_earlier(bifurcation.orbit):
+        raise InputError(
+            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: thus "
+            "every period doubling is one, and its curve is that of the doublings; track the PD, or a limit point "
+            "of the branch that switch_branch gives"
+        )
     settings = make_settings(
         bifurcation.orbit.system,
         max_step,

@@ -173,25 +173,31 @@ def keeps_subharmonics(a: CurvePoint, b: CurvePoint) -> bool:
     assert isinstance(curve, TrackedCurve)
     if curve.balance.basis.nu == 1 or subharmonic_share(b) <= _NOTHING_LEFT:
         return True
-    before = _parts(replace(a, u=curve.transfer(a.u, a.curve), curve=curve))
-    return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, _parts(b), strict=True))
+    before = _parts(curve, curve.transfer(a.u, a.curve))
+    return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, _parts(curve, b.u), strict=True))
 
 
 def subharmonic_share(point: CurvePoint) -> float:
     """Smallest share of a motion that one of its period multiplications has brought about."""
     curve = point.curve
     assert isinstance(curve, TrackedCurve)
-    return min(float(np.linalg.norm(part)) for part in _parts(point)) / (curve.size(point.u) or 1.0)
+    return min(float(np.linalg.norm(part)) for part in _parts(curve, point.u)) / (curve.size(point.u) or 1.0)
 
 
-def _parts(point: CurvePoint) -> list[Array]:
+def _parts(curve: TrackedCurve, u: Array) -> list[Array]:
     """Harmonics that the motion would not have if it repeated earlier: one array for each prime factor of nu."""
-    curve = point.curve
-    assert isinstance(curve, TrackedCurve)
     basis = curve.balance.basis
     nu = basis.nu
-    x = point.u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
+    x = u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
     return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
+
+
+def repeats_earlier(orbit: PeriodicOrbit) -> bool:
+    """Whether a motion repeats after a part of the period that it is written with."""
+    basis, scales = orbit.basis, orbit.balance.scales()[0]
+    x = orbit.coefficients.reshape(basis.size, -1) * scales
+    least = min((float(np.linalg.norm(x[rows])) for rows in _rows_of_parts(basis.nu, basis.harmonics)), default=np.inf)
+    return least <= _NOTHING_LEFT * float(np.linalg.norm(x))
 
 
 @lru_cache(maxsize=64)
@@ -201,4 +207,4 @@ def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
     return [np.flatnonzero(k % prime) for prime in primes]
 
 
-__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]
+__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "repeats_earlier", "subharmonic_share"]

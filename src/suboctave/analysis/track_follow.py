@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from suboctave.analysis.extremum import polished
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
@@ -180,7 +179,7 @@ class _Tracker:
     def _take(self, found: list[Found]) -> None:
         settings, warnings = self.settings, self.trace.warnings
         for item in found:
-            better = polished(refined(item, settings.newton, warnings), settings.newton)
+            better = refined(item, settings.newton, warnings)
             self.trace.events.append(as_event(better, settings.stability, settings.observe))
 
     def _add(self, sample: TrackedSample) -> None:

@@ -28,18 +28,21 @@ _BESIDE = 0.05
 _SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
+#: share of a test's values at the ends of a step with which a zero is near enough for secants
+_LITTLE = 0.05
 
 
 @dataclass(frozen=True)
 class Found:
     """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns; `rough`:
-    where more harmonics are to locate it better.
+    where more harmonics are to locate it better, `slope` about the test's derivative by arclength.
     """
 
     test: CurveTest
     sample: TrackedSample
     extreme: str = ""
     rough: _Stretch | None = None
+    slope: float = 0.0
 
 
 def events_between(
@@ -62,13 +65,15 @@ def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: Ne
     """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
     own = test.within(low, high)
     stretch = _Stretch(low, high, own, newton)
-    sample = stretch.zero(_ROUGH)
+    # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
+    close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
+    sample, slope = stretch.about(_ROUGH if close else 0.0)
     if not own.genuine(sample):
         return None
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
-    sample = sample if finer else stretch.zero(_RESOLVED)
-    return Found(own, sample, extreme_of(test, low), stretch if finer else None)
+    sample = sample if finer else stretch.zero_from(sample, slope)
+    return Found(own, sample, extreme_of(test, low), stretch if finer else None, slope)
 
 
 def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
@@ -106,21 +111,27 @@ def _brackets(
 
 def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
     """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
-    i, way = a.curve.index(name), b.point.arclength - a.point.arclength
-    if not way > 0.0:
-        return None
-    chord = float(b.point.u[b.curve.index(name)] - a.point.u[i]) / way
-    start, stop = float(a.point.tangent[i]), float(b.point.tangent[b.curve.index(name)])
-    # the slope start (1 - s) (1 - 3 s) + stop s (3 s - 2) + 6 chord s (1 - s) has its vertex at s
-    curve = 3.0 * start + 3.0 * stop - 6.0 * chord
+    start, curve, half = _slope_between(name, a, b)
     if curve == 0.0:
         return None
-    s = (2.0 * start + stop - 3.0 * chord) / curve
+    s = -half / curve
     if not 0.0 < s < 1.0:
         return None
-    slope = start * (1.0 - s) * (1.0 - 3.0 * s) + stop * s * (3.0 * s - 2.0) + 6.0 * chord * s * (1.0 - s)
+    slope = start + s * half
     # where it nearly vanishes the interpolation cannot tell
     return s if slope * math.copysign(1.0, start) < 0.05 * abs(start) else None
+
+
+def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float, float]:
+    """The derivative of a parameter by arclength, `start + 2 half s + curve s^2` at the share s of the way between two
+    neighbours, by its cubic interpolation; nothing of it without a way.
+    """
+    i, j, way = a.curve.index(name), b.curve.index(name), b.point.arclength - a.point.arclength
+    if not way > 0.0:
+        return 0.0, 0.0, 0.0
+    chord = float(b.point.u[j] - a.point.u[i]) / way
+    start, stop = float(a.point.tangent[i]), float(b.point.tangent[j])
+    return start, 3.0 * (start + stop - 2.0 * chord), 3.0 * chord - 2.0 * start - stop
 
 
 class _Stretch:
@@ -160,12 +171,61 @@ class _Stretch:
             solved = correct(curve, guess, row, weights, replace(self.newton, iterations=30, damped=True))
         return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
 
+    def about(self, resolved: float) -> tuple[TrackedSample, float]:
+        """A point beside the zero, closer than a share of the way or (0) where little is left of the test's values at
+        the ends, and about the test's derivative by arclength there.
+        """
+        first, last = self.values[0.0], self.values[1.0]
+        self.value(self._turn())
+        # components of a tangent change evenly; others may be large at one end
+        size = max if isinstance(self.test, Extremum) else min
+        little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
+        share = self._root(resolved or _RESOLVED, little)
+        value, way = self.value(share), self.b.point.arclength - self.a.point.arclength
+        slope = last - first
+        if 0.0 < share < 1.0:
+            # of the parabola through all three
+            slope = (value - first) / share + (last - value) / (1.0 - share) - slope
+        return self.samples[share], slope / way if way > 0.0 else 0.0
+
+    def _turn(self) -> float:
+        """The share at which a parameter turns by its cubic interpolation; 0 for other tests."""
+        if isinstance(self.test, Extremum):
+            start, curve, half = _slope_between(self.test.name, self.a, self.b)
+            inside = half * half - start * curve
+            if inside >= 0.0 and start != 0.0:
+                # the root on the side of the end whose sign is the other one
+                share = -start / (half - math.copysign(math.sqrt(inside), start))
+                return share if 0.0 < share < 1.0 else 0.0
+        return 0.0
+
+    def zero_from(self, sample: TrackedSample, slope: float) -> TrackedSample:
+        """Where the test vanishes, from a point beside, by secants; by Brent's method where these leave the way."""
+        low, high = self.a.point.arclength, self.b.point.arclength
+        try:
+            found = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
+        except ConvergenceError:
+            found = None
+        # tangents at the ends may be those of points a rounding away
+        slack = _ROUGH * (high - low)
+        if found is not None and low - slack <= found.point.arclength <= high + slack:
+            return found
+        return self.zero(_RESOLVED)
+
     def zero(self, resolved: float) -> TrackedSample:
-        """Where the test vanishes, to a share of the way, by Brent's method."""
-        shares = sorted(self.values)
-        for low, high in itertools.pairwise(shares):
+        """Where the test vanishes, to a share of the way."""
+        return self.samples_at(self._root(resolved))
+
+    def _root(self, resolved: float, little: float = 0.0) -> float:
+        """The share at which the test vanishes, or its modulus is below `little`, by Brent's method."""
+
+        def value(share: float) -> float:
+            found = self.value(share)
+            return found if abs(found) > little else 0.0
+
+        for low, high in itertools.pairwise(sorted(self.values)):
             if self.values[low] * self.values[high] <= 0.0:
-                return self.samples_at(float(brentq(self.value, low, high, xtol=resolved, rtol=8.9e-16)))
+                return float(brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
         raise ConvergenceError("the test does not change sign")
 
     def samples_at(self, share: float) -> TrackedSample:
@@ -193,7 +253,6 @@ def extreme_of(test: CurveTest, a: TrackedSample) -> str:
 def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     """An event located again with the harmonics that events ask for."""
     sample = found.sample
-    arclength = sample.point.arclength
     for _ in range(6):
         curve, basis = sample.curve, _finer(sample)
         if basis is None:
@@ -205,20 +264,19 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
             along = finer.transfer(sample.point.tangent, curve)
             start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton, along)
+            start = replace(start, arclength=sample.point.arclength)
             near = TrackedSample(start)
             test = found.test.within(near, near)
-            sample = zero_along(start, test.value, newton, _BESIDE)
+            sample = zero_along(start, test.value, newton, _BESIDE, found.slope)
         except ConvergenceError as failure:
             warnings.append(
                 f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
                 f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
             if sample is found.sample and found.rough is not None:
-                sample = found.rough.zero(_RESOLVED)
+                sample = found.rough.zero_from(sample, found.slope)
             break
-    if sample is found.sample:
-        return found
-    return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
+    return found if sample is found.sample else replace(found, sample=sample)
 
 
 __all__ = ["Found", "events_between", "extreme_of", "located", "refined"]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation import kernels
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
@@ -24,6 +24,8 @@ from suboctave.errors import ConvergenceError, InputError
 _BEHIND = 2
 #: points from which on a march watches whether it goes round and round without passing its start
 _LONG = 256
+#: share of a step over which derivatives count as the same
+_SPARED = 5e-6
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,9 @@ class SteppingOptions:
 
 @dataclass(eq=False, slots=True)
 class CurvePoint:
-    """A point of a curve with its tangent (in u, unit length in scaled arclength)."""
+    """A point of a curve with its tangent (in u, unit length in scaled arclength); `factor` as in `Solved`, while the
+    point is new.
+    """
 
     curve: Curve
     u: Array
@@ -73,6 +77,7 @@ class CurvePoint:
     orientation: float
     arclength: float
     iterations: int
+    factor: Factor | None = None
 
     @property
     def parameter(self) -> float:
@@ -130,7 +135,9 @@ def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: flo
     sign = solved.factor.sign
     if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:
         t, sign = -t, -sign
-    return CurvePoint(curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations)
+    return CurvePoint(
+        curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations, solved.factor
+    )
 
 
 def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
@@ -296,7 +303,8 @@ class March:
             try:
                 guess = np.empty(len(point.u))
                 kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
-                solved = correct(point.curve, guess, point.weights * point.tangent, point.weights, self.newton)
+                row = point.weights * point.tangent
+                solved = correct(point.curve, guess, row, point.weights, self.newton, spare=_SPARED * step)
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)

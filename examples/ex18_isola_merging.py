@@ -5,7 +5,7 @@ large motions of twice the period come off. These are two events. Up to j = 0.17
 large motions. From there on a bubble joins them directly, and the large motions are a closed branch of their own. At
 j = 0.17713 the bubble shrinks to nothing, which the isola does not notice.
 
-    python ex17_isola_merging.py [figure.png]
+    python ex18_isola_merging.py [figure.png]
 """
 
 import sys
