@@ -207,6 +207,23 @@ def test_ends_can_be_tracked_again(isolas):
     assert isola.born == pytest.approx(curve.parameter("j")[end], abs=2e-6)
 
 
+def test_a_budget_ends_it_politely():
+    isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), seconds=1e-6)
+    assert list(isolas) == []
+    assert any("seconds are over" in note for note in isolas.notes)
+
+
+def test_ctrl_c_keeps_what_is_there():
+    def stop(share, where):
+        if "closed" in where:
+            raise KeyboardInterrupt
+
+    isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), values=2, progress=stop)
+    assert list(isolas) == []
+    assert isolas.limit_points
+    assert any("interrupted" in note for note in isolas.notes)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -218,6 +235,7 @@ def test_ends_can_be_tracked_again(isolas):
         ({"search": "2"}, "periods"),
         ({"levels": (0.0,)}, "levels"),
         ({"depth": -1}, "depth"),
+        ({"seconds": 0.0}, "seconds"),
         ({"max_curves": True}, "max_curves"),
         ({"seeds": 3}, "Seeds"),
         ({"omega": (0.0, 1.0)}, "omega"),

@@ -183,6 +183,7 @@ def test_resume_does_not_search_again(study_file, monkeypatch):
         ("search = [3]", "serach = [3]", "did you mean 'search'"),
         ("search = [3]", "seeds = { frequencys = 3 }", "did you mean 'frequencies'"),
         ("harmonics = 3", 'harmonics = "adaptve"', "adaptive"),
+        ("harmonics = 3", "seconds = 0.0", "greater than 0"),
         ("harmonics = 3", "events = []", "there is no such key"),
         ("omega = [2.5, 9.0]", "omega = [0.0, 9.0]", "frequencies are positive"),
         ("isola = 0, at = 4.0 }", "at = 4.0 }", "say which, and at which value"),
