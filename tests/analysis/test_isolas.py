@@ -73,6 +73,11 @@ def test_stable_parts_by_shooting(isolas):
         assert so.verify(branch.orbits[index]).agrees
 
 
+def test_the_answer_does_not_depend_on_how_one_looks(isolas):
+    (isola,) = so.find_isolas(reference(), (1.9, 4.2), "j", (0.0, 1.0), values=2)
+    assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
+
+
 @pytest.mark.parametrize("gap", [0.3, 0.5, 0.9])
 def test_the_answer_does_not_depend_on_where_one_stands(isolas, gap):
     (isola,) = so.find_isolas(reference(j=gap), OMEGA[::-1], "j", (1.0, 0.0))

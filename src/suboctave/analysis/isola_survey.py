@@ -161,7 +161,7 @@ class Survey:
         if leg is not None or any(v == value and _beside(b, item) for v, b in self._lost):
             return leg
         curve = self._tracked(item, value)
-        if curve is not None:
+        if curve is not None and not self._repeats(curve):
             self.curves.append(curve)
             self.legs += legs_of(curve, self.name)
             leg = self.leg_of(item, value)
@@ -170,6 +170,12 @@ class Survey:
             if curve is not None:
                 self.note(f"the limit point at omega = {item.omega:.6g}, {self.name} = {value:.6g} is not on its curve")
         return leg
+
+    def _repeats(self, curve: TrackedBranch) -> bool:
+        """Whether a curve is one that is known, met where the known one was not found again."""
+        turns = [event for event in curve.bifurcations.met if isinstance(event, TrackedEvent) and event.isola]
+        known = (e for c in self.curves if c.nu == curve.nu for e in c.bifurcations.met)
+        return any(_beside(a, b) and same_motion(a.orbit, b.orbit) for b in known for a in turns)
 
     def doubling(self, item: Bifurcation, value: float) -> None:
         """Follow a period doubling over the parameter, unless its curve is known."""
