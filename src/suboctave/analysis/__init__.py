@@ -4,6 +4,8 @@ from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isola_map import isola_map
+from suboctave.analysis.isola_region import IsolaMap
 from suboctave.analysis.isolas import find_isolas
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
@@ -18,6 +20,7 @@ __all__ = [
     "Branch",
     "BranchPoint",
     "Isola",
+    "IsolaMap",
     "Isolas",
     "Results",
     "Seeds",
@@ -29,6 +32,7 @@ __all__ = [
     "find_isolas",
     "find_subharmonics",
     "frequency_response",
+    "isola_map",
     "load",
     "locate_extremum",
     "periodic_orbit",
