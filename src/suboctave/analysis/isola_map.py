@@ -2,9 +2,9 @@
 
 `find_isolas` says between which values of one design parameter an isola lives. Its two ends, the centre where it is
 born and the point where it merges, are extrema of curves of limit points: `track` follows both in a second design
-parameter. Between the two curves the isola exists. At some values of the second parameter a closed branch in the middle of the
-range is followed, which no curve of extrema knows of: it must close, and the curve of its limit points must end where
-the map says.
+parameter. Between the two curves the isola exists. At some values of the second parameter a closed branch in the middle
+of the range is followed, which no curve of extrema knows of: it must close, and the curve of its limit points must end
+where the map says.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def _checked(isolas: Any) -> list[Isola]:
 def _check_probes(probes: Any, low: float, high: float) -> None:
     if isinstance(probes, int) and not isinstance(probes, bool) and probes >= 0:
         return
-    given = list(probes) if isinstance(probes, Iterable) and not isinstance(probes, str) else [None]
+    given: list[Any] = list(probes) if isinstance(probes, Iterable) and not isinstance(probes, str) else [None]
     if not all(is_number(value) and low <= value <= high for value in given):
         raise InputError(f"probes must be how many, or numbers within the bounds ({low:g}, {high:g}), not {probes!r}")
 

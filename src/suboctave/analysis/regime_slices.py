@@ -1,0 +1,202 @@
+"""All branches at one value of the design parameter, as deep as asked, and their stable arcs.
+
+The response with the branches that bifurcate from it, begun at both ends of the range; then a branch through every
+limit point of a known curve that lies on none of these: isolas, and branches that lead through the range elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from suboctave.analysis.borders import Border
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.diagram import bifurcation_diagram
+from suboctave.analysis.regime_arcs import Arc, Edge, Stretch, lies_on, same_branch, stretches
+from suboctave.analysis.regime_atlas import Atlas
+from suboctave.analysis.switching import switch_branch
+from suboctave.analysis.verbs import continue_branch
+from suboctave.bifurcation import Bifurcation
+from suboctave.errors import ConvergenceError, InputError
+
+__all__ = ["Slice", "looked"]
+
+#: ends of branches this close to the end of the range, relatively, lie on it
+_AT_END = 1e-6
+#: stretches without a point, narrower than this share of the range, are taken for unstable without a word
+_NARROW = 1e-4
+
+
+@dataclass(eq=False)
+class Slice:
+    """Branches over omega at one value of the design parameter.
+
+    branches
+        Each with whether it lies on an isola, or leaves one.
+    arcs
+        Its stable arcs.
+    explained
+        Borders of limit points that lie on one of the branches there.
+    """
+
+    value: float
+    branches: list[tuple[Branch, bool]] = field(default_factory=list)
+    arcs: list[Arc] = field(default_factory=list)
+    explained: list[Border] = field(default_factory=list)
+
+    @property
+    def bifurcations(self) -> list[Bifurcation]:
+        """Everything located on its branches."""
+        return [item for branch, _ in self.branches for item in branch.bifurcations]
+
+
+def looked(value: float, atlas: Atlas, depth: int, slices: Slice | None = None) -> Slice:
+    """The branches at a value; bifurcations met there are followed over the parameter if they are new.
+
+    With a slice given it is completed by branches through limit points that have become known since.
+    """
+    found = slices or Slice(value)
+    before = len(found.branches)
+    if slices is None:
+        for branch in _responses(value, atlas, depth):
+            found.branches.append((branch, False))
+            _explain(found, branch, atlas)
+    done: list[Border] = []
+    while True:
+        missing = [
+            b for b in atlas.borders if b.kind == "LP" and b.contains(value) and b not in found.explained + done
+        ]
+        missing = [b for b in missing if b.nu <= 2**depth and _within(float(b.across(value)), atlas)]
+        if not missing:
+            break
+        done.append(missing[0])
+        for branch, isolated in _through(missing[0], value, atlas, depth, found):
+            found.branches.append((branch, isolated))
+            _explain(found, branch, atlas)
+    if slices is None or len(found.branches) > before:
+        found.arcs = _arcs(found, atlas, 2**depth)
+    return found
+
+
+def _within(omega: float, atlas: Atlas) -> bool:
+    low, high = atlas.omega
+    return low <= omega <= high
+
+
+def _responses(value: float, atlas: Atlas, depth: int) -> Iterator[Branch]:
+    """The response from both ends with all that bifurcates from it."""
+    system = atlas.system.with_parameters({atlas.name: value})
+    low, high = atlas.omega
+    known: list[Branch] = []
+    for ends in ((high, low), (low, high)):
+        try:
+            diagram = bifurcation_diagram(system, ends, depth, harmonics=atlas.harmonics, **atlas.options)
+        except ConvergenceError as failure:
+            atlas.note(f"at {atlas.name} = {value:.6g}: {failure}")
+            continue
+        for node in diagram:
+            for item, why in node.failures:
+                atlas.note(f"at {atlas.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+            if len(node.branch) and not any(same_branch(node.branch, other) for other in known):
+                yield node.branch
+            if node.branch.interrupted:
+                raise KeyboardInterrupt
+        root = diagram.root.branch
+        known += diagram.branches
+        if len(root) and root.points[-1].orbit.omega == ends[1]:
+            return
+
+
+def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slice) -> Iterator[tuple[Branch, bool]]:
+    """The branch through a limit point, and what bifurcates from it."""
+    where = f"omega = {float(border.across(value)):.6g}, {atlas.name} = {value:.6g}"
+    places = [float(v) for b in atlas.borders if b.kind == "LP" and b.contains(value) for v in [b.across(value)]]
+    low, high = min([*places, *atlas.omega]), max([*places, *atlas.omega])
+    margin = 0.02 * (high - low)
+    bounds = (max(low - margin, 0.5 * low), high + margin)
+    try:
+        branch = continue_branch(atlas.limit_point(border, value), "omega", bounds, **atlas.options)
+    except (ConvergenceError, InputError) as failure:
+        atlas.note(f"the branch through the limit point at {where} could not be followed: {failure}")
+        return
+    if branch.interrupted:
+        raise KeyboardInterrupt
+    if any(same_branch(branch, other) for other, _ in found.branches):
+        found.explained.append(border)
+        return
+    detached = branch.closed and branch.departs is None and branch.arrives is None
+    yield branch, detached
+    waiting = [branch]
+    while waiting:
+        parent = waiting.pop(0)
+        if 2 * parent.nu > 2**depth:
+            continue
+        met = [j for j in (parent.departs, parent.arrives) if j is not None]
+        for item in parent.bifurcations["PD"]:
+            if any(j.nu == item.orbit.basis.nu and j.same_place(item, high - low) for j in met):
+                continue
+            try:
+                child = switch_branch(item, **atlas.options)
+            except (ConvergenceError, InputError) as failure:
+                atlas.note(f"at {atlas.name} = {value:.6g}, PD at omega = {item.omega:.6g}: {failure}")
+                continue
+            met += [j for j in (child.departs, child.arrives) if j is not None]
+            if any(same_branch(child, other) for other, _ in found.branches):
+                continue
+            waiting.append(child)
+            yield child, detached
+
+
+def _explain(found: Slice, branch: Branch, atlas: Atlas) -> None:
+    """Limit points of a branch are followed over the parameter, and known from now on to lie on a branch."""
+    for item in branch.bifurcations["LP"]:
+        border = atlas.known(item, found.value)
+        if border is not None and border not in found.explained:
+            found.explained.append(border)
+
+
+def _arcs(found: Slice, atlas: Atlas, deepest: int) -> list[Arc]:
+    """The stable arcs of all branches, what ends them followed over the parameter; each once."""
+    arcs: list[Arc] = []
+    others = found.bifurcations
+    low, high = atlas.omega
+    for branch, isolated in found.branches:
+        for stretch in stretches(branch, others):
+            if stretch.stable is None and stretch.width > _NARROW * (high - low):
+                atlas.note(
+                    f"at {atlas.name} = {found.value:.6g} no motion of a {branch.nu}T branch was computed on a stretch "
+                    f"{stretch.width:.2g} wide in omega: taken for unstable"
+                )
+            beyond = branch.nu == deepest and stretch.doubled
+            if not stretch.stable and not beyond:
+                continue
+            if any(arc.nu == branch.nu and _shared(stretch, arc) for arc in arcs):
+                continue  # branches begun at different ends may have a part in common
+            arcs.append(_arc(stretch, isolated, found.value, atlas, beyond))
+    return arcs
+
+
+def _shared(stretch: Stretch, arc: Arc) -> bool:
+    """Whether a stretch is part of an arc that is known already."""
+    return lies_on(stretch.points[len(stretch.points) // 2], arc.points)
+
+
+def _arc(stretch: Stretch, isolated: bool, value: float, atlas: Atlas, beyond: bool) -> Arc:
+    edges = []
+    low, high = atlas.omega
+    slack = _AT_END * (high - low)
+    for end in stretch.ends:
+        if isinstance(end, float):
+            bound = end <= low + slack or end >= high - slack
+            if not bound:
+                atlas.note(
+                    f"at {atlas.name} = {value:.6g} a branch of stable motions ends at omega = {end:.6g}: "
+                    f"{stretch.branch.ended}"
+                )
+            outside = -float("inf") if end <= low + slack else float("inf")
+            edges.append(Edge(outside if bound else end, bound=bound))
+            continue
+        edges.append(Edge(end.omega, atlas.known(end, value), end.kind))
+    edges.sort(key=lambda edge: edge.omega)
+    nu = stretch.branch.nu * (2 if beyond else 1)
+    return Arc(nu, isolated, (edges[0], edges[1]), stretch.points, not beyond)
