@@ -1,12 +1,16 @@
 """What a user calls: response curves, curves along any parameter, stability and verification of single motions."""
 
+from suboctave.analysis.attractors import Attractor
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagram
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
+from suboctave.analysis.integration import Trajectory, integrate
 from suboctave.analysis.isola import Isola, Isolas
 from suboctave.analysis.isola_map import isola_map
 from suboctave.analysis.isola_region import IsolaMap
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.poincare import PoincareSections, poincare_sections
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
@@ -16,26 +20,33 @@ from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.analysis.verification import Verification, stability, verify
 
 __all__ = [
+    "Attractor",
     "BifurcationDiagram",
     "Branch",
     "BranchPoint",
+    "BruteForceDiagram",
     "Isola",
     "IsolaMap",
     "Isolas",
+    "PoincareSections",
     "Results",
     "Seeds",
     "Table",
     "TrackedBranch",
+    "Trajectory",
     "Verification",
     "bifurcation_diagram",
+    "brute_force_diagram",
     "continue_branch",
     "find_isolas",
     "find_subharmonics",
     "frequency_response",
+    "integrate",
     "isola_map",
     "load",
     "locate_extremum",
     "periodic_orbit",
+    "poincare_sections",
     "stability",
     "switch_branch",
     "track",

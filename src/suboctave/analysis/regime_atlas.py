@@ -105,7 +105,7 @@ class Atlas:
         return off + float(gap / room) if gap <= room else None
 
     def known(self, item: Bifurcation, value: float) -> Border | None:
-        """The border that a bifurcation lies on, after following it over the parameter if it is new; None if that fails."""
+        """The border that a bifurcation lies on, followed over the parameter if it is new; None if that fails."""
         border = self.border_of(item, value)
         if border is not None or self._is_lost(item, value):
             return border

@@ -15,13 +15,17 @@ from suboctave.analysis.checks import is_number
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.regime_arcs import Arc
 from suboctave.analysis.regime_atlas import Atlas
+from suboctave.analysis.regime_motions import motion_at
 from suboctave.analysis.regime_slices import Slice
 from suboctave.analysis.results import Table
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
+from suboctave.harmonic.orbit import PeriodicOrbit
 
 if TYPE_CHECKING:
     import pandas
+
+    from suboctave.analysis.regime_check import RegimeCheck
 
 __all__ = ["Regime", "RegimeMap", "Region", "Strip"]
 
@@ -74,6 +78,11 @@ class Strip:
     def arcs(self) -> list[Arc]:
         """The stable arcs."""
         return [] if self.seen is None else self.seen.arcs
+
+    @property
+    def value(self) -> float:
+        """The value of the parameter that was looked at."""
+        return 0.5 * (self.low + self.high) if self.seen is None else self.seen.value
 
 
 @dataclass(frozen=True)
@@ -134,6 +143,46 @@ class RegimeMap:
             if first <= omega <= last:
                 found.append(arc)
         return found
+
+    def motions(self, omega: float, value: float) -> list[PeriodicOrbit]:
+        """The stable motions themselves at a point of the plane, solved there; those beyond the depth are left out.
+
+        Raises
+        ------
+        ConvergenceError
+            If one is not found again, which may happen next to a border.
+        """
+        strip = self.strip(value)
+        return [
+            motion_at(arc, strip.value, self.system, self.parameter, self.omega, omega, value)
+            for arc in self.arcs(omega, value)
+            if arc.followed
+        ]
+
+    def check(
+        self,
+        points: int = 200,
+        seed: int = 0,
+        *,
+        states: int = 4,
+        transient: int = 400,
+        progress: Any = None,
+    ) -> RegimeCheck:
+        """Integrate in time at points of the plane drawn at random, and compare what is reached with the labels.
+
+        Parameters
+        ----------
+        points, seed
+            How many points, drawn evenly from the plane with this seed.
+        states
+            From how many states, drawn at random from about twice the size of the motions known there; the known
+            stable motions, slightly disturbed, are starts as well.
+        transient
+            Periods of the load before a motion is recognised; those that have not settled get ten times as many.
+        """
+        from suboctave.analysis.regime_check import check_regimes
+
+        return check_regimes(self, points, seed, states, transient, progress)
 
     def label(self, omega: float, value: float) -> Regime:
         """The stable motions known at a point of the plane.
@@ -224,7 +273,7 @@ class RegimeMap:
         return self.to_table().to_dataframe()
 
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
-        """The plane coloured by regime, with the curves of bifurcations; options `title`, `size`, `curves`, `labels`."""
+        """The plane coloured by regime, with the borders; options are those of `pictures.regimes.plot_regimes`."""
         from suboctave.pictures.regimes import plot_regimes
 
         cells, regimes = self.raster(900, 700)
@@ -233,7 +282,7 @@ class RegimeMap:
         return plot_regimes(cells, said, lines, (self.omega, self.bounds), ("omega", self.parameter), path, **options)
 
     def _lines(self) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-        """The stretches of borders that stable motions end at, over the strips in which they do: kind, omega, values."""
+        """The stretches of borders that stable motions end at, in the strips in which they do: kind, omega, values."""
         drawn: set[tuple[int, int]] = set()
         for number, strip in enumerate(self.strips):
             values = strip.low + 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 121))) * (strip.high - strip.low)

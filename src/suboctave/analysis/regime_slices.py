@@ -63,9 +63,7 @@ def looked(value: float, atlas: Atlas, depth: int, slices: Slice | None = None) 
             _explain(found, branch, atlas)
     done: list[Border] = []
     while True:
-        missing = [
-            b for b in atlas.borders if b.kind == "LP" and b.contains(value) and b not in found.explained + done
-        ]
+        missing = [b for b in atlas.borders if b.kind == "LP" and b.contains(value) and b not in found.explained + done]
         missing = [b for b in missing if b.nu <= 2**depth and _within(float(b.across(value)), atlas)]
         if not missing:
             break

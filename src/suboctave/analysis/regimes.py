@@ -13,6 +13,7 @@ quasi-periodic and chaotic ones, and branches that nothing leads to, are not kno
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 from suboctave.analysis.checks import (
@@ -155,7 +156,7 @@ def _unseen(atlas: Atlas, slices: list[Slice], resolution: float) -> list[float]
     """The middles of strips that no value looked at lies in."""
     marks = atlas.critical()
     found = []
-    for a, b in zip(marks[:-1], marks[1:], strict=True):
+    for a, b in pairwise(marks):
         if b - a >= resolution * atlas.span and not any(_inside(s.value, a, b) for s in slices):
             found.append(0.5 * (a + b))
     return found
@@ -170,7 +171,7 @@ def _strips(atlas: Atlas, slices: list[Slice]) -> list[Strip]:
     """The strips with what was seen in them; those that nobody looked at take over from their neighbours."""
     marks = atlas.critical()
     strips = []
-    for a, b in zip(marks[:-1], marks[1:], strict=True):
+    for a, b in pairwise(marks):
         within = [s for s in slices if _inside(s.value, a, b)]
         middle = 0.5 * (a + b)
         nearest = min(within or slices, key=lambda s: abs(s.value - middle), default=None)

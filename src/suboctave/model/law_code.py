@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -210,6 +210,41 @@ class Law:
                 return law(q, theta, c)
 
         return quiet
+
+    def scalar_code(
+        self,
+        parts: list[Any],
+        states: list[str],
+        number: Callable[[int], str],
+        prefix: str,
+        more: Mapping[str, str],
+    ) -> tuple[list[str], list[str]]:
+        """Lines of code and an expression for each of the parts, for a compiler: of numbers instead of arrays.
+
+        What the states and coefficients are called there is told; names of its own begin with `prefix`; `more` are
+        further symbols. The phase is `theta`.
+        """
+        import sympy
+
+        names = {state.name: states[i] for i, state in enumerate(self.q)}
+        names |= {one.name: number(i) for i, one in enumerate(self.c)} | {_THETA: "theta", **more}
+        parts = [_off_corners(part) for part in parts]
+        common, reduced = sympy.cse(parts, symbols=sympy.numbered_symbols("(common)"))
+        lines = []
+        for i, (name, value) in enumerate(common):
+            lines.append(f"{prefix}w{i} = {as_code(value, names)}")
+            names[name.name] = f"{prefix}w{i}"
+        return lines, [as_code(part, names) for part in reduced]
+
+    @property
+    def phase(self) -> Any:
+        """The symbol of omega t."""
+        return symbol(_THETA)
+
+    @property
+    def rough(self) -> bool:
+        """Whether a power that is no integer begins at a corner."""
+        return self._rough
 
     def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         """`(f, f_q)`, shapes (N,), (Q, N)."""

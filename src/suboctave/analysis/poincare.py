@@ -1,0 +1,230 @@
+"""`poincare_sections`: where trajectories pierce the plane of phase 0 of the load, and what they settle on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from suboctave.analysis.attractors import TOLERANCE, Attractor, attractor_of, distinct
+from suboctave.analysis.integration import _not_negative, _samples, start_state
+from suboctave.analysis.progress import reporting, timed
+from suboctave.errors import InputError
+from suboctave.model.element import Array
+from suboctave.model.system import System
+from suboctave.timedomain.batch import Flow, check_count
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["PoincareSections", "check_observe", "check_tolerance", "poincare_sections"]
+
+
+@dataclass(eq=False)
+class PoincareSections:
+    """Stroboscopic points of B trajectories.
+
+    Attributes
+    ----------
+    points
+        (B, P, 2n): displacements, then velocities, at phase 0 of the load, after the transient.
+    largest
+        (B, P, n): the largest |x_i| in the period before each point.
+    omega
+        (B,).
+    varied
+        (B,) each: the parameters that differ from the system's, by name.
+    failed
+        (B,): trajectories that left the range of numbers (their points are NaN), or some steps of which Newmark's
+        method did not solve.
+    finished
+        (B,): False for those that an interruption (Ctrl-C) left out; their points are NaN.
+    tolerance
+        Relative tolerance of the recognition of periods.
+    """
+
+    points: Array
+    largest: Array
+    omega: Array
+    varied: Mapping[str, Array]
+    failed: NDArray[np.bool_]
+    finished: NDArray[np.bool_]
+    tolerance: float
+    transient: int
+    method: str
+    observed: int
+    system: System
+    seconds: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def attractor(self, index: int) -> Attractor:
+        """What trajectory number `index` has settled on."""
+        if not -len(self) <= index < len(self):
+            raise InputError(f"there is no trajectory {index}: they are numbered from 0 to {len(self) - 1}")
+        values = {name: float(column[index]) for name, column in self.varied.items()}
+        return attractor_of(
+            self.system,
+            self.points[index],
+            self.largest[index],
+            float(self.omega[index]),
+            {**self.system.parameters, **values},
+            self.tolerance,
+            self.observed,
+        )
+
+    @property
+    def periods(self) -> NDArray[np.int_]:
+        """(B,): the period of each in periods of the load, 0 where nothing repeats."""
+        return np.array([self.attractor(i).period for i in range(len(self))], dtype=int)
+
+    @property
+    def attractors(self) -> list[Attractor]:
+        """Every attractor once, by falling amplitude, with the number of trajectories on it.
+
+        All trajectories must have the same frequency and parameters; those that did not finish are left out.
+        """
+        columns = [self.omega, *self.varied.values()]
+        if any((column != column[0]).any() for column in columns):
+            raise InputError(
+                "the trajectories have different frequencies or parameters: ask for attractor(i) of each, or take "
+                "brute_force_diagram"
+            )
+        kept = np.flatnonzero(self.finished & ~self.failed)
+        return distinct(self.system, [self.attractor(int(i)) for i in kept], self.tolerance)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Points on (trajectory, section, dof), periods, and what produced them."""
+        import xarray
+
+        n = self.system.n
+        names: Any = self.system.dof_names or range(n)
+        return xarray.Dataset(
+            {
+                "displacement": (("trajectory", "section", "dof"), self.points[:, :, :n]),
+                "velocity": (("trajectory", "section", "dof"), self.points[:, :, n:]),
+                "largest": (("trajectory", "section", "dof"), self.largest),
+                "omega": (("trajectory",), self.omega),
+                "period": (("trajectory",), self.periods),
+                "failed": (("trajectory",), self.failed),
+                "finished": (("trajectory",), self.finished),
+                **{name: (("trajectory",), column) for name, column in self.varied.items()},
+            },
+            coords={"dof": list(names)},
+            attrs={
+                "contents": "poincare sections",
+                "transient": self.transient,
+                "method": self.method,
+                "tolerance": self.tolerance,
+                "observed": self.observed,
+                "dofs": n,
+                "system": self.system.name,
+                "suboctave": __version__,
+            },
+        )
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """The points in the plane of displacement and velocity; saved if a path is given.
+
+        Options are those of `pictures.plot_sections`: `dof`, `title`, `size`.
+        """
+        from suboctave.pictures.in_time import plot_sections
+
+        return plot_sections(self.to_xarray(), path, **options)
+
+    def __repr__(self) -> str:
+        count, sections, _ = self.points.shape
+        return f"PoincareSections({count} trajectories, {sections} points each after {self.transient} periods)"
+
+
+@timed
+def poincare_sections(
+    system: System,
+    states: Any = None,
+    *,
+    omega: ArrayLike,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    transient: int = 300,
+    periods: int = 60,
+    method: str = "accurate",
+    steps_per_period: int | None = None,
+    tolerance: float | None = None,
+    period_tolerance: float = TOLERANCE,
+    observe: int | None = None,
+    workers: int | None = None,
+    progress: Any = None,
+) -> PoincareSections:
+    """Follow many trajectories and keep their states once in every period of the load, on all processors.
+
+    Parameters
+    ----------
+    states
+        (B, 2n) or (2n,): displacements, then velocities, at phase 0 of the load; None for rest.
+    omega, parameters
+        A number, or (B,) with one for each trajectory; parameters by name.
+    transient, periods
+        Periods of the load that are left out, and those that are kept.
+    method, steps_per_period, tolerance
+        As in `integrate`.
+    period_tolerance
+        Motions whose points repeat to this share of their size are periodic; at least three repetitions are looked for.
+    observe
+        The degree of freedom whose amplitude attractors tell; default that of the first load.
+    workers
+        Threads; default as many as there are processors. Results do not depend on it.
+    progress
+        True for a bar, or a callable (share, text).
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    """
+    if states is None or not isinstance(states, list | tuple | np.ndarray):
+        states = start_state(system, states)
+    periods = check_count("periods", periods)
+    transient = _not_negative("transient", transient)
+    check_tolerance(period_tolerance)
+    observe = check_observe(system, observe)
+    flow = Flow(system, method, 1, _samples(method, steps_per_period), tolerance)
+    with reporting(progress, "Poincaré sections") as report:
+        motions = flow.over(
+            states, omega, transient + periods, parameters, transient, measure=True, workers=workers, report=report
+        )
+    count = len(motions.states)
+    assert motions.peaks is not None
+    return PoincareSections(
+        points=motions.states,
+        largest=motions.peaks,
+        omega=np.broadcast_to(np.asarray(omega, dtype=float), (count,)).copy(),
+        varied={
+            name: np.broadcast_to(np.asarray(values, dtype=float), (count,)).copy()
+            for name, values in (parameters or {}).items()
+        },
+        failed=motions.failed | (motions.unsettled > 0.0),
+        finished=motions.finished,
+        tolerance=period_tolerance,
+        transient=transient,
+        method=method,
+        observed=observe,
+        system=system,
+    )
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Refuse a tolerance of periods that makes no sense."""
+    if not (isinstance(tolerance, int | float) and 1e-14 <= tolerance < 1.0):
+        raise InputError(f"period_tolerance={tolerance!r}: give a share of the motion's size, such as 1e-6")
+
+
+def check_observe(system: System, observe: int | None) -> int:
+    """The observed degree of freedom, or `InputError`."""
+    dof = system.observed_dof if observe is None else observe
+    if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or not 0 <= dof < system.n:
+        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
+    return int(dof)

@@ -1,0 +1,63 @@
+"""Laws that have no code, as functions of C that generated code may call: forces given as Python functions, and
+elements of a user's own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from suboctave.model.coupled import as_coupled
+from suboctave.model.element import Array
+from suboctave.timedomain.lanes import asked_states
+from suboctave.timedomain.structure import PlacedLaw
+
+__all__ = ["Answers"]
+
+_KIND = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+
+
+class Answers:
+    """One function of C for all laws that are asked; `address` is where it is, 0 without any.
+
+    It is given the number of the law, of trajectories W, and the address of a block of rows of W numbers: the states
+    that the law reads, the phase, its numbers, then room for the force and its derivatives. What a law raises is kept
+    in `failure`: no exception passes through code of C.
+    """
+
+    def __init__(self, laws: Sequence[PlacedLaw]) -> None:
+        self.failure: BaseException | None = None
+        self._laws = [
+            (
+                as_coupled(placed.element),
+                asked_states(placed),
+                placed.law,
+            )
+            for placed in laws
+        ]
+        self._function = _KIND(self._answer)
+        self.address = ctypes.cast(self._function, ctypes.c_void_p).value or 0 if laws else 0
+
+    def _answer(self, which: int, lanes: int, address: int) -> None:
+        try:
+            law, states, text = self._laws[which]
+            size = 2 * states + text.count + 2
+            block = np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(ctypes.c_double)), (size, lanes))
+            begin = states + 1 + text.count
+            numbers = block[states + 1 + text.corners : begin]
+            self._tell(law, block[:states].copy(), block[states].copy(), numbers.copy(), block[begin:])
+        except BaseException as failure:  # nothing may pass through C
+            self.failure = self.failure or failure
+
+    def _tell(self, law: Any, q: Array, theta: Array, c: Array, out: Array) -> None:
+        out[:] = np.nan
+        with np.errstate(all="ignore"):
+            if (c == c[:, :1]).all():
+                out[0], out[1:] = law.tangent(q, theta, c[:, 0].copy())
+                return
+            for lane in range(len(theta)):
+                at = slice(lane, lane + 1)
+                out[:1, at], out[1:, at] = law.tangent(q[:, at].copy(), theta[at], c[:, lane].copy())

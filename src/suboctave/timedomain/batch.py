@@ -1,0 +1,357 @@
+"""Many trajectories at once: the compiled flow of a system over whole periods of the load.
+
+    flow = Flow(system)
+    motions = flow.over(states, omega=2.3, periods=200)      # states (B, 2n)
+
+Every trajectory may have its own frequency and parameters. Its result does not depend on the others, on their number or
+on that of the threads: neighbours in a group share instructions, no number. Nothing here knows what a user calls; the
+verbs are in `analysis`.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.model.element import Array
+from suboctave.model.system import System
+from suboctave.timedomain.adaptive import AdaptiveGroup, AdaptiveKernel
+from suboctave.timedomain.asked import Answers
+from suboctave.timedomain.newmark import NewmarkGroup, NewmarkKernel
+from suboctave.timedomain.structure import Numbers, Structure
+
+__all__ = ["METHODS", "Flow", "Motions", "Report"]
+
+METHODS = ("accurate", "newmark")
+Report = Callable[[float, str], None]
+#: seconds between two looks at whether to go on
+_LOOK = 0.1
+#: numbers that one answer may hold
+_LARGEST = 400_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """What a flow brings.
+
+    Attributes
+    ----------
+    states
+        (B, S, 2n): displacements, then velocities, at the S instants kept.
+    peaks
+        (B, S, n): the largest |x_i| since the instant before, between the instants too; None if not asked for.
+    end
+        (B, 2n): the last states.
+    failed
+        (B,): trajectories that left the range of numbers; they are NaN from there on.
+    unsettled
+        (B,): steps of Newmark's method whose equations were not solved to the tolerance.
+    finished
+        (B,): whether the trajectory was followed to its end; not all are where the user interrupted (Ctrl-C).
+    """
+
+    states: Array
+    peaks: Array | None
+    end: Array
+    failed: NDArray[np.bool_]
+    unsettled: Array
+    finished: NDArray[np.bool_]
+
+
+class Flow:
+    """The flow of a system over whole periods of its load, compiled.
+
+    Parameters
+    ----------
+    system
+        Any `System`. Its structure (places and kinds of elements) is compiled, its numbers are not.
+    method
+        "accurate": Runge-Kutta of order 8 with located corners, local error `tolerance` (default 1e-10) relative to the
+        size of the motion. "newmark": constant average acceleration with `steps_per_period` steps (default 1000), each
+        solved until Newton's correction is below `tolerance` (default 1e-10) of the motion.
+    samples
+        Instants per period at which states are given; of Newmark's method a divisor of `steps_per_period`.
+    lanes
+        Trajectories that run side by side; default what suits large batches. Few of them waste less with 8. Results
+        with different numbers may differ in the last bit.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        method: str = "accurate",
+        samples: int = 1,
+        steps_per_period: int = 1000,
+        tolerance: float | None = None,
+        lanes: int | None = None,
+    ) -> None:
+        if method not in METHODS:
+            raise InputError(f"method={method!r}{suggest(str(method), METHODS)}")
+        tolerance = 1e-10 if tolerance is None else tolerance
+        if not 1e-15 <= tolerance <= 1e-2:
+            raise InputError(f"tolerance={tolerance!r}: give a number from 1e-15 to 1e-2, relative to the motion")
+        samples = check_count("samples", samples)
+        steps = check_count("steps_per_period", steps_per_period)
+        if method == "newmark" and (steps < 4 or steps % samples):
+            raise InputError(f"steps_per_period={steps} must be at least 4 and a multiple of samples={samples}")
+        self.system, self.method, self.samples = system, method, samples
+        self.structure = Structure(system)
+        self.kernel: NewmarkKernel | AdaptiveKernel
+        if method == "newmark":
+            self.kernel = NewmarkKernel(self.structure, steps, tolerance, lanes)
+        else:
+            self.kernel = AdaptiveKernel(self.structure, samples, tolerance, lanes)
+
+    def over(
+        self,
+        states: ArrayLike,
+        omega: ArrayLike,
+        periods: int,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        skip: int = 0,
+        measure: bool = False,
+        workers: int | None = None,
+        report: Report | None = None,
+    ) -> Motions:
+        """Follow trajectories from phase 0 of the load over whole periods.
+
+        Parameters
+        ----------
+        states
+            (B, 2n), or (2n,) for one that all share.
+        omega, parameters
+            A number, or (B,) with one for each; parameters by name.
+        periods
+            How many periods of the load.
+        skip
+            Samples at the beginning that are not kept.
+        measure
+            Whether the largest displacements are wanted.
+        workers
+            Threads; default: as many as there are processors.
+        report
+            Called with the share done and a text, from the calling thread.
+
+        Raises
+        ------
+        InputError
+            Before any work, for shapes and values that make no sense.
+        """
+        periods = check_count("periods", periods)
+        x, w, varied = self._broadcast(states, omega, parameters or {})
+        total = periods * self.samples
+        skip = min(max(int(skip), 0), total)
+        if len(x) * (total - skip) * 2 * self.structure.n > _LARGEST:
+            raise InputError(
+                f"{len(x)} trajectories with {total - skip} states each are more than fit: keep fewer (a longer "
+                "transient, or fewer trajectories at once)"
+            )
+        which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
+        numbers = self.structure.numbers(w, varied)
+        return _Run(self, numbers, x, which, total, skip, measure).go(workers, report)
+
+    def _broadcast(
+        self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
+    ) -> tuple[Array, Array, dict[str, Array]]:
+        n = self.structure.n
+        x, w = np.asarray(states, dtype=float), np.asarray(omega, dtype=float)
+        varied = {}
+        for name, values in parameters.items():
+            self.system.check_parameter(name)
+            varied[name] = np.asarray(values, dtype=float)
+        if x.ndim not in (1, 2) or x.shape[-1] != 2 * n:
+            raise InputError(
+                f"states of {n} degrees of freedom have the shape ({2 * n},) or (B, {2 * n}): displacements, then "
+                f"velocities; got {x.shape}"
+            )
+        sizes = {"states": len(x) if x.ndim == 2 else None, "omega": len(w) if w.ndim else None}
+        sizes |= {name: len(values) if values.ndim else None for name, values in varied.items()}
+        for name, array in (("omega", w), *varied.items()):
+            if array.ndim > 1 or not np.isfinite(array).all():
+                raise InputError(f"{name} must be a finite number or one for each trajectory, got shape {array.shape}")
+        if not (w > 0.0).all():
+            raise InputError("omega must be positive: it sets the scale of time")
+        if not np.isfinite(x).all():
+            raise InputError("the states have entries that are not finite")
+        counts = {size for size in sizes.values() if size is not None}
+        if len(counts) > 1 or 0 in counts:
+            told = ", ".join(f"{name}: {size}" for name, size in sizes.items() if size is not None)
+            raise InputError(f"there must be as many states, frequencies and parameters; got {told}")
+        count = counts.pop() if counts else 1
+        sets = count if w.ndim or any(values.ndim for values in varied.values()) else 1
+        return (
+            np.broadcast_to(x, (count, 2 * n)),
+            np.broadcast_to(w, (sets,)),
+            {name: np.broadcast_to(values, (sets,)) for name, values in varied.items()},
+        )
+
+
+class _Run:
+    """One batch on its way: groups of trajectories, each followed by one thread in chunks."""
+
+    def __init__(
+        self, flow: Flow, numbers: Numbers, states: Array, which: NDArray[np.int_], total: int, skip: int, measure: bool
+    ) -> None:
+        self.flow, self.numbers, self.states, self.which = flow, numbers, states, which
+        self.total, self.skip, self.measure = total, skip, measure
+        self.rows = flow.kernel.numbers(numbers)
+        self.answers = Answers(flow.structure.asked)
+        n, count = flow.structure.n, len(states)
+        self.out = np.full((count, total - skip, 2 * n), np.nan)
+        self.peaks = np.full((count, total - skip, n), np.nan) if measure else None
+        self.end = np.full((count, 2 * n), np.nan)
+        self.failed = np.zeros(count, dtype=bool)
+        self.unsettled = np.zeros(count)
+        self.finished = np.zeros(count, dtype=bool)
+        lanes = flow.kernel.lanes
+        self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
+        self.done = [0.0] * len(self.groups)
+        self.stop = threading.Event()
+
+    def go(self, workers: int | None, report: Report | None) -> Motions:
+        """Follow all of them."""
+        many = min(workers or _processors(), len(self.groups))
+        try:
+            if many <= 1:
+                for g in range(len(self.groups)):
+                    self._follow(g, report)
+            else:
+                self._together(many, report)
+        except KeyboardInterrupt:
+            self.stop.set()
+        if self.answers.failure is not None:
+            raise self.answers.failure
+        self.failed |= self.finished & ~np.isfinite(self.end).all(axis=1)
+        return Motions(self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished)
+
+    def _together(self, many: int, report: Report | None) -> None:
+        self._compile()
+        with ThreadPoolExecutor(many) as pool:
+            pending: set[Future[None]] = {pool.submit(self._follow, g, None) for g in range(len(self.groups))}
+            try:
+                while pending:
+                    finished, pending = wait(pending, _LOOK, FIRST_COMPLETED)
+                    for future in finished:
+                        future.result()
+                    self._tell(report)
+            except BaseException:
+                self.stop.set()
+                for future in pending:
+                    future.cancel()
+                raise
+
+    def _tell(self, report: Report | None) -> None:
+        if report is not None:
+            share = sum(self.done) / len(self.done)
+            report(share, f"{share * len(self.states):.0f} of {len(self.states)} trajectories")
+
+    def _compile(self) -> None:
+        """Once, before the threads."""
+        group = self._group(np.zeros(self.flow.kernel.lanes, dtype=int))
+        empty = np.empty((0, 2 * self.flow.structure.n, self.flow.kernel.lanes))
+        if isinstance(group, NewmarkGroup):
+            group.advance(0, 0, 1, 0, empty, None)
+        else:
+            group.advance(0, 0, empty, None)
+
+    def _group(self, members: NDArray[np.int_], alive: int = 0) -> NewmarkGroup | AdaptiveGroup:
+        kernel, states, which = self.flow.kernel, self.states[members], self.which[members]
+        if isinstance(kernel, NewmarkKernel):
+            return NewmarkGroup(kernel, self.rows, states, which, self.answers.address)
+        sizes = self.flow.structure.sizes(self.numbers, states, which)
+        return AdaptiveGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address, alive)
+
+    def _follow(self, g: int, report: Report | None) -> None:
+        members = self.groups[g]
+        lanes, n = self.flow.kernel.lanes, self.flow.structure.n
+        # what is missing from the last group is made up by its first one, but stands still where it may
+        filled = np.array([members[i] if i < len(members) else members[0] for i in range(lanes)])
+        group = self._group(filled, len(members))
+        kept = self.total - self.skip
+        out = np.full((kept, 2 * n, lanes), np.nan)
+        peaks = np.full((kept, n, lanes), np.nan) if self.measure else None
+        if isinstance(group, NewmarkGroup):
+            self._by_steps(group, g, out, peaks, report)
+        else:
+            self._by_trials(group, g, out, peaks, report)
+        if self.stop.is_set():
+            return
+        if isinstance(group, AdaptiveGroup) and group.left() > 0.0:
+            return
+        here, own = slice(members.start, members.stop), slice(0, len(members))
+        self.out[here] = out.transpose(2, 0, 1)[own]
+        if self.peaks is not None and peaks is not None:
+            self.peaks[here] = peaks.transpose(2, 0, 1)[own]
+        self.end[here] = group.states()[own]
+        if isinstance(group, NewmarkGroup):
+            self.unsettled[here] = group.unsettled()[own]
+        else:
+            self.failed[here] = group.failed()[own]
+        self.finished[here] = True
+
+    def _by_steps(self, group: NewmarkGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
+        kernel = group.kernel
+        stride = kernel.steps // self.flow.samples
+        begin, end, used, chunk = 0, self.total * stride, 0, kernel.steps
+        while begin < end and not self._stopped():
+            to, started = min(begin + chunk, end), perf_counter()
+            used += group.advance(
+                begin, to, stride, self.skip * stride, out[used:], None if peaks is None else peaks[used:]
+            )
+            chunk = _next_chunk(to - begin, perf_counter() - started)
+            begin = to
+            self.done[g] = begin / end
+            self._tell(report)
+
+    def _by_trials(self, group: AdaptiveGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
+        budget, finished = 20, False
+        while not finished and not self._stopped():
+            started = perf_counter()
+            finished = group.advance(budget, self.skip, out, peaks)
+            budget = _next_chunk(budget, perf_counter() - started)
+            self.done[g] = 1.0 - group.left() / (self.total * len(self.groups[g]))
+            self._tell(report)
+
+    def _stopped(self) -> bool:
+        return self.stop.is_set() or self.answers.failure is not None
+
+
+def _next_chunk(chunk: int, seconds: float) -> int:
+    """What will take about `_LOOK` seconds, if `chunk` took `seconds`."""
+    return max(1, int(chunk * min(4.0, _LOOK / max(seconds, 1e-6))))
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def check_count(name: str, value: int) -> int:
+    """A positive whole number, or `InputError`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise InputError(f"{name} must be a positive whole number, not {value!r}")
+    return int(value)
+
+
+def check_motions(motions: Motions, flow: Flow) -> None:
+    """Refuse motions that failed or whose steps were not solved, with what to change."""
+    if motions.failed.any():
+        first = int(np.flatnonzero(motions.failed)[0])
+        raise ConvergenceError(
+            f"{int(motions.failed.sum())} of {len(motions.failed)} trajectories (the first is number {first}) left the "
+            "range of numbers: the motion grows without bound, or a force is not finite where it goes"
+        )
+    if motions.unsettled.any():
+        raise ConvergenceError(
+            f"Newmark's method did not solve {int(motions.unsettled.sum())} of its steps: take more steps_per_period "
+            'than now, or method="accurate"'
+        )
