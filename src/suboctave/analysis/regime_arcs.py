@@ -17,8 +17,9 @@ from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.analysis.junction import Junction
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
+from suboctave.harmonic.orbit import PeriodicOrbit
 
-__all__ = ["Arc", "Edge", "Stretch", "lies_on", "same_branch", "stretches"]
+__all__ = ["Arc", "Edge", "Stretch", "lies_on", "lies_on_orbit", "same_branch", "stretches"]
 
 #: amplitudes of a motion on two branches that are one differ by less, relatively
 _SAME = 5e-3
@@ -86,6 +87,20 @@ class Arc:
     points: tuple[BranchPoint, ...]
     followed: bool = True
 
+    @property
+    def nearly_doubled(self) -> float:
+        """How close a real multiplier comes to -1 within the arc and turns back; infinite where none does.
+
+        Where that vanishes, as the parameter changes, a pair of period doublings appears.
+        """
+        gaps = []
+        for point in self.points:
+            mu = point.floquet.multipliers
+            real = mu[(np.abs(mu.imag) <= 1e-9 * np.abs(mu)) & (mu.real < 0.0)].real
+            gaps.append(float(np.abs(real + 1.0).min(initial=np.inf)))
+        inner = [b for a, b, c in zip(gaps, gaps[1:], gaps[2:], strict=False) if b <= a and b <= c]
+        return min(inner, default=np.inf)
+
     def range(self, values: Array | float) -> tuple[Array, Array]:
         """Between which frequencies it has a motion, at values of the design parameter."""
         low, high = (edge.across(values) for edge in self.edges)
@@ -135,7 +150,15 @@ def same_branch(one: Branch, other: Branch) -> bool:
 
 def lies_on(point: BranchPoint, points: Sequence[BranchPoint]) -> bool:
     """Whether a motion lies on a curve through others of its period, told by its harmonics."""
-    orbit = point.orbit
+    return _passes(point.orbit, points)
+
+
+def lies_on_orbit(orbit: PeriodicOrbit, branch: Branch) -> bool:
+    """Whether a motion lies on a branch of motions of its period."""
+    return _passes(orbit, branch.points)
+
+
+def _passes(orbit: PeriodicOrbit, points: Sequence[BranchPoint]) -> bool:
     target = np.abs(orbit.amplitudes)
     for a, b in pairwise(points):
         first, last = a.orbit.omega, b.orbit.omega

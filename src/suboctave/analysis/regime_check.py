@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,11 @@ from suboctave.analysis.progress import reporting
 from suboctave.analysis.regime_arcs import Arc
 from suboctave.analysis.regime_motions import motion_at
 from suboctave.analysis.results import Table
+from suboctave.analysis.subharmonics import periodic_orbit
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.system import System
 
 if TYPE_CHECKING:
     from suboctave.analysis.regime_map import RegimeMap
@@ -64,6 +68,8 @@ class Landing:
         "agrees"; "not followed" (motions beyond the depth of the map, which says so); "unknown motion" (the map has
         none like it there); "left its motion" (a motion said to be stable was left); "not settled"; "not solved" (the
         motion of the map was not found again at that point).
+    state
+        (2n,) what it had reached, at phase 0 of the load.
     """
 
     omega: float
@@ -73,6 +79,7 @@ class Landing:
     amplitude: float
     expected: str
     verdict: str
+    state: Array
 
 
 class RegimeCheck:
@@ -86,14 +93,15 @@ class RegimeCheck:
         How many points of the plane.
     """
 
-    def __init__(self, landings: Sequence[Landing], points: int, name: str) -> None:
+    def __init__(self, landings: Sequence[Landing], points: int, system: System, name: str) -> None:
         self.landings = tuple(landings)
         self.points = points
+        self.system = system
         self.name = name
 
     @property
     def rate(self) -> float:
-        """Share of the trajectories that settled which end on a motion of the map, or on one that it calls unfollowed."""
+        """Share of the settled trajectories that end on a motion of the map, or on one that it calls not followed."""
         settled = [one for one in self.landings if one.verdict != UNSETTLED]
         return sum(one.verdict in (AGREES, BEYOND) for one in settled) / max(len(settled), 1)
 
@@ -107,6 +115,24 @@ class RegimeCheck:
     def disagreements(self) -> list[Landing]:
         """The trajectories that do not agree."""
         return [one for one in self.landings if one.verdict not in (AGREES, BEYOND)]
+
+    def unknown(self) -> list[PeriodicOrbit]:
+        """The motions that the map does not have, solved by harmonic balance, one for each point and amplitude.
+
+        `regime_map(..., motions=check.unknown())` maps the branches that they lie on.
+        """
+        found: list[tuple[float, float, int, float]] = []
+        orbits = []
+        for one in self.landings:
+            here = (one.omega, one.value, one.period, one.amplitude)
+            told = any(k[:3] == here[:3] and abs(k[3] - here[3]) <= _SAME * abs(here[3]) for k in found)
+            if one.verdict != UNKNOWN or told:
+                continue
+            found.append(here)
+            system = self.system.with_parameters({self.name: one.value})
+            with suppress(ConvergenceError):
+                orbits.append(periodic_orbit(system, one.omega, one.state, one.period))
+        return orbits
 
     @property
     def counts(self) -> dict[str, int]:
@@ -169,7 +195,7 @@ def check_regimes(
             ended = _settled(regimes, places, starts, transient, None if report is None else _later(report))
             landings += [_judged(regimes, places, s, a, known[s.point]) for s, a in zip(starts, ended, strict=True)]
     landings.sort(key=lambda one: (one.omega, one.value))
-    return RegimeCheck(landings, points, regimes.parameter)
+    return RegimeCheck(landings, points, regimes.system, regimes.parameter)
 
 
 def _later(report: Any) -> Any:
@@ -200,13 +226,18 @@ def _begin(
         except ConvergenceError:
             landings.append(
                 Landing(
-                    omega, value, period_name(arc.nu), 0, float("nan"), str(regimes.label(omega, value)), NOT_SOLVED
+                    omega,
+                    value,
+                    period_name(arc.nu),
+                    0,
+                    float("nan"),
+                    str(regimes.label(omega, value)),
+                    NOT_SOLVED,
+                    np.zeros(2 * n),
                 )
             )
             continue
-        extent = np.array(
-            [orbit.amplitude(i) for i in range(n)] + [orbit.velocity_amplitude(i) for i in range(n)]
-        )
+        extent = np.array([orbit.amplitude(i) for i in range(n)] + [orbit.velocity_amplitude(i) for i in range(n)])
         size = np.maximum(size, extent)
         known[id(arc)] = (arc, orbit.amplitude(_observed(regimes)))
         starts.append(_Start(number, arc, orbit.start() + _DISTURBED * extent * draw.uniform(-1.0, 1.0, 2 * n)))
@@ -283,4 +314,4 @@ def _judged(
     else:
         verdict = UNKNOWN if found.period else UNSETTLED
     begun = "state" if start.arc is None else period_name(start.arc.nu)
-    return Landing(omega, value, begun, found.period, found.amplitude, str(label), verdict)
+    return Landing(omega, value, begun, found.period, found.amplitude, str(label), verdict, found.state)

@@ -19,6 +19,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import truncation
 from suboctave.model.system import System
+from suboctave.stability import floquet_multipliers
 
 __all__ = ["motion_at"]
 
@@ -57,7 +58,12 @@ def motion_at(
             target = min(1.0, way + step)
             at = (omega, value) if target == 1.0 else place(target)
             found = _solved(orbit, system, name, *at)
-            if found is None or _changed(orbit, found) > _MOST or _own(found) < _KEPT * _own(orbit):
+            if (
+                found is None
+                or _changed(orbit, found) > _MOST
+                or _own(found) < _KEPT * _own(orbit)
+                or not _stable(found)
+            ):
                 step *= 0.5
                 if step < _SMALLEST:
                     where = f"omega = {omega:.6g}, {name} = {value:.6g}"
@@ -70,6 +76,12 @@ def motion_at(
 def _range(arc: Arc, value: float, within: tuple[float, float]) -> tuple[float, float]:
     low, high = arc.range(value)
     return max(float(low), within[0]), min(float(high), within[1])
+
+
+def _follows(orbit: PeriodicOrbit, found: PeriodicOrbit) -> bool:
+    """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
+    lasting = _own(found) >= _KEPT * _own(orbit)
+    return lasting and _changed(orbit, found) <= _MOST and bool(floquet_multipliers(found.state()).stable)
 
 
 def _changed(one: PeriodicOrbit, other: PeriodicOrbit) -> float:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from suboctave.analysis.borders import Border
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.diagram import bifurcation_diagram
+from suboctave.analysis.junction import period_name
 from suboctave.analysis.regime_arcs import Arc, Edge, Stretch, lies_on, same_branch, stretches
 from suboctave.analysis.regime_atlas import Atlas
 from suboctave.analysis.switching import switch_branch
@@ -19,7 +20,7 @@ from suboctave.analysis.verbs import continue_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import ConvergenceError, InputError
 
-__all__ = ["Slice", "looked"]
+__all__ = ["Slice", "introduce", "looked"]
 
 #: ends of branches this close to the end of the range, relatively, lie on it
 _AT_END = 1e-6
@@ -64,7 +65,7 @@ def looked(value: float, atlas: Atlas, depth: int, slices: Slice | None = None) 
     done: list[Border] = []
     while True:
         missing = [b for b in atlas.borders if b.kind == "LP" and b.contains(value) and b not in found.explained + done]
-        missing = [b for b in missing if b.nu <= 2**depth and _within(float(b.across(value)), atlas)]
+        missing = [b for b in missing if _within(float(b.across(value)), atlas)]
         if not missing:
             break
         done.append(missing[0])
@@ -145,6 +146,17 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
             yield child, detached
 
 
+def introduce(branch: Branch, value: float, atlas: Atlas) -> None:
+    """A branch that was found by other means: its limit points are followed, and lead to it at every value."""
+    before = len(atlas.borders)
+    known = [atlas.known(item, value) for item in branch.bifurcations["LP"]]
+    if not any(known) and before == len(atlas.borders):
+        atlas.note(
+            f"a branch of {period_name(branch.nu)} motions at {atlas.name} = {value:.6g} has no limit point that could "
+            "be followed: it is not on the map"
+        )
+
+
 def _explain(found: Slice, branch: Branch, atlas: Atlas) -> None:
     """Limit points of a branch are followed over the parameter, and known from now on to lie on a branch."""
     for item in branch.bifurcations["LP"]:
@@ -162,10 +174,10 @@ def _arcs(found: Slice, atlas: Atlas, deepest: int) -> list[Arc]:
         for stretch in stretches(branch, others):
             if stretch.stable is None and stretch.width > _NARROW * (high - low):
                 atlas.note(
-                    f"at {atlas.name} = {found.value:.6g} no motion of a {branch.nu}T branch was computed on a stretch "
-                    f"{stretch.width:.2g} wide in omega: taken for unstable"
+                    f"at {atlas.name} = {found.value:.6g} no motion of a {period_name(branch.nu)} branch was computed on "
+                    f"a stretch {stretch.width:.2g} wide in omega: taken for unstable"
                 )
-            beyond = branch.nu == deepest and stretch.doubled
+            beyond = 2 * branch.nu > deepest and stretch.doubled
             if not stretch.stable and not beyond:
                 continue
             if any(arc.nu == branch.nu and _shared(stretch, arc) for arc in arcs):
