@@ -58,12 +58,7 @@ def motion_at(
             target = min(1.0, way + step)
             at = (omega, value) if target == 1.0 else place(target)
             found = _solved(orbit, system, name, *at)
-            if (
-                found is None
-                or _changed(orbit, found) > _MOST
-                or _own(found) < _KEPT * _own(orbit)
-                or not _stable(found)
-            ):
+            if found is None or not _follows(orbit, found):
                 step *= 0.5
                 if step < _SMALLEST:
                     where = f"omega = {omega:.6g}, {name} = {value:.6g}"

@@ -174,8 +174,8 @@ def _arcs(found: Slice, atlas: Atlas, deepest: int) -> list[Arc]:
         for stretch in stretches(branch, others):
             if stretch.stable is None and stretch.width > _NARROW * (high - low):
                 atlas.note(
-                    f"at {atlas.name} = {found.value:.6g} no motion of a {period_name(branch.nu)} branch was computed on "
-                    f"a stretch {stretch.width:.2g} wide in omega: taken for unstable"
+                    f"at {atlas.name} = {found.value:.6g} no motion was computed on a stretch of a "
+                    f"{period_name(branch.nu)} branch {stretch.width:.2g} wide in omega: taken for unstable"
                 )
             beyond = 2 * branch.nu > deepest and stretch.doubled
             if not stretch.stable and not beyond:
