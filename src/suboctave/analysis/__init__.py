@@ -11,6 +11,8 @@ from suboctave.analysis.isola_map import isola_map
 from suboctave.analysis.isola_region import IsolaMap
 from suboctave.analysis.isolas import find_isolas
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
+from suboctave.analysis.regime_map import RegimeMap
+from suboctave.analysis.regimes import regime_map
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
@@ -29,6 +31,7 @@ __all__ = [
     "IsolaMap",
     "Isolas",
     "PoincareSections",
+    "RegimeMap",
     "Results",
     "Seeds",
     "Table",
@@ -47,6 +50,7 @@ __all__ = [
     "locate_extremum",
     "periodic_orbit",
     "poincare_sections",
+    "regime_map",
     "stability",
     "switch_branch",
     "track",
