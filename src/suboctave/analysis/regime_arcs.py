@@ -89,15 +89,18 @@ class Arc:
 
     @property
     def nearly_doubled(self) -> float:
-        """How close a real multiplier comes to -1 within the arc and turns back; infinite where none does.
+        """How close a multiplier comes to -1 within the arc and turns back; infinite where none does.
 
-        Where that vanishes, as the parameter changes, a pair of period doublings appears.
+        Where that vanishes, as the parameter changes, a pair of period doublings appears. Of motions of the load's
+        period only real multipliers count: a pair passes -1 at some distance wherever omega is twice a frequency of
+        the structure.
         """
         gaps = []
         for point in self.points:
             mu = point.floquet.multipliers
-            real = mu[(np.abs(mu.imag) <= 1e-9 * np.abs(mu)) & (mu.real < 0.0)].real
-            gaps.append(float(np.abs(real + 1.0).min(initial=np.inf)))
+            if self.nu == 1:
+                mu = mu[np.abs(mu.imag) <= 1e-9 * np.abs(mu)]
+            gaps.append(float(np.abs(mu + 1.0).min(initial=np.inf)))
         inner = [b for a, b, c in zip(gaps, gaps[1:], gaps[2:], strict=False) if b <= a and b <= c]
         return min(inner, default=np.inf)
 

@@ -26,12 +26,16 @@ __all__ = ["Slice", "introduce", "looked"]
 _AT_END = 1e-6
 #: stretches without a point, narrower than this share of the range, are taken for unstable without a word
 _NARROW = 1e-4
+#: responses are followed this share of the range beyond a bifurcation that lies outside of it
+_BESIDE = 0.02
 
 
 @dataclass(eq=False)
 class Slice:
     """Branches over omega at one value of the design parameter.
 
+    reach
+        Range of omega in which the responses were followed.
     branches
         Each with whether it lies on an isola, or leaves one.
     arcs
@@ -41,6 +45,7 @@ class Slice:
     """
 
     value: float
+    reach: tuple[float, float] = (0.0, 0.0)
     branches: list[tuple[Branch, bool]] = field(default_factory=list)
     arcs: list[Arc] = field(default_factory=list)
     explained: list[Border] = field(default_factory=list)
@@ -56,10 +61,18 @@ def looked(value: float, atlas: Atlas, depth: int, slices: Slice | None = None) 
 
     With a slice given it is completed by branches through limit points that have become known since.
     """
-    found = slices or Slice(value)
+    reach = _reach(value, atlas)
+    if slices is not None and (reach[0] < slices.reach[0] or reach[1] > slices.reach[1]):
+        # bifurcations beyond the range have become known, from which branches lead into it
+        slices.branches, slices.arcs, slices.explained = [], [], []
+        slices.reach = reach
+        fresh = True
+    else:
+        fresh = slices is None
+    found = slices or Slice(value, reach)
     before = len(found.branches)
-    if slices is None:
-        for branch in _responses(value, atlas, depth):
+    if fresh:
+        for branch in _responses(found, atlas, depth):
             found.branches.append((branch, False))
             _explain(found, branch, atlas)
     done: list[Border] = []
@@ -72,9 +85,17 @@ def looked(value: float, atlas: Atlas, depth: int, slices: Slice | None = None) 
         for branch, isolated in _through(missing[0], value, atlas, depth, found):
             found.branches.append((branch, isolated))
             _explain(found, branch, atlas)
-    if slices is None or len(found.branches) > before:
+    if fresh or len(found.branches) > before:
         found.arcs = _arcs(found, atlas, 2**depth)
     return found
+
+
+def _reach(value: float, atlas: Atlas) -> tuple[float, float]:
+    """The range of omega, made wider to hold bifurcations beside it from which branches lead into it."""
+    low, high = atlas.omega
+    places = [float(b.across(value)) for b in atlas.borders if b.kind in ("PD", "BP") and b.contains(value)]
+    margin = _BESIDE * (high - low)
+    return min([low, *(w - margin for w in places if w < low)]), max([high, *(w + margin for w in places if w > high)])
 
 
 def _within(omega: float, atlas: Atlas) -> bool:
@@ -82,10 +103,11 @@ def _within(omega: float, atlas: Atlas) -> bool:
     return low <= omega <= high
 
 
-def _responses(value: float, atlas: Atlas, depth: int) -> Iterator[Branch]:
+def _responses(found: Slice, atlas: Atlas, depth: int) -> Iterator[Branch]:
     """The response from both ends with all that bifurcates from it."""
+    value = found.value
     system = atlas.system.with_parameters({atlas.name: value})
-    low, high = atlas.omega
+    low, high = found.reach
     known: list[Branch] = []
     for ends in ((high, low), (low, high)):
         try:
@@ -114,7 +136,12 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
     margin = 0.02 * (high - low)
     bounds = (max(low - margin, 0.5 * low), high + margin)
     try:
-        branch = continue_branch(atlas.limit_point(border, value), "omega", bounds, **atlas.options)
+        start = atlas.limit_point(border, value)
+        branch = continue_branch(start, "omega", bounds, **atlas.options)
+        if branch.nu > 1 and not branch.closed and branch.departs is None and branch.arrives is None:
+            # it may close where no limit point is known yet
+            wider = continue_branch(start, "omega", (0.5 * low, 2.0 * high), **atlas.options)
+            branch = wider if wider.closed else branch
     except (ConvergenceError, InputError) as failure:
         atlas.note(f"the branch through the limit point at {where} could not be followed: {failure}")
         return

@@ -47,7 +47,7 @@ __all__ = ["regime_map"]
 
 #: a search among resonances: coarse, since the branch itself is followed afterwards
 _SEEDS = Seeds(8, 4, 3)
-#: a real multiplier this close to -1 asks for a look at values beside it, as far as this share of the range apart
+#: a multiplier this close to -1 asks for a look at values beside it, as far as this share of the range apart
 _NEARLY, _FINE = 0.6, 1.0 / 32.0
 #: a value within a strip keeps this share of its width away from the ends
 _INSIDE = 0.02
@@ -62,7 +62,7 @@ def regime_map(
     harmonics: Harmonics = "adaptive",
     *,
     depth: int = 2,
-    values: int = 3,
+    values: int = 5,
     resolution: float = 1e-4,
     isolas: Isolas | None = None,
     search: Sequence[int] = (),

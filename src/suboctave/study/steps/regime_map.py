@@ -18,7 +18,7 @@ class Regimes(MapStep):
     kind: ClassVar[str] = "regime_map"
 
     depth: int = Field(default=2, ge=0)
-    values: int = Field(default=3, ge=1)
+    values: int = Field(default=5, ge=1)
     resolution: float = Field(default=1e-4, gt=0.0, lt=0.5)
     search: list[int] = Field(default_factory=list)
     max_slices: int = Field(default=64, ge=1)
