@@ -17,11 +17,13 @@ import numpy as np
 
 from suboctave.analysis.attractors import Attractor
 from suboctave.analysis.junction import period_name
+from suboctave.analysis.making import make_curve
 from suboctave.analysis.poincare import poincare_sections
 from suboctave.analysis.progress import reporting
 from suboctave.analysis.regime_arcs import Arc
 from suboctave.analysis.regime_motions import motion_at
 from suboctave.analysis.results import Table
+from suboctave.analysis.starts import linear_response
 from suboctave.analysis.subharmonics import periodic_orbit
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
@@ -37,8 +39,9 @@ __all__ = ["Landing", "RegimeCheck", "check_regimes"]
 _SAME = 1e-2
 #: by how much a start beside a known motion is disturbed, relative to it
 _DISTURBED = 1e-4
-#: random states are drawn from so many times the size of the largest motion known there
-_WIDE = 2.0
+#: random states are drawn from up to so many times the size of the largest motion, which counts as at most so many
+#: times that of the largest on the map
+_WIDE, _CAP = 2.0, 20.0
 #: periods that are kept: three repetitions of 16T
 _KEPT = 48
 #: tolerance of the integration, and that of the recognition of periods
@@ -182,13 +185,14 @@ def check_regimes(
     (first, last), (low, high) = regimes.omega, regimes.bounds
     places = np.column_stack([draw.uniform(first, last, points), draw.uniform(low, high, points)])
     with reporting(progress, "integrating at points of the map") as report:
+        sizes = _sizes(regimes)
         starts: list[_Start] = []
         known: list[dict[int, tuple[Arc, float]]] = []
         landings: list[Landing] = []
         for number, (omega, value) in enumerate(places):
             if report is not None:
                 report(0.3 * number / points, f"motions at point {number + 1} of {points}")
-            found = _begin(regimes, number, float(omega), float(value), states, draw, landings)
+            found = _begin(regimes, number, float(omega), float(value), states, sizes, draw, landings)
             starts += found[0]
             known.append(found[1])
         if starts:
@@ -208,6 +212,7 @@ def _begin(
     omega: float,
     value: float,
     states: int,
+    sizes: tuple[Array, Array],
     draw: np.random.Generator,
     landings: list[Landing],
 ) -> tuple[list[_Start], dict[int, tuple[Arc, float]]]:
@@ -216,7 +221,6 @@ def _begin(
     known: dict[int, tuple[Arc, float]] = {}
     strip = regimes.strip(value)
     n = regimes.system.n
-    size = np.zeros(2 * n)
     arcs = regimes.arcs(omega, value)
     for arc in arcs:
         if not arc.followed:
@@ -238,23 +242,40 @@ def _begin(
             )
             continue
         extent = np.array([orbit.amplitude(i) for i in range(n)] + [orbit.velocity_amplitude(i) for i in range(n)])
-        size = np.maximum(size, extent)
         known[id(arc)] = (arc, orbit.amplitude(_observed(regimes)))
         starts.append(_Start(number, arc, orbit.start() + _DISTURBED * extent * draw.uniform(-1.0, 1.0, 2 * n)))
-    if not size.any():
-        size = _largest(regimes, value, n)
-    starts += [_Start(number, None, _WIDE * size * draw.uniform(-1.0, 1.0, 2 * n)) for _ in range(states)]
+    for _ in range(states):
+        # of every order of magnitude between the smallest motion and the largest
+        scale = sizes[0] * (_WIDE * sizes[1] / sizes[0]) ** draw.uniform()
+        starts.append(_Start(number, None, scale * draw.uniform(-1.0, 1.0, 2 * n)))
     return starts, known
 
 
-def _largest(regimes: RegimeMap, value: float, n: int) -> Array:
-    """The size of the largest motion known in a strip: where none is known at the point itself."""
-    size = np.full(2 * n, 1.0)
-    for arc in regimes.strip(value).arcs:
-        orbit = arc.points[len(arc.points) // 2].orbit
-        extent = [orbit.amplitude(i) for i in range(n)] + [orbit.velocity_amplitude(i) for i in range(n)]
-        size = np.maximum(size if size.all() else 0.0, extent)
-    return np.asarray(size)
+def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
+    """Sizes (2n,) of the smallest motion of the map, and of what may be reached: that of its largest, or in resonance.
+
+    The linear response in resonance is what no motion of the load's period exceeds by much.
+    """
+    system, n = regimes.system, regimes.system.n
+    sizes = [
+        np.array([point.orbit.amplitude(i) for i in range(n)] + [point.orbit.velocity_amplitude(i) for i in range(n)])
+        for strip in regimes.strips
+        for arc in strip.arcs
+        for point in (arc.points[0], arc.points[len(arc.points) // 2], arc.points[-1])
+    ]
+    known = np.array(sizes) if sizes else np.ones((1, 2 * n))
+    top = known.max(axis=0)
+    curve = make_curve(system, "omega", regimes.omega[0], regimes.omega[1], 1, 1, None)
+    first, last = regimes.omega
+    for omega in np.geomspace(first / 3.0, 3.0 * last, 97):
+        try:
+            rows = curve.balance.spread(linear_response(curve, float(omega))[:-1])
+        except (ConvergenceError, np.linalg.LinAlgError):
+            continue
+        size = np.hypot(rows[1], rows[2])
+        if np.isfinite(size).all():
+            top = np.maximum(top, np.concatenate((size, omega * size)))
+    return known.min(axis=0), np.minimum(top, _CAP * known.max(axis=0))
 
 
 def _observed(regimes: RegimeMap) -> int:

@@ -175,8 +175,9 @@ class RegimeMap:
         points, seed
             How many points, drawn evenly from the plane with this seed.
         states
-            From how many states, drawn at random from about twice the size of the motions known there; the known
-            stable motions, slightly disturbed, are starts as well.
+            From how many states, drawn at random from all orders of magnitude between the smallest motion of the map
+            and twice the largest, or the linear response in resonance; the known stable motions, slightly disturbed,
+            are starts as well.
         transient
             Periods of the load before a motion is recognised; those that have not settled get ten times as many.
         """

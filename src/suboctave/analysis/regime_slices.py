@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from suboctave.analysis.borders import Border
 from suboctave.analysis.branch import Branch
@@ -16,11 +17,11 @@ from suboctave.analysis.junction import period_name
 from suboctave.analysis.regime_arcs import Arc, Edge, Stretch, lies_on, same_branch, stretches
 from suboctave.analysis.regime_atlas import Atlas
 from suboctave.analysis.switching import switch_branch
-from suboctave.analysis.verbs import continue_branch
+from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import ConvergenceError, InputError
 
-__all__ = ["Slice", "introduce", "looked"]
+__all__ = ["Slice", "beyond", "introduce", "looked"]
 
 #: ends of branches this close to the end of the range, relatively, lie on it
 _AT_END = 1e-6
@@ -28,6 +29,10 @@ _AT_END = 1e-6
 _NARROW = 1e-4
 #: responses are followed this share of the range beyond a bifurcation that lies outside of it
 _BESIDE = 0.02
+#: where along an arc its motions are compared with those of another
+_SAMPLES = (0.1, 0.3, 0.5, 0.7, 0.9)
+#: and begin so many times beyond its ends where limit points beside it are looked for
+_FAR = 2.0
 
 
 @dataclass(eq=False)
@@ -184,6 +189,28 @@ def introduce(branch: Branch, value: float, atlas: Atlas) -> None:
         )
 
 
+def beyond(value: float, atlas: Atlas) -> None:
+    """Limit points of the response beside the range, between which and others it runs through the range.
+
+    A resonance that begins below the range of omega and folds within it is met so, by no curve within the range.
+    """
+    system = atlas.system.with_parameters({atlas.name: value})
+    low, high = atlas.omega
+    try:
+        wide = frequency_response(system, (_FAR * high, low / _FAR), atlas.harmonics, **atlas.options)
+    except ConvergenceError as failure:
+        atlas.note(f"at {atlas.name} = {value:.6g} the response beside the range of omega was not found: {failure}")
+        return
+    if wide.interrupted:
+        raise KeyboardInterrupt
+    folds = wide.bifurcations["LP"]
+    places = [float(wide.omega[0]), *(b.omega for b in folds), float(wide.omega[-1])]
+    for number, (one, other) in enumerate(pairwise(places)):
+        if min(one, other) < high and max(one, other) > low:
+            for item in folds[max(number - 1, 0) : number + 1]:
+                atlas.known(item, value)
+
+
 def _explain(found: Slice, branch: Branch, atlas: Atlas) -> None:
     """Limit points of a branch are followed over the parameter, and known from now on to lie on a branch."""
     for item in branch.bifurcations["LP"]:
@@ -207,15 +234,24 @@ def _arcs(found: Slice, atlas: Atlas, deepest: int) -> list[Arc]:
             beyond = 2 * branch.nu > deepest and stretch.doubled
             if not stretch.stable and not beyond:
                 continue
-            if any(arc.nu == branch.nu and _shared(stretch, arc) for arc in arcs):
-                continue  # branches begun at different ends may have a part in common
-            arcs.append(_arc(stretch, isolated, found.value, atlas, beyond))
+            made = _arc(stretch, isolated, found.value, atlas, beyond)
+            # branches begun at different ends may have a part in common: the longer one says where it ends
+            alike = [i for i, arc in enumerate(arcs) if arc.nu == made.nu and _shared(made, arc)]
+            if not alike:
+                arcs.append(made)
+            elif sum(edge.bound for edge in made.edges) < sum(edge.bound for edge in arcs[alike[0]].edges):
+                arcs[alike[0]] = made
     return arcs
 
 
-def _shared(stretch: Stretch, arc: Arc) -> bool:
-    """Whether a stretch is part of an arc that is known already."""
-    return lies_on(stretch.points[len(stretch.points) // 2], arc.points)
+def _shared(one: Arc, other: Arc) -> bool:
+    """Whether two arcs of one period have motions in common."""
+    pairs = ((one.points, other.points), (other.points, one.points))
+    return any(
+        lies_on(points[min(round(share * len(points)), len(points) - 1)], others)
+        for points, others in pairs
+        for share in _SAMPLES
+    )
 
 
 def _arc(stretch: Stretch, isolated: bool, value: float, atlas: Atlas, beyond: bool) -> Arc:

@@ -34,7 +34,7 @@ from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.regime_arcs import lies_on_orbit
 from suboctave.analysis.regime_atlas import Atlas
 from suboctave.analysis.regime_map import RegimeMap, Strip
-from suboctave.analysis.regime_slices import Slice, introduce, looked
+from suboctave.analysis.regime_slices import Slice, beyond, introduce, looked
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.analysis.verbs import continue_branch
 from suboctave.continuation import NewtonOptions, SteppingOptions
@@ -213,6 +213,8 @@ def _fill(atlas: Atlas, slices: list[Slice], depth: int, count: int, resolution:
     """Look at values until every strip has one, and nothing known is unexplained at any of them."""
     low, high = atlas.bounds
     waiting = [low + (i + 0.5) / count * (high - low) for i in range(count)]
+    for value in dict.fromkeys((waiting[0], waiting[-1])):
+        beyond(value, atlas)
     while waiting:
         value = waiting.pop(0)
         if len(slices) >= most:
