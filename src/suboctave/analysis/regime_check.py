@@ -68,9 +68,9 @@ class Landing:
     start
         "state", or the period of the known motion that it began beside.
     verdict
-        "agrees"; "not followed" (motions beyond the depth of the map, which says so); "unknown motion" (the map has
-        none like it there); "left its motion" (a motion said to be stable was left); "not settled"; "not solved" (the
-        motion of the map was not found again at that point).
+        "agrees" (also where neither has anything periodic); "not followed" (motions beyond the depth of the map, which says so); "unknown motion" (the map has
+        none like it there); "left its motion" (a motion said to be stable was left); "not settled" (nothing periodic, not
+        yet or never); "not solved" (the motion of the map was not found again at that point).
     state
         (2n,) what it had reached, at phase 0 of the load.
     """
@@ -332,7 +332,9 @@ def _judged(
         verdict = LEFT
     elif beyond and (not found.period or found.period % min(beyond) == 0):
         verdict = BEYOND
+    elif not found.period:
+        verdict = UNSETTLED if label.count else AGREES
     else:
-        verdict = UNKNOWN if found.period else UNSETTLED
+        verdict = UNKNOWN
     begun = "state" if start.arc is None else period_name(start.arc.nu)
     return Landing(omega, value, begun, found.period, found.amplitude, str(label), verdict, found.state)
