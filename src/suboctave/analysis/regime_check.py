@@ -68,9 +68,10 @@ class Landing:
     start
         "state", or the period of the known motion that it began beside.
     verdict
-        "agrees" (also where neither has anything periodic); "not followed" (motions beyond the depth of the map, which says so); "unknown motion" (the map has
-        none like it there); "left its motion" (a motion said to be stable was left); "not settled" (nothing periodic, not
-        yet or never); "not solved" (the motion of the map was not found again at that point).
+        "agrees" (also where neither has anything periodic); "not followed" (motions beyond the depth of the map, which
+        says so); "unknown motion" (the map has none like it there); "left its motion" (a motion said to be stable was
+        left); "not settled" (nothing periodic, not yet or never); "not solved" (the motion of the map was not found
+        again at that point).
     state
         (2n,) what it had reached, at phase 0 of the load.
     """
