@@ -51,6 +51,7 @@ def plot_regimes(
     size: str | tuple[float, float] = (7.4, 4.6),
     curves: bool = True,
     labels: Sequence[str] | None = None,
+    smallest: float = 5e-4,
     xlabel: str | None = None,
     ylabel: str | None = None,
 ) -> Figure:
@@ -68,6 +69,8 @@ def plot_regimes(
         Of the plane, to the right and upwards.
     labels
         What the legend calls the regimes, in their order.
+    smallest
+        Regimes with a smaller share of the plane are counted in the legend, not named.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -90,12 +93,15 @@ def plot_regimes(
     dot: dict[str, Any] = {"marker": "o", "markersize": _DOT, "color": style.INK, "linestyle": "none"}
     for number in sorted(range(len(regimes)), key=lambda i: _rank(regimes[i])):
         words, known, beyond = regimes[number]
-        if not np.any(cells == number):
+        if np.count_nonzero(cells == number) <= smallest * cells.size:
             continue
         swatch: Any = Patch(facecolor=colours[number], edgecolor=style.SOFT, linewidth=0.5)
         if _isolated(known, beyond):
             swatch = (swatch, Line2D([], [], **dot))
         handles[words if labels is None else labels[number]] = swatch
+    shown = len({int(number) for number in np.unique(cells)})
+    if len(handles) < shown:
+        handles[f"({shown - len(handles)} smaller ones)"] = Line2D([], [], linestyle="none")
     for kind, x, y in lines if curves else ():
         drawing: dict[str, Any] = {"color": style.INK, "linewidth": 0.65 * look.line}
         drawing["linestyle"] = _DASHES.get(kind, "solid")
