@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 
 import suboctave as so
 
@@ -121,6 +122,65 @@ def test_a_system_without_any():
     assert len(isolas.to_dataframe()) == 0
 
 
+@pytest.fixture(scope="module")
+def damped():
+    """An oscillator whose damping falls and rises again with its velocity: over the load it has an isola.
+
+    With one harmonic `F^2 = ((1 - w^2 + 3/4 k A^2) A)^2 + D(w A)^2`, `D(u) = a u - b u^3 + c u^5`.
+    """
+    return so.System(
+        mass=1.0,
+        damping=0.0,
+        stiffness=1.0,
+        elements=[so.Expression(0, "a*v - b*v**3*4/3 + c*v**5*8/5 + k*x**3")],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 0.02, "a": 0.1, "b": 0.12, "c": 0.04, "k": 0.05},
+    )
+
+
+def damped_ends():
+    """Where F over (w, A) is stationary: (w, F) of the saddle and of the minimum."""
+
+    def load(w, a):
+        u = w * a
+        return np.hypot((1.0 - w**2 + 0.0375 * a**2) * a, 0.1 * u - 0.12 * u**3 + 0.04 * u**5)
+
+    def slopes(at):
+        w, a = at
+        h = 1e-6
+        return [load(w + h, a) - load(w - h, a), load(w, a + h) - load(w, a - h)]
+
+    roots = [fsolve(slopes, start, xtol=1e-13) for start in ((1.0, 0.58), (1.03, 1.18))]
+    return [(w, load(w, a)) for w, a in roots]
+
+
+@pytest.mark.parametrize("bounds", [(0.005, 0.06), (0.02, 0.06), (0.005, 0.03), (0.02, 0.03)])
+def test_an_isola_of_nonlinear_damping(damped, bounds):
+    """Also where it meets no other branch within the bounds: stronger loads lead to it."""
+    (isola,) = so.find_isolas(damped, (0.3, 2.0), "F", bounds, harmonics=1)
+    (w_merges, merges), (w_born, born) = damped_ends()
+    assert isola.range == pytest.approx((max(born, bounds[0]), min(merges, bounds[1])), rel=1e-7)
+    for end, omega, value in ((isola.born, w_born, born), (isola.merges, w_merges, merges)):
+        if bounds[0] < value < bounds[1]:
+            assert (float(end), end.omega) == pytest.approx((value, omega), rel=1e-7)
+        else:
+            assert end is None
+
+
+def test_two_isolas_that_join():
+    """They are told apart, each closed branch belongs to one of them, and it says where they join."""
+    first, second = so.find_isolas(reference(p=1.7), (1.8, 4.5), "j", (0.3, 1.0))
+    assert (first.born, second.born) == pytest.approx((0.846206, 0.900471), abs=2e-6)
+    joined = max(first.range[0], second.range[0])
+    assert joined == pytest.approx(0.780048, abs=2e-6)
+    assert sum("as which it goes on" in reason for isola in (first, second) for reason in isola.reasons) == 1
+    at = {
+        value: [b.bifurcations["LP"] for b in (i.at(value) for i in (first, second) if value in i)]
+        for value in (0.7, 0.8)
+    }
+    assert [len(at[0.7]), len(at[0.8])] == [1, 2]
+
+
 def test_a_third_of_the_frequency_is_searched_for():
     """The 1/3 sub-harmonic isola of a Duffing oscillator: no branch leads to it; born as the load grows."""
     system = so.System(
@@ -155,6 +215,7 @@ def test_ends_can_be_tracked_again(isolas):
         ({"values": [0.5, 1.5]}, "within the bounds"),
         ({"search": (0,)}, "periods"),
         ({"search": "2"}, "periods"),
+        ({"levels": (0.0,)}, "levels"),
         ({"depth": -1}, "depth"),
         ({"max_curves": True}, "max_curves"),
         ({"seeds": 3}, "Seeds"),

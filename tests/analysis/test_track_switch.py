@@ -1,5 +1,7 @@
 """From a generalised period doubling onto the limit points of the doubled motions, against shooting."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,3 +45,18 @@ def test_the_other_one_leads_to_the_other_limit_points(border):
 def test_only_in_the_parameters_in_which_it_was_found(border):
     with pytest.raises(InputError, match="followed over omega and j"):
         so.track(border.bifurcations["GPD"][0], "Kc", (4, 5))
+
+
+def test_a_period_doubling_in_the_doubled_basis_is_no_limit_point_to_follow(border):
+    """There the Jacobian is singular at every one of them, and no motion has a sub-harmonic part."""
+    (highest,) = (e for e in border.extrema if e.parameter_name == "j")
+    orbit = highest.orbit
+    basis = orbit.basis.doubled
+    x = orbit.basis.resized(orbit.coefficients, basis)
+    balance = orbit.balance.with_basis(basis).settle(x, orbit.omega, orbit.values)
+    written = replace(orbit, balance=balance, coefficients=x)
+    singular = np.linalg.svd(written.state().jacobian, compute_uv=False)
+    assert singular[-1] < 1e-6 * singular[0]
+    taken = so.Bifurcation("LP", written, highest.floquet, highest.residual, highest.amplitude, "omega")
+    with pytest.raises(InputError, match="repeats earlier"):
+        so.track(taken, "j", (0, 1))

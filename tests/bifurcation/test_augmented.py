@@ -113,6 +113,6 @@ def test_cubic_coefficient_of_the_general_way(system):
     curve, u = curve_at(system, ("omega", "p"), "PD")
     state = curve.evaluate(u).state
     own = Expansion.of(state, Kind.HALF, null_vectors(state, Kind.HALF), "omega")
-    factor = Factor.of(state.jacobian)
-    expected = own.cubic(factor.solve(-0.5 * own.squared()))[0]
-    assert cubic_coefficient(state, own.phi, own.psi, own.by_motion, factor) == pytest.approx(expected, rel=1e-9)
+    solve = Factor.of(state.jacobian).solve
+    expected = own.cubic(solve(-0.5 * own.squared()))[0]
+    assert cubic_coefficient(state, own.phi, own.psi, own.by_motion, solve) == pytest.approx(expected, rel=1e-9)

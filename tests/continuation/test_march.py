@@ -336,3 +336,21 @@ def test_events_that_make_no_sense():
         Event("", abs)
     with pytest.raises(InputError, match=r"'peak'.*callable"):
         Event("peak", 3.0)
+
+
+@dataclass
+class IntoCircle(Plane):
+    """The line x = 1 that goes over to the unit circle where both touch: as steps do between neighbouring branches."""
+
+    def adapted(self, u, evaluation):
+        return circle() if u[1] > -0.01 else self
+
+
+def test_going_round_and_round_without_passing_the_start():
+    """The march says so instead of going round until its points are used up."""
+    line = IntoCircle(lambda x, p: x - 1.0, lambda x, p: (1.0, 0.0))
+    engine, points, u = march(line, 1.0, -2.0, 1.0, (-3.0, 3.0), max_step=0.05)
+    assert not engine.closed
+    assert "without having passed its start" in engine.ended
+    assert np.abs(u[-1]).max() <= 1.001
+    assert len(points) < 1100

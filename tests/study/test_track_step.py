@@ -69,6 +69,7 @@ def test_two_parameters(study_file):
         ("bounds = [0.05, 0.5]", "bounds = [0.5, 0.5]", "two different finite ends"),
         ('bifurcation = "LP", index = 1', "point = 3", "name a bifurcation"),
         ('bifurcation = "LP"', 'bifurcation = "CP"', "CP cannot be tracked"),
+        ('parameter = "F"', 'parameter = "F"\nonto = "NS"', "LP is none"),
         ('parameter = "F"', 'parameter = "F"\nomega = [0.0, 1.0]', "frequencies are positive"),
     ],
 )
@@ -105,3 +106,54 @@ def test_two_parameters_more_for_an_extremum(study_file, suboctave):
     status, _, err = suboctave("run", study_file(text))
     assert status != 0
     assert "is one name: the third parameter" in err
+
+
+ABSORBER = """
+title = "tori from a resonance"
+[system]
+mass = [["m1", 0.0], [0.0, "m2"]]
+damping = [["c1 + c2", "-c2"], ["-c2", "c2"]]
+stiffness = [["k1 + k2", "-k2"], ["-k2", "k2"]]
+parameters = { m1 = 1.0, c1 = 0.002, k1 = 1.0, a = 1.0, m2 = 0.05, c2 = 0.0128, k2 = 0.0454, b = 0.0042, F = 0.16 }
+[[system.elements]]
+type = "CubicSpring"
+dof = 0
+coefficient = "a"
+[[system.elements]]
+type = "CubicSpring"
+dof = [0, 1]
+coefficient = "b"
+[[system.loads]]
+type = "HarmonicLoad"
+dof = 0
+amplitude = "F"
+[[analyses]]
+name = "response"
+type = "frequency_response"
+omega = [0.9, 1.5]
+harmonics = 3
+[[analyses]]
+name = "limits"
+type = "track"
+start = { analysis = "response", bifurcation = "LP", index = 2 }
+parameter = "F"
+bounds = [0.1, 0.2]
+omega = [1.2, 1.5]
+[[analyses]]
+name = "tori"
+type = "track"
+start = { analysis = "limits", bifurcation = "R1" }
+parameter = "F"
+bounds = [0.1, 0.2]
+"""
+
+
+def test_another_curve_from_a_point_of_codimension_two(study_file, suboctave):
+    results = run_study(read_study(study_file(ABSORBER))).finished
+    limits, tori = (finished.result for finished in results[1:])
+    assert tori.kind == "NS"
+    expected = so.track(limits.bifurcations["R1"][0], "F", (0.1, 0.2))
+    assert tori.kappa == pytest.approx(expected.kappa, abs=1e-9)
+    status, _, err = suboctave("run", study_file(ABSORBER + 'onto = "PD"\n'))
+    assert status != 0
+    assert "the curves through R1 are LP and NS" in err

@@ -225,7 +225,10 @@ def brute_force_diagram(
         complete = True
         if carried:
             flow = Flow(system, method, 1, samples, tolerance, lanes=FEW)
-            complete = run.carried(flow, carried, names, first, _share(report, 0.0, len(carried) / whole))
+            try:
+                complete = run.carried(flow, carried, names, first, _share(report, 0.0, len(carried) / whole))
+            except KeyboardInterrupt:
+                complete = False
         if anew and complete:
             flow = Flow(system, method, 1, samples, tolerance)
             begin = np.vstack([np.zeros((1, 2 * system.n)), fresh]) if "rest" in names else fresh

@@ -25,10 +25,10 @@ from suboctave.analysis.track_start import (
     with_extremum,
 )
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import Extremum, Found
+from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point
-from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
+from suboctave.analysis.tracked_tests import Extremum
 from suboctave.bifurcation.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.compiled import computation_begins
@@ -38,14 +38,12 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import HarmonicBalance
 
-__all__ = ["locate_extremum", "newton_extremum", "polished"]
+__all__ = ["locate_extremum", "newton_extremum"]
 
 #: step of the differences along Psi, in units of the motion and of the parameters' ranges
 _STEP = 3e-5
 #: correction in scaled arclength below which what is left is rounding
 _ROUNDING = 1e-11
-#: way that an extremum located by bracketing may move
-_BESIDE = 1e-3
 _ITERATIONS = 12
 
 
@@ -189,20 +187,3 @@ class _Published:
 
 def _sample(curve: TrackedCurve, u: Array, newton: NewtonOptions) -> TrackedSample:
     return TrackedSample(nearest_point(curve, u, curve.weights(u, 0.0), newton))
-
-
-def polished(found: Found, newton: NewtonOptions) -> Found:
-    """An extremum located by bracketing, solved for by Newton's method; as it was where that does not converge."""
-    curve, point = found.sample.curve, found.sample.point
-    if not isinstance(found.test, Extremum) or curve.augmentation.turning:
-        return found
-    if isinstance(curve.augmentation, ExtendedOperator | PublishedDoubling):
-        return found  # by brackets alone, so that other systems are solved from beginning to end
-    try:
-        u = newton_extremum(curve, point.u, found.test.name, newton)
-        if length(curve.weights(u, 0.0) * (u - point.u)) > _BESIDE:
-            return found
-        better = replace(found, sample=_sample(curve, u, newton))
-    except ConvergenceError:
-        return found
-    return replace(better, sample=TrackedSample(replace(better.sample.point, arclength=point.arclength)))

@@ -70,6 +70,8 @@ class _Follower:
     def run(self) -> Trace:
         trace = self.trace
         try:
+            # in a fresh installation the first verdict on stability waits for its kernels to be compiled
+            self._report(self.march.start)
             for point in self.march:
                 self._accept(point)
                 if self._turned is not None and self.settings.half:
@@ -177,15 +179,18 @@ class _Follower:
             self.previous = new
         if passage is not None:
             self._look_behind(passage)
-        report = self.settings.report
-        if report is not None:
-            low, high = self.bounds
-            share = (point.parameter - low) / (high - low)
-            # where the branch folds back the share done does not
-            self._done = max(self._done, min(1.0, share if self.direction > 0 else 1.0 - share))
-            report(self._done, point.curve.where(point.u))
+        self._report(point)
         if self._found is not None:
             self._found(self.trace)
+
+    def _report(self, point: CurvePoint) -> None:
+        if self.settings.report is None:
+            return
+        low, high = self.bounds
+        share = (point.parameter - low) / (high - low)
+        # where the branch folds back the share done does not
+        self._done = max(self._done, min(1.0, share if self.direction > 0 else 1.0 - share))
+        self.settings.report(self._done, point.curve.where(point.u))
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
         return bifurcation_at(located, a, b, self.settings.observe, self.trace.warnings)

@@ -166,10 +166,10 @@ def integrate(
     """
     periods = check_count("periods", periods)
     samples = _samples(method, steps_per_period)
+    start = start_state(system, state)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
     transient = _not_negative("transient", transient)
     values = {name: float(value) for name, value in (parameters or {}).items()}
-    start = start_state(system, state)
     with reporting(progress, "integrating") as report:
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report

@@ -18,7 +18,6 @@ from suboctave.analysis.tracked_branch import TrackedBranch, TrackedPoint
 from suboctave.analysis.verbs import continue_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.tracked import TrackedEvent
-from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.system import System
 
@@ -152,7 +151,7 @@ class Isola:
             except ConvergenceError as why:
                 failure = why
                 continue
-            return closed_branch(found, self.omega, self.legs, self.options, progress)
+            return closed_branch(found, self.omega, self.parameter, self.legs, self.options, progress)
         raise ConvergenceError(
             f"no limit point of the isola was found at {self.parameter} = {value:.9g}"
             + (f" ({failure})" if failure else "")
@@ -171,12 +170,14 @@ class Isola:
 def closed_branch(
     limit_point: Bifurcation,
     omega: tuple[float, float],
+    name: str,
     legs: Iterable[Leg],
     options: dict[str, Any],
     progress: Any = None,
 ) -> Branch:
-    """The branch over omega through a limit point, in a range that holds the limit points of the curves known."""
-    places = [float(w) for leg in legs for w in leg.omega] + [limit_point.omega, *omega]
+    """The branch over omega through a limit point, in a range widened by the limit points of legs at that value."""
+    value = limit_point.parameter(name)
+    places = [leg.omega_near(value)[0] for leg in legs if leg.contains(value)] + [limit_point.omega, *omega]
     low, high = min(places), max(places)
     margin = 0.02 * (high - low)
     bounds = (max(low - margin, 0.5 * low), high + margin)
@@ -239,7 +240,7 @@ def _joined(chain: Sequence[Leg], bounds: tuple[float, float]) -> TrackedBranch:
             if not leg.low < end < leg.high:
                 continue
             with contextlib.suppress(ConvergenceError):
-                cut = as_point(leg.limit_point(end)).at(float(np.interp(end, *_ascending(leg))))
+                cut = as_point(leg.limit_point(end)).at(leg.place(end))
                 inside.insert(0 if at_start else len(inside), cut)
         points += inside[1:] if points and inside and inside[0].orbit is points[-1].orbit else inside
     curve = chain[0].curve
@@ -249,12 +250,6 @@ def _joined(chain: Sequence[Leg], bounds: tuple[float, float]) -> TrackedBranch:
     return TrackedBranch(
         curve.kind, curve.names, curve.system, curve.name, points, met, [], False, text, curve.observe, options
     )
-
-
-def _ascending(leg: Leg) -> tuple[Array, Array]:
-    """Values of a leg in ascending order, and the arclengths there."""
-    places = np.array([node.arclength for node in leg.nodes])
-    return (leg.values, places) if leg.values[-1] > leg.values[0] else (leg.values[::-1], places[::-1])
 
 
 def _within(event: Bifurcation, points: Sequence[TrackedPoint]) -> bool:

@@ -9,7 +9,7 @@ by bisection and said.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from suboctave.analysis.isola import IsolaEnd
@@ -57,17 +57,17 @@ class _End:
         return None if self.event is None else IsolaEnd.of(self.event, name, self.centre)
 
 
-def life_of(loop: Loop, survey: Survey) -> Life:
-    """The range over which a detached branch stays so."""
+def life_of(loop: Loop, survey: Survey, others: Sequence[Life] = ()) -> Life:
+    """The range over which a detached branch stays so, and is none of the others."""
     life = Life(list(loop.legs), [loop])
-    low, high = (_extended(loop, upper, survey, life) for upper in (False, True))
+    low, high = (_extended(loop, upper, survey, life, others) for upper in (False, True))
     life.low, life.high = low.value, high.value
     life.ends = (low.as_end(survey.name), high.as_end(survey.name))
     life.reasons = (low.reason, high.reason)
     return life
 
 
-def _extended(loop: Loop, upper: bool, survey: Survey, life: Life) -> _End:
+def _extended(loop: Loop, upper: bool, survey: Survey, life: Life, others: Sequence[Life]) -> _End:
     """Go on in one direction until the branch vanishes, meets another one, or the range ends."""
     name = survey.name
     bound = survey.bounds[1] if upper else survey.bounds[0]
@@ -90,6 +90,9 @@ def _extended(loop: Loop, upper: bool, survey: Survey, life: Life) -> _End:
             if passed or chosen is None:
                 return _bisected(lasting[0], loop, after, survey, life)
             return _End(value, chosen, False, _merging(name, value, chosen, after))
+        other = next((o for o in others if any(o.covers(leg, behind) for leg in after.legs)), None)
+        if other is not None:
+            return _End(value, _culprit(own or events), False, _joining(name, value, own or events, other))
         _take(life, after)
         loop = after
     last = [leg for leg in loop.legs if leg.contains(bound)]
@@ -146,6 +149,12 @@ def _merging(name: str, value: float, event: TrackedEvent, after: Loop) -> str:
         return f"meets the motion whose period it doubles at {where}"
     what = f"the branch between {' and '.join(met)}" if met else "a branch that runs through the range"
     return f"merges at {where} with {what}"
+
+
+def _joining(name: str, value: float, events: list[TrackedEvent], other: Life) -> str:
+    place = ", ".join(f"{name} = {float(e):.7g}" for e in other.ends if e is not None and e.kind == "isola_centre")
+    which = f"the isola born at {place}" if place else "another isola"
+    return f"merges at omega = {events[0].omega:.9g}, {name} = {value:.9g} with {which}, as which it goes on"
 
 
 def _bisected(leg: Leg, inside: Loop, outside: Loop, survey: Survey, life: Life) -> _End:

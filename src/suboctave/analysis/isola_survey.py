@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from suboctave.analysis.branch import Branch
+from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.isola import closed_branch
 from suboctave.analysis.limit_curves import Leg, legs_of, same_motion
 from suboctave.analysis.making import Harmonics
@@ -25,6 +26,8 @@ __all__ = ["Loop", "Survey"]
 
 #: frequencies that differ by less, relatively, are one
 _SAME = 1e-6
+#: events that are closer, in units of the range, are met together
+_TOGETHER = 1e-7
 #: a limit point lies at most this many distances between neighbours away from the curve's chord
 _BESIDE = 3.0
 
@@ -91,6 +94,35 @@ class Survey:
         if self.report is not None:
             self.report(share, where)
 
+    # ---------------------------------------------------------------------------------------------------- responses
+    def look(self, value: float) -> None:
+        """Follow responses at a value and what bifurcates from them; limit points and doublings over the parameter."""
+        for branch, level in self._branches(value):
+            if level < self.depth:
+                for item in branch.bifurcations["PD"]:
+                    self.doubling(item, value)
+            self.attach(self.loop_of(branch, value))
+            if branch.interrupted:
+                raise KeyboardInterrupt
+
+    def _branches(self, value: float) -> Iterator[tuple[Branch, int]]:
+        """Branches at a value, and how many bifurcations lead to them from the response, which begins at both ends."""
+        system = self.system.with_parameters({self.name: value})
+        low, high = self.omega
+        for ends in ((high, low), (low, high)):
+            try:
+                diagram = bifurcation_diagram(system, ends, self.depth, harmonics=self.harmonics, **self.options)
+            except ConvergenceError as failure:
+                self.note(f"at {self.name} = {value:.6g}: {failure}")
+                continue
+            for node in diagram:
+                yield node.branch, node.depth
+                for item, why in node.failures:
+                    self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+            root = diagram.root.branch
+            if len(root) and root.points[-1].orbit.omega == ends[1]:
+                return
+
     # ------------------------------------------------------------------------------------------------- limit points
     def leg_of(self, item: Bifurcation, value: float) -> Leg | None:
         """The known leg that a limit point at a value of the parameter lies on."""
@@ -149,7 +181,8 @@ class Survey:
         """The branch through a leg's limit point at a value; None where it cannot be followed."""
         try:
             found = leg.limit_point(value)
-            branch = closed_branch(found, self.omega, [leg], self.options)
+            same = [other for other in self.legs if other.curve is leg.curve]
+            branch = closed_branch(found, self.omega, self.name, same, self.options)
         except ConvergenceError as failure:
             omega, _ = leg.omega_near(value)
             self.note(f"the branch at omega = {omega:.6g}, {self.name} = {value:.6g} could not be followed: {failure}")
@@ -187,12 +220,12 @@ class Survey:
                 events += [e for e in curve.extrema if isinstance(e, TrackedEvent) and e.parameter_name == self.name]
         sign = 1.0 if upper else -1.0
         ahead = sorted(
-            {id(e): e for e in events if sign * (e.parameter(self.name) - value) > 0.0}.values(),
+            {id(e): e for e in events if sign * (e.parameter(self.name) - value) > _TOGETHER * self.span}.values(),
             key=lambda e: sign * e.parameter(self.name),
         )
         group: list[TrackedEvent] = []
         for event in ahead:
-            if group and abs(event.parameter(self.name) - group[0].parameter(self.name)) > 1e-10 * self.span:
+            if group and abs(event.parameter(self.name) - group[0].parameter(self.name)) > _TOGETHER * self.span:
                 yield group[0].parameter(self.name), group
                 group = []
             group.append(event)

@@ -27,12 +27,12 @@ from suboctave.analysis.checks import (
     is_number,
     make_settings,
 )
-from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.isola import Isola, Isolas
 from suboctave.analysis.isola_life import Life, life_of
 from suboctave.analysis.isola_survey import Loop, Survey
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.limit_curves import Leg
+from suboctave.analysis.load_levels import branches_by_load
 from suboctave.analysis.making import Harmonics, rule_of
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
@@ -48,8 +48,8 @@ __all__ = ["find_isolas"]
 _SHARE = 0.6
 #: a search among resonances: coarse, since the closed branch itself is followed afterwards
 _SEEDS = Seeds(8, 4, 3)
-#: periods that are searched where nothing else leads to an isola
-_SEARCHED = (1, 2)
+#: levels of the loads that are looked at, and periods that are searched, where nothing else leads to an isola
+_LEVELS, _SEARCHED = (1.5, 2.2, 3.2, 4.7), (2,)
 
 
 @timed
@@ -62,6 +62,7 @@ def find_isolas(
     *,
     values: int | Sequence[float] = 5,
     depth: int = 1,
+    levels: Sequence[float] | None = None,
     search: Sequence[int] | None = None,
     seeds: Seeds | None = None,
     max_curves: int = 64,
@@ -90,10 +91,13 @@ def find_isolas(
     depth
         How many bifurcations deep branches are followed there: 0 the response alone, 1 with what leaves it (2T), 2 with
         what leaves these (4T). Isolas of those periods are found.
+    levels
+        Other levels of the loads, in units of their own, at which responses are followed at these values as well: most
+        isolas join the main branch under stronger loads. Default: where no isola was found otherwise some between
+        1.5 and 5, at three of the values, until one is found; () for never.
     search
-        Periods (1 for T, 2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values among the nonlinear
-        resonances of the linear modes as well (`find_subharmonics`). Default: 1 and 2 where no isola was found
-        otherwise; () for never.
+        Periods (2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values among the nonlinear resonances
+        of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was found otherwise; () for never.
     seeds
         How finely that is done.
     max_curves
@@ -127,7 +131,7 @@ def find_isolas(
     rule_of(harmonics)
     make_settings(system, max_step, observe, (), newton, stepping, stability, None)
     places = _checked_values(values, low, high)
-    orders = _checked_search(search)
+    strengths, orders = _checked_levels(levels), _checked_search(search)
     for name, number, least in (("depth", depth, 0), ("max_curves", max_curves, 1)):
         if isinstance(number, bool) or not isinstance(number, int) or number < least:
             raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
@@ -148,12 +152,17 @@ def find_isolas(
         try:
             for number, value in enumerate(places):
                 survey.say(_SHARE * number / len(places), f"{parameter} = {value:.6g}")
-                _look(survey, value)
+                survey.look(value)
             survey.say(_SHARE, "closed branches")
             _live(survey, lives, places)
-            if orders or (orders is None and not lives):
-                for value in places:
-                    _search(survey, lives, value, orders or _SEARCHED, seeds or _SEEDS)
+            for level in _LEVELS if strengths is None else strengths:
+                if strengths is None and lives:
+                    break
+                for value in places if strengths else sorted({places[0], places[len(places) // 2], places[-1]}):
+                    _by_loads(survey, lives, value, level)
+            for value in places if orders or (orders is None and not lives) else ():
+                for order in orders or _SEARCHED:
+                    _by_resonance(survey, lives, value, order, seeds or _SEEDS)
         except KeyboardInterrupt:
             survey.note("interrupted: what is here is what had been found by then")
     found = [
@@ -188,12 +197,21 @@ def _checked_values(values: Any, low: float, high: float) -> list[float]:
     return sorted({float(v) for v in given})
 
 
+def _checked_levels(levels: Any) -> tuple[float, ...] | None:
+    if levels is None:
+        return None
+    given = tuple(levels) if isinstance(levels, Sequence | np.ndarray) and not isinstance(levels, str) else (None,)
+    if not all(is_number(level) and level > 0.0 for level in given):
+        raise InputError(f"levels must be positive numbers, those of the loads in units of their own, not {levels!r}")
+    return tuple(float(level) for level in given)
+
+
 def _checked_search(search: Any) -> tuple[int, ...] | None:
     if search is None:
         return None
     given = tuple(search) if isinstance(search, Sequence) and not isinstance(search, str) else (None,)
-    if not all(isinstance(order, int) and not isinstance(order, bool) and order >= 1 for order in given):
-        raise InputError(f"search must be periods in periods of the load, as (1, 2, 3), not {search!r}")
+    if not all(isinstance(order, int) and not isinstance(order, bool) and order >= 2 for order in given):
+        raise InputError(f"search must be periods of at least 2 periods of the load, as (2, 3), not {search!r}")
     return given
 
 
@@ -206,38 +224,6 @@ def _said(found: Sequence[Isola], survey: Survey, places: Sequence[float]) -> st
         return f"{len(found)} isola{'s' * (len(found) > 1)} {where}; {looked}."
     periods = " and ".join(period_name(nu) for nu in sorted({leg.nu for leg in survey.legs} | {1}))
     return f"No isola of {periods} motions was found {where}: {looked} show none."
-
-
-# ---------------------------------------------------------------------------------------------------------- responses
-def _look(survey: Survey, value: float) -> None:
-    """Responses at a value of the parameter and what bifurcates from them: limit points and doublings are followed."""
-    for branch, level in _branches(survey, value):
-        if level < survey.depth:
-            for item in branch.bifurcations["PD"]:
-                survey.doubling(item, value)
-        loop = survey.loop_of(branch, value)
-        survey.attach(loop)
-        if branch.interrupted:
-            raise KeyboardInterrupt
-
-
-def _branches(survey: Survey, value: float) -> Iterator[tuple[Branch, int]]:
-    """Branches at a value with the number of bifurcations that lead to them from the response, begun at both ends."""
-    system = survey.system.with_parameters({survey.name: value})
-    low, high = survey.omega
-    for ends in ((high, low), (low, high)):
-        try:
-            diagram = bifurcation_diagram(system, ends, survey.depth, harmonics=survey.harmonics, **survey.options)
-        except ConvergenceError as failure:
-            survey.note(f"at {survey.name} = {value:.6g}: {failure}")
-            continue
-        for node in diagram:
-            yield node.branch, node.depth
-            for item, why in node.failures:
-                survey.note(f"at {survey.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
-        root = diagram.root.branch
-        if len(root) and root.points[-1].orbit.omega == ends[1]:
-            return
 
 
 # -------------------------------------------------------------------------------------------------------------- isolas
@@ -253,7 +239,7 @@ def _consider(survey: Survey, lives: list[Life], loop: Loop) -> None:
     """A branch that is detached lives over some range; any other is known from now on."""
     if loop.detached and loop.legs:
         survey.say(_SHARE, f"closed branch at {survey.name} = {loop.value:.6g}")
-        lives.append(life_of(loop, survey))
+        lives.append(life_of(loop, survey, lives))
     else:
         survey.attach(loop)
 
@@ -295,23 +281,33 @@ def _centres(survey: Survey) -> Iterator[tuple[Leg, TrackedEvent, bool]]:
                 yield leg, event, upper
 
 
-def _search(survey: Survey, lives: list[Life], value: float, orders: Sequence[int], seeds: Seeds) -> None:
-    """Isolas that a search among resonances meets at a value."""
+def _by_loads(survey: Survey, lives: list[Life], value: float, level: float) -> None:
+    """Isolas at a value that responses at another level of the loads lead to."""
+    survey.say(_SHARE, f"{level:g} times the loads at {survey.name} = {value:.6g}")
+    for branch in branches_by_load(survey, value, level):
+        _met(survey, lives, branch, value)
+
+
+def _by_resonance(survey: Survey, lives: list[Life], value: float, order: int, seeds: Seeds) -> None:
+    """Isolas at a value that a search among resonances meets."""
+    where = f"searching {period_name(order)} motions at {survey.name} = {value:.6g}"
+    survey.say(_SHARE, where)
     system = survey.system.with_parameters({survey.name: value})
-    for order in orders:
-        survey.say(_SHARE, f"searching {period_name(order)} motions at {survey.name} = {value:.6g}")
-        known = [branch for branch in survey.met.get(value, []) if branch.nu == order]
-        try:
-            found = isolated_branches(
-                system, survey.omega, order, known, survey.harmonics, seeds=seeds, **survey.options
-            )
-        except ConvergenceError as failure:
-            survey.note(f"searching {period_name(order)} motions at {survey.name} = {value:.6g}: {failure}")
-            continue
-        for branch in found:
-            if branch.interrupted:
-                raise KeyboardInterrupt
-            loop = survey.loop_of(branch, value)
-            if not any(life.covers(leg, value) for life in lives for leg in loop.legs):
-                _consider(survey, lives, loop)
-                _live(survey, lives, ())
+    known = [branch for branch in survey.met.get(value, []) if branch.nu == order]
+    try:
+        found = isolated_branches(system, survey.omega, order, known, survey.harmonics, seeds=seeds, **survey.options)
+    except ConvergenceError as failure:
+        survey.note(f"{where}: {failure}")
+        return
+    for branch in found:
+        _met(survey, lives, branch, value)
+
+
+def _met(survey: Survey, lives: list[Life], branch: Branch, value: float) -> None:
+    """A branch that a search has met: an isola unless it is attached, or one that is known."""
+    if branch.interrupted:
+        raise KeyboardInterrupt
+    loop = survey.loop_of(branch, value)
+    if not any(life.covers(leg, value) for life in lives for leg in loop.legs):
+        _consider(survey, lives, loop)
+        _live(survey, lives, ())

@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from suboctave.analysis.making import own_linear_part
 from suboctave.analysis.refine import solved_bifurcation
@@ -34,6 +35,8 @@ __all__ = ["Leg", "as_point", "bifurcation_at_value", "legs_of", "same_motion", 
 
 #: a solved limit point lies at most this many distances between its neighbours away from where it was expected
 _AWAY = 3.0
+#: share of the way between two nodes below which steps are not halved again
+_SMALLEST = 0.02
 #: harmonics of two motions that are one differ by less, relative to their size
 _SAME = 1e-4
 
@@ -117,45 +120,103 @@ class Leg:
         rising = self.values[-1] > self.values[0]
         return self.ends[1] if rising == upper else self.ends[0]
 
-    def _around(self, value: float) -> tuple[int, float]:
-        """Between which nodes a value lies, and the share of the way that the motion has gone."""
-        values = self.values
-        ascending = values if values[-1] > values[0] else -values
-        i = int(np.searchsorted(ascending, value if values[-1] > values[0] else -value, side="right")) - 1
-        i = min(max(i, 0), len(values) - 2)
-        share = (value - values[i]) / ((values[i + 1] - values[i]) or 1.0)
-        # beside a turn the motion changes with the square root of the way
-        if i == 0 and self.ends[0] is not None:
-            share = math.sqrt(max(share, 0.0))
-        elif i == len(values) - 2 and self.ends[1] is not None:
-            share = 1.0 - math.sqrt(max(1.0 - share, 0.0))
-        return i, share
+    @cached_property
+    def places(self) -> Array:
+        """Arclengths of the nodes along the curve."""
+        return np.array([node.arclength for node in self.nodes])
+
+    def _segment(self, value: float) -> int:
+        """Between which nodes a value lies: the index of the first."""
+        rising = self.values[-1] > self.values[0]
+        ascending, wanted = (self.values, value) if rising else (-self.values, -value)
+        return min(max(int(np.searchsorted(ascending, wanted, side="right")) - 1, 0), len(self.values) - 2)
+
+    def _near(self, value: float, order: int) -> tuple[slice, Array]:
+        """Nodes around a value, and their weights in the polynomial of an order in arclength that passes through them.
+
+        Over arclength all is smooth, also where the parameter turns.
+        """
+        i = self._segment(value)
+        first = min(max(0, i - (order - 1) // 2), max(0, len(self.values) - order - 1))
+        nodes = slice(first, first + order + 1)
+        s, v = self.places[nodes], self.values[nodes]
+        start, stop = self.places[i], self.places[i + 1]
+
+        def weights(place: float) -> Array:
+            return np.array([np.prod((place - np.delete(s, k)) / (s[k] - np.delete(s, k))) for k in range(len(s))])
+
+        def off(place: float) -> float:
+            return float(weights(place) @ v) - value
+
+        if off(start) * off(stop) > 0.0:
+            return nodes, weights(start if abs(off(start)) < abs(off(stop)) else stop)
+        return nodes, weights(brentq(off, start, stop, xtol=1e-13 * (1.0 + abs(stop))))
+
+    def place(self, value: float) -> float:
+        """The arclength along the curve at a value."""
+        nodes, weights = self._near(value, 1)
+        return float(weights @ self.places[nodes])
 
     def omega_near(self, value: float) -> tuple[float, float]:
         """Where the limit point at a value is to be expected, and how far off it may lie."""
-        i, share = self._around(value)
-        a, b = float(self.omega[i]), float(self.omega[i + 1])
-        return a + share * (b - a), abs(b - a) + 1e-6 * abs(a)
+        i = self._segment(value)
+        nodes, weights = self._near(value, 1)
+        return float(weights @ self.omega[nodes]), abs(float(self.omega[i + 1] - self.omega[i])) + 1e-6 * self.omega[i]
 
     def limit_point(self, value: float) -> Bifurcation:
         """The limit point at a value of the parameter, located over omega.
 
         Raises ConvergenceError where it is not found again.
         """
-        i, share = self._around(value)
-        beside = [node.orbit for node in self.nodes[i : i + 2]]
-        orbit = max(beside, key=lambda o: o.basis.harmonics)
-        a, b = (o.basis.resized(o.coefficients, orbit.basis.filled) for o in beside)
         expected, reach = self.omega_near(value)
-        span = float(np.ptp(self.omega)) or expected
-        x = a + share * (b - a)
         with one_thread():
-            found = bifurcation_at_value(LIMIT_POINT, orbit, x, expected, self.name, value, span, self.curve.options)
+            for order in (3, 1):
+                nodes, weights = self._near(value, order)
+                try:
+                    return self._solved(value, nodes, weights, expected, reach)
+                except ConvergenceError:
+                    continue
+            return self._approached(value, expected, reach)
+
+    def _solved(self, value: float, nodes: slice, weights: Array, expected: float, reach: float) -> Bifurcation:
+        """The limit point at a value by Newton's method from nodes with weights."""
+        beside = [node.orbit for node in self.nodes[nodes]]
+        orbit = max(beside, key=lambda o: o.basis.harmonics)
+        basis = orbit.basis.filled
+        x = sum(w * o.basis.resized(o.coefficients, basis) for w, o in zip(weights, beside, strict=True))
+        omega = float(weights @ self.omega[nodes])
+        return self._at(value, orbit, np.asarray(x), omega, expected, reach)
+
+    def _at(
+        self, value: float, orbit: PeriodicOrbit, x: Array, omega: float, expected: float, reach: float
+    ) -> Bifurcation:
+        span = float(np.ptp(self.omega)) or expected
+        found = bifurcation_at_value(LIMIT_POINT, orbit, x, omega, self.name, value, span, self.curve.options)
         if abs(found.omega - expected) > _AWAY * reach:
             raise ConvergenceError(
                 f"the limit point near omega = {expected:.6g}, {self.name} = {value:.6g} was not found again"
             )
         return found
+
+    def _approached(self, value: float, expected: float, reach: float) -> Bifurcation:
+        """The limit point at a value in small steps from the nodes beside it, where contacts that graze are near."""
+        i = self._segment(value)
+        failure = ConvergenceError("no node")
+        for node, start in ((self.nodes[i], self.values[i]), (self.nodes[i + 1], self.values[i + 1])):
+            orbit, share = node.orbit, 0.0
+            step = 0.5
+            while share < 1.0 and step > _SMALLEST:
+                there = min(1.0, share + step)
+                between = float(start + there * (value - start))
+                x = orbit.basis.resized(orbit.coefficients, orbit.basis.filled)
+                try:
+                    found = self._at(between, orbit, x, orbit.omega, expected, reach)
+                    orbit, share, step = found.orbit, there, 2.0 * step
+                except ConvergenceError as why:
+                    failure, step = why, 0.5 * step
+            if share == 1.0:
+                return found
+        raise failure
 
 
 def legs_of(curve: TrackedBranch, name: str) -> list[Leg]:

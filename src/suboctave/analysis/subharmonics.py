@@ -45,7 +45,7 @@ from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.timedomain import integrate
 
-__all__ = ["Seeds", "find_subharmonics", "isolated_branches", "periodic_orbit", "subharmonic_start"]
+__all__ = ["Seeds", "find_subharmonics", "isolated_branches", "lies_on", "periodic_orbit", "subharmonic_start"]
 
 #: part of a motion at fractions of omega below which it is taken for a motion of the load's period
 _SUBHARMONIC = 1e-3
@@ -142,7 +142,7 @@ def isolated_branches(
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
 ) -> list[Branch]:
-    """As `find_subharmonics`, for any period from that of the load on, without the branches that are known."""
+    """As `find_subharmonics`, without the branches that are known."""
     first, last = omega
     settings = make_settings(system, max_step, observe, (), newton, stepping, stability, None)
     curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, None)
@@ -164,7 +164,7 @@ def _branches(
     first, last = bounds
     found = list(known)
     for point in _motions(curve, bounds, seeds, settings):
-        if any(_on(branch, point) for branch in found):
+        if any(lies_on(branch, _orbit(point)) for branch in found):
             continue
         trace = both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
         if trace.points:
@@ -292,7 +292,7 @@ def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array
     balance = curve.balance
     nu = balance.basis.nu
     base = linear_response(curve, value)
-    for k in range(1, max(nu, 2)):
+    for k in range(1, nu):
         if gcd(k, nu) > 1:
             continue
         for shape in _modes(balance)[: seeds.modes]:
@@ -382,12 +382,9 @@ def _same(curve: ResponseCurve, u: Array, other: Array) -> bool:
     return any(length(image[:-1] - other[:-1]) <= 1e-4 * size for image in curve.images(u))
 
 
-def _on(branch: Branch, point: CurvePoint) -> bool:
-    """Whether a motion lies on a branch: between two of its points, by the moduli of its harmonics."""
-    curve = point.curve
-    assert isinstance(curve, ResponseCurve)
-    x, omega, _ = curve.split(point.u)
-    moduli = np.abs(PeriodicOrbit(curve.balance, x, omega, curve.balance.values, 0.0).amplitudes)
+def lies_on(branch: Branch, orbit: PeriodicOrbit) -> bool:
+    """Whether a motion lies on a branch over omega: between two of its points, by the moduli of its harmonics."""
+    moduli, omega = np.abs(orbit.amplitudes), orbit.omega
     values = branch.omega
     size = length(moduli)
     for i in np.flatnonzero((values[:-1] - omega) * (values[1:] - omega) <= 0.0):

@@ -11,19 +11,21 @@ from suboctave.analysis.checks import check_bounds, check_parameter, check_range
 from suboctave.analysis.making import check_unknowns, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_ends import repeats_earlier
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
+from suboctave.analysis.track_onto import aside, curve_onto, start_onto
 from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, solved_start
-from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.formulation import BorderedSystem, Formulation
-from suboctave.bifurcation.tracked import TRACKED_KINDS, TrackedEvent
+from suboctave.bifurcation.tracked import CURVES_THROUGH, TRACKED_KINDS, TrackedEvent
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.stability import StabilityMethod
 
@@ -37,6 +39,7 @@ def track(
     bounds: Sequence[Any],
     *,
     omega: Range | None = None,
+    onto: str | None = None,
     harmonics: int | str | AdaptiveHarmonics | None = None,
     max_step: float | None = None,
     observe: int | None = None,
@@ -53,8 +56,9 @@ def track(
     Parameters
     ----------
     bifurcation
-        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); or one of the
-        `extrema` of a tracked curve.
+        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); one of the
+        `extrema` of a tracked curve; or one of its points of codimension two through which another curve passes, or
+        from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS).
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
@@ -62,6 +66,9 @@ def track(
         is not bounded.
     omega
         Range of omega, rad per unit time; default: not bounded.
+    onto
+        From a point of codimension two: the kind of the curve to follow. Default: that on which it was not found, the
+        Neimark-Sacker points that begin in an R1 or R2 of a curve of LP or PD, the LP or PD through that of an NS.
     harmonics
         As in `frequency_response`; default: as the bifurcation was computed.
     max_step
@@ -78,14 +85,15 @@ def track(
     -------
     TrackedBranch
         With `extrema` (where either parameter turns) and, in `bifurcations`, points of codimension two as well: CP
-        (cusp), R1, R2, R3, R4 (resonances), LPPD (fold-flip).
+        (cusp), GPD (generalised period doubling), R1, R2, R3, R4 (resonances), LPPD, LPNS, PDNS, NSNS (fold-flip,
+        fold-, flip- and double Neimark-Sacker).
 
     Raises
     ------
     InputError
         Wrong input, before any work.
     ConvergenceError
-        If the bifurcation given is not found again.
+        If the bifurcation given is not found again, or nothing of the kind wanted beside it.
 
     Notes
     -----
@@ -97,34 +105,45 @@ def track(
         names, ranges = _third(bifurcation, parameter, bounds, omega)
     else:
         names, ranges = _free(bifurcation, parameter, bounds, omega)
-    if bifurcation.kind == "GPD":
-        assert isinstance(bifurcation, TrackedEvent)
-        assert ranges[1] is not None
-        bifurcation = _leaving(bifurcation, names, ranges[1])
-    orbit = bifurcation.orbit
-    system = orbit.system
+    kind = curve_onto(bifurcation, onto)
+    if bifurcation.kind == "LP" and repeats_earlier(bifurcation.orbit):
+        raise InputError(
+            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: thus "
+            "every period doubling is one, and its curve is that of the doublings; track the PD, or a limit point "
+            "of the branch that switch_branch gives"
+        )
     settings = make_settings(
-        system, max_step, _observed(bifurcation, observe), (), newton, stepping, stability, formulation
+        bifurcation.orbit.system,
+        max_step,
+        _observed(bifurcation, observe),
+        (),
+        newton,
+        stepping,
+        stability,
+        formulation,
     )
     if turning and not isinstance(settings.formulation, BorderedSystem):
         raise InputError(
             f"curves of extrema are followed by the bordered system, not {settings.formulation.name!r}: leave "
             "formulation= out; locate_extremum solves for a single one by the published system"
         )
-    basis = orbit.basis
-    wanted = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
-    adaptive, basis = discretisation(basis, wanted)
-    check_unknowns(orbit.balance.size, basis)
+    wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
     second = ranges[1]
     assert second is not None
-    ends = (min(second), max(second))
-    first = None if ranges[0] is None else (min(ranges[0]), max(ranges[0]))
-    box = Box(first, ends)
+    box = Box(None if ranges[0] is None else (min(ranges[0]), max(ranges[0])), (min(second), max(second)))
     computation_begins()
-    with one_thread(), reporting(progress, f"{bifurcation.kind} over {names[-1]}") as report:
+    with one_thread(), reporting(progress, f"{kind} over {names[-1]}") as report:
         settings = replace(settings, report=report)
+        if bifurcation.kind in CURVES_THROUGH:
+            assert isinstance(bifurcation, TrackedEvent)
+            bifurcation = start_onto(bifurcation, kind, names, box, settings.newton)
+            wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
+        orbit = bifurcation.orbit
+        system = orbit.system
         balance = HarmonicBalance(system, basis, linear=own_linear_part(orbit))
         start = solved_start(bifurcation, balance, adaptive, names, box, settings)
+        if bifurcation.kind in CURVES_THROUGH:
+            start = aside(start, box, settings.newton)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     bounded = {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None}
     options = options_of(settings, wanted, bounded)
@@ -177,9 +196,10 @@ def _free(
         raise InputError(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
         )
-    if item.kind not in (*TRACKED_KINDS, "GPD"):
+    if item.kind not in (*TRACKED_KINDS, *CURVES_THROUGH):
         raise InputError(
-            f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves; this is a {item.kind}"
+            f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves, and other curves from "
+            f"{', '.join(CURVES_THROUGH)}; this is a {item.kind}"
         )
     system = item.orbit.system
     if isinstance(parameter, str):
@@ -218,13 +238,13 @@ def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range
             raise InputError(f"the bifurcation has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
 
 
-def _leaving(item: TrackedEvent, names: tuple[str, ...], second: Range) -> Bifurcation:
-    """Where the curve of doubled limit points that begins at a GPD is entered."""
-    if names != item.names:
-        raise InputError(
-            f"the limit points that leave this GPD are followed over {' and '.join(item.names)}, in which it was found"
-        )
-    return limit_point_beside(item, abs(second[1] - second[0]))
+def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | None, HarmonicBasis]:
+    """Harmonics wanted, the rule for them, and the basis that tracking begins with; by default as those of a start."""
+    orbit = item.orbit
+    wanted = given if given is not None else orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
+    adaptive, basis = discretisation(orbit.basis, wanted)
+    check_unknowns(orbit.balance.size, basis)
+    return wanted, adaptive, basis
 
 
 def _observed(item: Bifurcation, observe: int | None) -> int | None:

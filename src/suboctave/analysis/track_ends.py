@@ -1,6 +1,10 @@
 """Where a curve of bifurcations ends although its parameters stay in range: its motions cease to be of its kind.
 
-- NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there.
+- NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there. At
+  w0/2 the harmonics left out shift the end in the equations solved, so that a curve may go on with neutral saddles: it
+  ends as well where the pair has become two real multipliers. Perturbations of motions with a half-wave symmetry have
+  either even or odd multiples of w0 beside kappa. The two of a pair are then of different kinds, and pass each other
+  at w0/2 as if nothing were there: the curve goes on with kappa above it, and ends where that reaches w0.
 - BP: the unfolding is not zero any more: the symmetry that forces branch points is broken.
 - LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
   the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
@@ -16,8 +20,9 @@ from functools import lru_cache
 import numpy as np
 
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import CurveTest, DoubleMultiplier, Found, GeneralisedDoubling
+from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
+from suboctave.analysis.tracked_tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.bifurcation.augmented import BranchPointUnfolded, SingularOperator
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.problem import Array
@@ -33,6 +38,10 @@ _BESIDE = 0.05
 _AROUND = 0.2
 #: kappa in units of the base frequency, from 0 or 1/2, at which an NS curve has reached its end
 _RESONANT = 2e-3
+#: the same, within which the pair is looked at
+_DOUBTFUL = 0.05
+#: share of a perturbation with waves of the other parity that is none
+_NO_PARITY = 1e-6
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
 
@@ -63,9 +72,15 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
                 f"{b.curve.where(b.point.u)}, the symmetry that forces them is broken there"
             )
     if isinstance(augmentation, SingularOperator) and augmentation.kind is Kind.FREE:
-        share = b.kappa / b.state.rate
-        if not _RESONANT < share < 0.5 - _RESONANT:
-            return _resonance(a, share > 0.25, newton)
+        before, share = a.kappa / a.state.rate, b.kappa / b.state.rate
+        double = abs(share - 0.5) < 0.25
+        if double and _symmetric(b):
+            return None
+        # a step may lead across
+        target = 0.5 if double else float(round(share))
+        distance = (share - target) * math.copysign(1.0, before - target)
+        if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)):
+            return _resonance(a, double, newton)
     if b.curve.balance.basis.nu == 1:
         return None
     share = subharmonic_share(b.point)
@@ -82,6 +97,23 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
     return None
 
 
+def _symmetric(b: TrackedSample) -> bool:
+    """Whether a perturbation has frequencies kappa + k w0 for even k alone, or for odd k alone."""
+    waves = b.equations.bordered.right.reshape(-1, b.curve.balance.size)
+    first, last = (float(np.linalg.norm(waves[i::2])) for i in (0, 1))
+    return min(first, last) < _NO_PARITY * max(first, last)
+
+
+def _split(b: TrackedSample) -> bool:
+    """Whether the two multipliers nearest to the critical one are real: a neutral saddle."""
+    critical = b.evaluation.critical
+    if critical is None:
+        return False
+    mu = b.evaluation.floquet.multipliers
+    nearest = mu[np.argsort(np.abs(mu - critical), kind="stable")[:2]]
+    return bool(np.all(nearest.imag == 0.0))
+
+
 def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""
     order, operator = (2, Kind.HALF) if double else (1, Kind.INTEGER)
@@ -92,7 +124,8 @@ def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
         found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(order), newton, _AROUND)
     except ConvergenceError as failure:
         return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failure})")
-    return End(f"the curve ends in a {words} resonance at {found.sample.curve.where(found.sample.point.u)}", found)
+    where = found.sample.curve.where(found.sample.point.u)
+    return End(f"the curve ends in a {words} resonance at {where}", found, last=True)
 
 
 def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
@@ -127,8 +160,10 @@ def _zero_beside(
 
 
 def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
-    """A motion of the parent in the basis of a curve of doubled motions."""
+    """A motion in a curve's basis, where that is of another period: one of the parent of doubled motions."""
     balance = a.curve.balance
+    if orbit.basis.nu == balance.basis.nu:
+        return orbit
     return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
 
 
@@ -138,25 +173,31 @@ def keeps_subharmonics(a: CurvePoint, b: CurvePoint) -> bool:
     assert isinstance(curve, TrackedCurve)
     if curve.balance.basis.nu == 1 or subharmonic_share(b) <= _NOTHING_LEFT:
         return True
-    before = _parts(replace(a, u=curve.transfer(a.u, a.curve), curve=curve))
-    return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, _parts(b), strict=True))
+    before = _parts(curve, curve.transfer(a.u, a.curve))
+    return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, _parts(curve, b.u), strict=True))
 
 
 def subharmonic_share(point: CurvePoint) -> float:
     """Smallest share of a motion that one of its period multiplications has brought about."""
     curve = point.curve
     assert isinstance(curve, TrackedCurve)
-    return min(float(np.linalg.norm(part)) for part in _parts(point)) / (curve.size(point.u) or 1.0)
+    return min(float(np.linalg.norm(part)) for part in _parts(curve, point.u)) / (curve.size(point.u) or 1.0)
 
 
-def _parts(point: CurvePoint) -> list[Array]:
+def _parts(curve: TrackedCurve, u: Array) -> list[Array]:
     """Harmonics that the motion would not have if it repeated earlier: one array for each prime factor of nu."""
-    curve = point.curve
-    assert isinstance(curve, TrackedCurve)
     basis = curve.balance.basis
     nu = basis.nu
-    x = point.u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
+    x = u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
     return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
+
+
+def repeats_earlier(orbit: PeriodicOrbit) -> bool:
+    """Whether a motion repeats after a part of the period that it is written with."""
+    basis, scales = orbit.basis, orbit.balance.scales()[0]
+    x = orbit.coefficients.reshape(basis.size, -1) * scales
+    least = min((float(np.linalg.norm(x[rows])) for rows in _rows_of_parts(basis.nu, basis.harmonics)), default=np.inf)
+    return least <= _NOTHING_LEFT * float(np.linalg.norm(x))
 
 
 @lru_cache(maxsize=64)
@@ -166,4 +207,4 @@ def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
     return [np.flatnonzero(k % prime) for prime in primes]
 
 
-__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "subharmonic_share"]
+__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "repeats_earlier", "subharmonic_share"]

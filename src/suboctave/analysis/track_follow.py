@@ -7,16 +7,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from suboctave.analysis.extremum import polished
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_events import CurveTest, Extremum, Found, events_between, extreme_of, refined, tests_of
+from suboctave.analysis.tracked_events import Found, events_between, extreme_of, refined
+from suboctave.analysis.tracked_hidden import HiddenPairs
 from suboctave.analysis.tracked_located import as_event
+from suboctave.analysis.tracked_pairs import PairWatch
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.analysis.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
 from suboctave.continuation.march import between, make_point
@@ -66,8 +68,12 @@ class _Tracker:
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
         self.trace = TrackedTrace()
-        self.tests: tuple[CurveTest, ...] = tests_of(start.curve)
+        tests = tests_of(start.curve)
+        self.tests: tuple[CurveTest, ...] = tuple(t for t in tests if not isinstance(t, PairCrossing))
         self.previous: TrackedSample | None = None
+        self.hidden = HiddenPairs(self.tests, settings.newton)
+        pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
+        self.pairs = PairWatch(pairs, settings.newton)
         self.corners = 0
 
     def run(self) -> TrackedTrace:
@@ -82,6 +88,8 @@ class _Tracker:
                 heading = math.copysign(1.0, beyond.tangent[-1])
                 self.march = March(beyond, heading, self.box.second, self.settings.newton, stepping, self._clear)
             trace.closed = self.march.closed
+            self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
+            trace.events.sort(key=lambda event: event.arclength)
         except KeyboardInterrupt:
             where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
             trace.interrupted = True
@@ -139,6 +147,10 @@ class _Tracker:
         """Take a point in; a sentence if the curve ends there or before it."""
         settings, new = self.settings, TrackedSample(point)
         if self.previous is None or point is self.march.start:
+            # beyond a corner nothing leads on from what lies behind
+            for watch in (self.hidden, self.pairs):
+                self._take(watch.rest(self.trace.warnings))
+                watch.passed(new, self.trace.warnings)
             self._add(new)
             self.previous = new
             return None
@@ -154,15 +166,21 @@ class _Tracker:
         if landed is None:
             return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
         new = self._smooth(a, landed)
-        for found in events_between(a, new, self.tests, settings.newton, self.trace.warnings):
-            item = polished(refined(found, settings.newton, self.trace.warnings), settings.newton)
-            self.trace.events.append(as_event(item, settings.stability, settings.observe))
+        warnings = self.trace.warnings
+        found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
+        self._take(found + events_between(a, new, self.tests, settings.newton, warnings))
         self._add(new)
         self.previous = new
         if settings.report is not None:
             low, high = self.box.second
             settings.report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
         return f"reached the end of the range at {new.curve.where(new.point.u)}" if outside else None
+
+    def _take(self, found: list[Found]) -> None:
+        settings, warnings = self.settings, self.trace.warnings
+        for item in found:
+            better = refined(item, settings.newton, warnings)
+            self.trace.events.append(as_event(better, settings.stability, settings.observe))
 
     def _add(self, sample: TrackedSample) -> None:
         point = sample.point
@@ -174,6 +192,7 @@ class _Tracker:
                 self.settings.stability,
                 sample.instant_or_frequency,
                 sample.coefficient,
+                sample.multipliers_by(self.settings.stability),
                 extreme=sample.extreme,
                 isola=sample.isola,
             )
@@ -184,9 +203,12 @@ class _Tracker:
         if end.event is not None:
             found = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(found, settings.stability, settings.observe)
-            self.trace.events.append(replace(item, arclength=arclength))
+            curve = a.curve.augmentation.name
+            self.trace.events.append(replace(item, arclength=arclength, curve=curve))
             if end.last:
-                self.trace.points.append(TrackedPoint(rebased(item.orbit, a), arclength, 0, settings.stability))
+                orbit = rebased(item.orbit, a)
+                kappa = 0.5 * orbit.omega / orbit.basis.nu if found.test.kind == "R2" else 0.0
+                self.trace.points.append(TrackedPoint(orbit, arclength, 0, settings.stability, kappa))
 
     def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
         """The first point again, with the bordering vectors of the last."""

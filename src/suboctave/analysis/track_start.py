@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeGuard
 
@@ -46,6 +47,11 @@ class Box:
 
     first: tuple[float, float] | None
     second: tuple[float, float]
+
+    def around(self, names: Sequence[str], values: Mapping[str, float]) -> bool:
+        """Whether values of the free parameters lie within the ranges."""
+        both = ((names[0], self.first), (names[-1], self.second))
+        return all(ends is None or ends[0] <= values[name] <= ends[1] for name, ends in both)
 
 
 def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:

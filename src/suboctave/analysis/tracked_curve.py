@@ -30,6 +30,7 @@ _CRITICAL = 1e-3
 #: steps after which that is looked at again
 _LOOKED_AT = 5
 _TINY = float(np.finfo(float).tiny)
+_NONE = np.zeros(0)
 
 
 class TrackedEvaluation:
@@ -73,17 +74,24 @@ class TrackedEvaluation:
     def jacobian(self) -> Array:
         """Derivatives by u, shape (N, N + 1)."""
         state, equations = self.state, self.equations
-        n, q = state.balance.dimension, len(self.extra)
+        names, n, q = self.curve.names, state.balance.dimension, len(self.extra)
         rows = equations.rows
         out = np.zeros((n + rows.shape[0], rows.shape[1]))
-        out[:n, :n] = state.jacobian
+        # omega comes first
+        along = state.extended_jacobian(names[0])
+        out[:n, :n], out[:n, n + q] = along[:, :n], along[:, n]
         if equations.column is not None:
             out[:n, n] = equations.column
-        for i, name in enumerate(self.curve.names):
+        for i, name in enumerate(names[1:], 1):
             out[:n, n + q + i] = state.residual_by(name)
         out[n:] = rows
         out[n:] *= self.curve.force
         return out
+
+    def takes_over(self, other: Evaluation) -> bool:
+        """See `Evaluation`."""
+        assert isinstance(other, TrackedEvaluation)
+        return self.equations.takes_over(other.equations)
 
     @lazy
     def error(self) -> float:
@@ -147,7 +155,7 @@ class TrackedCurve:
         """Coefficients (2 H + 1, size), extra unknowns, omega and parameter values of a vector u."""
         n = self.balance.dimension
         x = u[:n].reshape(self.balance.basis.size, self.balance.size)
-        extra, parameters = np.split(u[n:], [self.augmentation.extras])
+        extra, parameters = u[n : -len(self.names)], u[-len(self.names) :]
         free = dict(zip(self.names, parameters.tolist(), strict=True))
         omega = free.pop("omega", self.omega)
         return x, extra, omega, {**self.balance.values, **free}
@@ -172,7 +180,7 @@ class TrackedCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * largest) or 1.0
-        extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu)
+        extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu) if self.augmentation.extras else _NONE
         return self.join(self._weight / size, 1.0 / extra, 1.0 / np.array(self.spans))
 
     def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
@@ -232,7 +240,7 @@ class TrackedCurve:
         basis, n = self.balance.basis, self.balance.dimension
         if basis.nu == 1:
             return [u]
-        extra, parameters = np.split(u[n:], [self.augmentation.extras])
+        extra, parameters = u[n : -len(self.names)], u[-len(self.names) :]
         found = []
         for shift in range(basis.nu):
             turn = 2.0 * np.pi * shift / basis.nu
@@ -244,10 +252,13 @@ class TrackedCurve:
             found.append(self.join(y, self.augmentation.shifted(extra, turn), parameters))
         return found
 
+    def named(self, u: Array) -> dict[str, float]:
+        """Values of the free parameters by name."""
+        return dict(zip(self.names, u[-len(self.names) :].tolist(), strict=True))
+
     def where(self, u: Array) -> str:
         """Where in the plane of the parameters, in words."""
-        values = u[-len(self.names) :]
-        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, values, strict=True))
+        return ", ".join(f"{name} = {value:.6g}" for name, value in self.named(u).items())
 
 
 __all__ = ["TrackedCurve", "TrackedEvaluation"]

@@ -1,207 +1,79 @@
-"""What is looked for along a curve of bifurcations: extrema of its parameters, and points of codimension two.
+"""Events between two neighbours of a curve of bifurcations: bracketed, located, and located again with more harmonics.
 
-Functions of the curve's points that change sign:
-
-    extremum of p     component of the tangent along p
-    CP                psi . R''[phi, phi] on LP curves; both components of the tangent vanish with it
-    R1, R2            psi . (dJ_kappa/dkappa) phi on LP, PD curves: the multiplier is double
-    R3, R4            kappa - w0/3, kappa - w0/4 on NS curves
-    GPD               the cubic coefficient c3 on PD curves: super- turns into subcritical
-    LPPD              det J_half on LP curves, det J_0 on PD curves: the other multiplier is critical too
-
-At a cusp the curve turns in both parameters, which makes no extremum of either: there the tangent's components divided
-by the cusp's function keep their signs. (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., chapters 8, 9.)
+What is looked for are the sign changes of `tracked_tests`. At a cusp the curve turns in both parameters, which makes no
+extremum of either: there the tangent's components divided by the cusp's function keep their signs.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
-from suboctave.bifurcation.augmented import SingularOperator
-from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.analysis.tracked_tests import CurveTest, Cusp, Extremum
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, make_point, point_between
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import choose_harmonics
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
-#: component of the tangent in scaled arclength that may be rounding at both ends of a step
-_LEVEL = 1e-9
 #: share of a step within which events coincide
 _SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
-
-
-class CurveTest(ABC):
-    """One kind of event: a function of the curve's points that changes sign."""
-
-    @property
-    @abstractmethod
-    def kind(self) -> str:
-        """What the events are called."""
-
-    @abstractmethod
-    def value(self, sample: TrackedSample) -> float:
-        """The test function; 0 where it says nothing."""
-
-    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
-        """The test with a function that is smooth between two neighbours."""
-        return self
-
-
-@dataclass(frozen=True)
-class Extremum(CurveTest):
-    """The curve turns in one of its parameters."""
-
-    name: str
-    kind = "extremum"
-
-    def value(self, sample: TrackedSample) -> float:
-        """See `CurveTest.value`."""
-        slope = float(sample.point.tangent[sample.curve.index(self.name)])
-        # at a cusp both change sign
-        plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
-        return slope / sample.bend if plane and sample.bend != 0.0 else slope
-
-    def level(self, *samples: TrackedSample) -> bool:
-        """Whether the parameter stays as it is but for rounding."""
-        indices = [sample.curve.index(self.name) for sample in samples]
-        points = [sample.point for sample in samples]
-        return all(abs(p.tangent[i] * p.weights[i]) < _LEVEL for p, i in zip(points, indices, strict=True))
-
-
-@dataclass(frozen=True)
-class Cusp(CurveTest):
-    """Two limit points meet and vanish."""
-
-    kind = "CP"
-
-    def value(self, sample: TrackedSample) -> float:
-        """See `CurveTest.value`."""
-        return sample.bend
-
-
-@dataclass(frozen=True)
-class GeneralisedDoubling(CurveTest):
-    """The motions that branch off change sides; a curve of their limit points begins."""
-
-    kind = "GPD"
-
-    def value(self, sample: TrackedSample) -> float:
-        """See `CurveTest.value`."""
-        # at a fold-flip c3 passes through infinity, and det J_0 through zero
-        return sample.cubic * sample.other
-
-
-@dataclass(frozen=True)
-class DoubleMultiplier(CurveTest):
-    """R1 on LP curves, R2 on PD curves: a curve of Neimark-Sacker points begins."""
-
-    order: int
-
-    @property
-    def kind(self) -> str:
-        """R1 or R2."""
-        return f"R{self.order}"
-
-    def value(self, sample: TrackedSample) -> float:
-        """See `CurveTest.value`."""
-        return sample.twist
-
-
-@dataclass(frozen=True)
-class Resonance(CurveTest):
-    """R3, R4 on NS curves: kappa = w0 / order."""
-
-    order: int
-
-    @property
-    def kind(self) -> str:
-        """R3 or R4."""
-        return f"R{self.order}"
-
-    def value(self, sample: TrackedSample) -> float:
-        """See `CurveTest.value`."""
-        return sample.kappa / sample.state.rate - 1.0 / self.order
-
-
-@dataclass(frozen=True)
-class FoldFlip(CurveTest):
-    """Multipliers +1 and -1 at once; between neighbours by g of the other operator with fixed borders."""
-
-    borders: NullVectors | None = None
-    operator: Kind = Kind.HALF
-    kind = "LPPD"
-
-    def value(self, sample: TrackedSample) -> float:
-        """See `CurveTest.value`."""
-        if self.borders is None:
-            return sample.other
-        return float(bordered(sample.state, self.operator, self.borders).g.real)
-
-    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
-        """See `CurveTest.within`."""
-        operator = Kind.HALF if b.equations.of.kind is Kind.INTEGER else Kind.INTEGER
-        return FoldFlip(null_vectors(b.state, operator), operator)
-
-
-def tests_of(curve: TrackedCurve) -> tuple[CurveTest, ...]:
-    """What to look for along a curve, by the kind of its bifurcations."""
-    turns = tuple(Extremum(name) for name in curve.names)
-    augmentation = curve.augmentation.own
-    if not isinstance(augmentation, SingularOperator):
-        return turns
-    own: dict[Kind, tuple[CurveTest, ...]] = {
-        Kind.INTEGER: (Cusp(), DoubleMultiplier(1), FoldFlip()),
-        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier(2), FoldFlip()),
-        Kind.FREE: (Resonance(3), Resonance(4)),
-    }
-    return turns + own[augmentation.kind]
+#: share of a test's values at the ends of a step with which a zero is near enough for secants
+_LITTLE = 0.05
 
 
 @dataclass(frozen=True)
 class Found:
     """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns; `rough`:
-    where more harmonics are to locate it better.
+    where more harmonics are to locate it better, `slope` about the test's derivative by arclength.
     """
 
     test: CurveTest
     sample: TrackedSample
     extreme: str = ""
     rough: _Stretch | None = None
+    slope: float = 0.0
 
 
 def events_between(
     a: TrackedSample, b: TrackedSample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
 ) -> list[Found]:
     """Every event between two neighbours in the same discretisation, in the order met."""
-    found = []
+    found: list[Found] = []
     for test in tests:
         try:
-            for low, high in _brackets(test, a, b, newton):
-                stretch = _Stretch(low, high, test.within(low, high), newton)
-                sample = stretch.zero(_ROUGH)
-                # what more harmonics will move need not be known better
-                finer = _finer(sample) is not None
-                sample = sample if finer else stretch.zero(_RESOLVED)
-                found.append(Found(test, sample, extreme_of(test, low), stretch if finer else None))
+            both = [located(test, low, high, newton) for low, high in _brackets(test, a, b, newton)]
+            found += [item for item in both if item is not None]
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
     if b.curve.augmentation.turning:
         found = _without_consequences(found, b.curve, _SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: NewtonOptions) -> Found | None:
+    """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
+    own = test.within(low, high)
+    stretch = _Stretch(low, high, own, newton)
+    # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
+    close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
+    sample, slope = stretch.about(_ROUGH if close else 0.0)
+    if not own.genuine(sample):
+        return None
+    # what more harmonics will move need not be known better
+    finer = _finer(sample) is not None
+    sample = sample if finer else stretch.zero_from(sample, slope)
+    return Found(own, sample, extreme_of(test, low), stretch if finer else None, slope)
 
 
 def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
@@ -228,33 +100,38 @@ def _brackets(
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
     if isinstance(test, Extremum) and test.level(a, b):
         return []
-    first, last = test.value(a), test.value(b)
-    if first * last < 0.0 or (last == 0.0 and first != 0.0):
+    if test.changed(a, b):
         return [(a, b)]
     share = _turn_inside(test.name, a, b) if isinstance(test, Extremum) else None
     if share is None:
         return []
     middle = TrackedSample(point_between(a.point, b.point, share, newton))
-    return [(a, middle), (middle, b)] if test.value(middle) * first < 0.0 else []
+    return [(a, middle), (middle, b)] if test.changed(a, middle) else []
 
 
 def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
     """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
-    i, way = a.curve.index(name), b.point.arclength - a.point.arclength
-    if not way > 0.0:
-        return None
-    chord = float(b.point.u[b.curve.index(name)] - a.point.u[i]) / way
-    start, stop = float(a.point.tangent[i]), float(b.point.tangent[b.curve.index(name)])
-    # the slope start (1 - s) (1 - 3 s) + stop s (3 s - 2) + 6 chord s (1 - s) has its vertex at s
-    curve = 3.0 * start + 3.0 * stop - 6.0 * chord
+    start, curve, half = _slope_between(name, a, b)
     if curve == 0.0:
         return None
-    s = (2.0 * start + stop - 3.0 * chord) / curve
+    s = -half / curve
     if not 0.0 < s < 1.0:
         return None
-    slope = start * (1.0 - s) * (1.0 - 3.0 * s) + stop * s * (3.0 * s - 2.0) + 6.0 * chord * s * (1.0 - s)
+    slope = start + s * half
     # where it nearly vanishes the interpolation cannot tell
     return s if slope * math.copysign(1.0, start) < 0.05 * abs(start) else None
+
+
+def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float, float]:
+    """The derivative of a parameter by arclength, `start + 2 half s + curve s^2` at the share s of the way between two
+    neighbours, by its cubic interpolation; nothing of it without a way.
+    """
+    i, j, way = a.curve.index(name), b.curve.index(name), b.point.arclength - a.point.arclength
+    if not way > 0.0:
+        return 0.0, 0.0, 0.0
+    chord = float(b.point.u[j] - a.point.u[i]) / way
+    start, stop = float(a.point.tangent[i]), float(b.point.tangent[j])
+    return start, 3.0 * (start + stop - 2.0 * chord), 3.0 * chord - 2.0 * start - stop
 
 
 class _Stretch:
@@ -294,12 +171,61 @@ class _Stretch:
             solved = correct(curve, guess, row, weights, replace(self.newton, iterations=30, damped=True))
         return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
 
+    def about(self, resolved: float) -> tuple[TrackedSample, float]:
+        """A point beside the zero, closer than a share of the way or (0) where little is left of the test's values at
+        the ends, and about the test's derivative by arclength there.
+        """
+        first, last = self.values[0.0], self.values[1.0]
+        self.value(self._turn())
+        # components of a tangent change evenly; others may be large at one end
+        size = max if isinstance(self.test, Extremum) else min
+        little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
+        share = self._root(resolved or _RESOLVED, little)
+        value, way = self.value(share), self.b.point.arclength - self.a.point.arclength
+        slope = last - first
+        if 0.0 < share < 1.0:
+            # of the parabola through all three
+            slope = (value - first) / share + (last - value) / (1.0 - share) - slope
+        return self.samples[share], slope / way if way > 0.0 else 0.0
+
+    def _turn(self) -> float:
+        """The share at which a parameter turns by its cubic interpolation; 0 for other tests."""
+        if isinstance(self.test, Extremum):
+            start, curve, half = _slope_between(self.test.name, self.a, self.b)
+            inside = half * half - start * curve
+            if inside >= 0.0 and start != 0.0:
+                # the root on the side of the end whose sign is the other one
+                share = -start / (half - math.copysign(math.sqrt(inside), start))
+                return share if 0.0 < share < 1.0 else 0.0
+        return 0.0
+
+    def zero_from(self, sample: TrackedSample, slope: float) -> TrackedSample:
+        """Where the test vanishes, from a point beside, by secants; by Brent's method where these leave the way."""
+        low, high = self.a.point.arclength, self.b.point.arclength
+        try:
+            found = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
+        except ConvergenceError:
+            found = None
+        # tangents at the ends may be those of points a rounding away
+        slack = _ROUGH * (high - low)
+        if found is not None and low - slack <= found.point.arclength <= high + slack:
+            return found
+        return self.zero(_RESOLVED)
+
     def zero(self, resolved: float) -> TrackedSample:
-        """Where the test vanishes, to a share of the way, by Brent's method."""
-        shares = sorted(self.values)
-        for low, high in itertools.pairwise(shares):
+        """Where the test vanishes, to a share of the way."""
+        return self.samples_at(self._root(resolved))
+
+    def _root(self, resolved: float, little: float = 0.0) -> float:
+        """The share at which the test vanishes, or its modulus is below `little`, by Brent's method."""
+
+        def value(share: float) -> float:
+            found = self.value(share)
+            return found if abs(found) > little else 0.0
+
+        for low, high in itertools.pairwise(sorted(self.values)):
             if self.values[low] * self.values[high] <= 0.0:
-                return self.samples_at(float(brentq(self.value, low, high, xtol=resolved, rtol=8.9e-16)))
+                return float(brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
         raise ConvergenceError("the test does not change sign")
 
     def samples_at(self, share: float) -> TrackedSample:
@@ -327,7 +253,6 @@ def extreme_of(test: CurveTest, a: TrackedSample) -> str:
 def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     """An event located again with the harmonics that events ask for."""
     sample = found.sample
-    arclength = sample.point.arclength
     for _ in range(6):
         curve, basis = sample.curve, _finer(sample)
         if basis is None:
@@ -339,20 +264,19 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
             along = finer.transfer(sample.point.tangent, curve)
             start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton, along)
+            start = replace(start, arclength=sample.point.arclength)
             near = TrackedSample(start)
             test = found.test.within(near, near)
-            sample = zero_along(start, test.value, newton, _BESIDE)
+            sample = zero_along(start, test.value, newton, _BESIDE, found.slope)
         except ConvergenceError as failure:
             warnings.append(
                 f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
                 f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
             if sample is found.sample and found.rough is not None:
-                sample = found.rough.zero(_RESOLVED)
+                sample = found.rough.zero_from(sample, found.slope)
             break
-    if sample is found.sample:
-        return found
-    return replace(found, sample=TrackedSample(replace(sample.point, arclength=arclength)))
+    return found if sample is found.sample else replace(found, sample=sample)
 
 
-__all__ = ["CurveTest", "Extremum", "Found", "events_between", "extreme_of", "refined", "tests_of"]
+__all__ = ["Found", "events_between", "extreme_of", "located", "refined"]

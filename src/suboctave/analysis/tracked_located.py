@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from suboctave.analysis.tracked_events import Extremum, Found
+from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_sample import TrackedSample
+from suboctave.analysis.tracked_tests import Extremum
 from suboctave.bifurcation.augmented import GrazingEquations, SingularOperator
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.extremum import LimitPointExtremal

@@ -16,20 +16,22 @@ from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations,
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.extremum import ExtremalEquations
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
+from suboctave.stability import FloquetResult, StabilityMethod
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
-#: way along a curve, in scaled arclength, that a zero may still be off by the last secant
-_AT_ZERO = 1e-10
+#: way along a curve, in scaled arclength, that a zero may still be off by the last secant, and the first secant's least
+_AT_ZERO, _SECANT = 1e-10, 1e-6
 
 
 class TrackedSample:
@@ -101,7 +103,8 @@ class TrackedSample:
         """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
         b, by_x = self.equations.bordered, self.equations.gradient[0].real
         by_motion = -by_x.reshape(self.state.x.shape)
-        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._other_factor)
+        weights = self.point.weights[: self.state.x.size]
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, lambda rhs: self._plain.solve(rhs) / weights)
 
     @lazy
     def coefficient(self) -> float:
@@ -128,15 +131,52 @@ class TrackedSample:
         equations = self.evaluation.equations
         return equations.isola if isinstance(equations, ExtremalEquations) else ""
 
-    @property
-    def other(self) -> float:
-        """Sign of det J_half of an LP, of det J_0 of a PD."""
-        return self._other_factor.sign
+    def sign(self, operator: Kind) -> float:
+        """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
+        return self._plain.sign if operator is Kind.INTEGER else self._half.sign
+
+    def determinant(self, operator: Kind) -> Array:
+        """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
+        state = self.state
+        factor = self._whole if operator is Kind.INTEGER else self._half
+        n = len(factor.lu)
+        rows = np.arange(n) // state.balance.size
+        f = (rows + 1) // 2 if operator is Kind.INTEGER else rows // 2 + 0.5
+        units = np.log(state.rate**2 * (1.0 + f**2)) - 2.0 * np.log(state.balance.row_weights(n))
+        return np.array([factor.sign, factor.log_determinant - float(units.sum())])
 
     @lazy
-    def _other_factor(self) -> Factor:
-        limit = self.equations.of.kind is Kind.INTEGER
-        return Factor.of(self.state.half_jacobian if limit else self.state.jacobian)
+    def _whole(self) -> Factor:
+        return Factor.of(self.state.jacobian)
+
+    @lazy
+    def _half(self) -> Factor:
+        return Factor.of(self.state.half_jacobian)
+
+    @lazy
+    def _plain(self) -> LeadingBlock:
+        """J_0, its columns in scaled arclength: the leading block of what the point was solved with."""
+        point, size = self.point, self.state.balance.dimension
+        whole = point.factor
+        if whole is None or whole.singular or len(point.u) > size + 4:
+            whole = Factor.of(self.state.jacobian / point.weights[:size])
+        return LeadingBlock(whole, size)
+
+    def multipliers_by(self, method: StabilityMethod) -> FloquetResult | None:
+        """Multipliers and errors as a method would give them along a curve, None if that is still to be computed."""
+        known: FloquetResult | None = self.evaluation.__dict__.get("floquet")
+        return known if method.follows_monodromy else None
+
+    @lazy
+    def others(self) -> ComplexArray:
+        """Multipliers but the one, or the pair, that is critical all along the curve."""
+        mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
+        if critical is None:
+            return mu
+        count = 2 if self.curve.augmentation.name == "NS" else 1
+        distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        result: ComplexArray = np.delete(mu, np.argsort(distance, kind="stable")[:count])
+        return result
 
 
 def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:
@@ -178,9 +218,12 @@ def zero_along(
     function: Callable[[TrackedSample], float],
     newton: NewtonOptions,
     reach: float,
+    slope: float = 0.0,
     iterations: int = 12,
 ) -> TrackedSample:
     """The zero of a function along a curve near one of its points, by secants in arclength.
+
+    `slope`: about the derivative of the function by arclength, 0 if that is not known.
 
     Raises
     ------
@@ -190,14 +233,17 @@ def zero_along(
     curve, weights = start.curve, start.weights
     row = weights * start.tangent
     row = row / length(row)
-
-    s, old = 0.02 * reach, 0.0
     value_old = function(TrackedSample(start))
+    step = -value_old / slope if slope != 0.0 else math.inf
+    # not so short that the secant would be one through rounding
+    s, old = math.copysign(min(max(abs(step), _SECANT), 0.02 * reach), step), 0.0
     guess = start.u + s * row / weights
     before = start.u
+    factor: Factor | None = None
     for _ in range(iterations):
-        solved = correct(curve, guess, row, weights, newton)
-        sample = TrackedSample(make_point(solved, curve, start.tangent, s))
+        solved = correct(curve, guess, row, weights, newton, factor)
+        factor = solved.factor
+        sample = TrackedSample(make_point(solved, curve, start.tangent, start.arclength + s))
         value = function(sample)
         if value == value_old and value != 0.0:
             break

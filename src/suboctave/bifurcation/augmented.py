@@ -23,11 +23,14 @@ import numpy as np
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.bifurcation.gaps import level_rate, levels
 from suboctave.bifurcation.grazing import basis_rows, read_direction
+from suboctave.harmonic import real_form
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, form_rates, parameter_gradient
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
+
+_NAMES = {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}
 
 
 class Equations(ABC):
@@ -56,6 +59,10 @@ class Equations(ABC):
     @abstractmethod
     def renewed(self) -> Augmentation:
         """The augmentation with bordering vectors of this motion."""
+
+    def takes_over(self, other: Equations) -> bool:
+        """Whether these keep the derivatives of the same equations at a motion that is a rounding away."""
+        return False
 
 
 def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
@@ -129,7 +136,7 @@ class SingularOperator(Augmentation):
     @property
     def name(self) -> str:
         """Kind of bifurcation."""
-        return {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}[self.kind]
+        return _NAMES[self.kind]
 
     @property
     def extras(self) -> int:
@@ -174,13 +181,24 @@ class SingularEquations(Equations):
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
         return gradient_of(self.bordered, self.names)
 
+    def takes_over(self, other: Equations) -> bool:
+        """Keep the gradient of a motion a rounding away, but for kappa: whether that vanishes is asked for."""
+        b = self.bordered
+        if type(other) is not SingularEquations or b.kind is Kind.FREE or not real_form.applies(self.state, ()):
+            return False
+        by_x, rates, _ = other.gradient
+        by_kappa = -real_form.by_kappa(self.state, b.kind is Kind.INTEGER, b.left, b.right)
+        self.__dict__["gradient"] = by_x, rates, by_kappa
+        return True
+
     @property
     def rows(self) -> Array:
         """See `Equations.rows`."""
         by_x, rates, by_kappa = self.gradient
-        extra = [by_kappa] if self.of.extras else []
-        whole = np.concatenate((by_x, extra, [rates[name] for name in self.names])) / self.of.unit
-        return np.array([whole.real, whole.imag] if self.of.extras else [whole.real])
+        if not self.of.extras:
+            return np.append(by_x.real, [rates[name].real for name in self.names])[None] / self.of.unit
+        whole = np.concatenate((by_x, [by_kappa], [rates[name] for name in self.names])) / self.of.unit
+        return np.array([whole.real, whole.imag])
 
     def renewed(self) -> SingularOperator:
         """See `Equations.renewed`."""

@@ -32,6 +32,9 @@ KINDS = {
     "R3": "1:3 resonance",
     "R4": "1:4 resonance",
     "LPPD": "fold-flip",
+    "LPNS": "fold-Neimark-Sacker",
+    "PDNS": "flip-Neimark-Sacker",
+    "NSNS": "double Neimark-Sacker",
     "isola_centre": "a closed branch shrinks to a point",
     "isola_merging": "a closed branch meets another branch",
 }

@@ -9,19 +9,22 @@ general way.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from suboctave.bifurcation.normal_form_real import Expansion
-from suboctave.continuation.linear import Factor
-from suboctave.harmonic import kernels, real_form
-from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real
+from suboctave.harmonic import real_form
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.bends import bends_of
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
 from suboctave.harmonic.third import Multilinear
 
 
-def cubic_coefficient(state: BalanceState, phi: Array, psi: Array, by_motion: Array, factor: Factor) -> float:
+def cubic_coefficient(
+    state: BalanceState, phi: Array, psi: Array, by_motion: Array, solve: Callable[[Array], Array]
+) -> float:
     """c3 of a period doubling.
 
     Parameters
@@ -30,36 +33,25 @@ def cubic_coefficient(state: BalanceState, phi: Array, psi: Array, by_motion: Ar
         Right and left null vectors of J_half, in the coefficients' own units.
     by_motion
         Gradient of `psi.J_half phi` by the motion, shape (2 H + 1, size).
-    factor
-        Factors of J_0.
+    solve
+        Solves with J_0.
     """
     moving = any(e.depends_on_velocity for e in state.balance.elements)
     if state.nodal or moving or state.compliance is not None:
         own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
-        return own.cubic(factor.solve(-0.5 * own.squared()))[0]
+        return own.cubic(solve(-0.5 * own.squared()))[0]
     size = state.balance.size
     right, left = (_waves(v.reshape(-1, size)) for v in (phi, psi))
     second = np.zeros_like(state.x)
     third = 0.0
     for bend in bends_of(state):
-        along = np.ascontiguousarray(np.stack((right @ bend.out, 2.0 * (left @ bend.out))))
-        zr, zi, weights = bend.second
-        if len(zr):
-            p = _values(along[:1], zr, zi)[0]
-            spectrum = kernels.spectra((weights[0, 0] * p * p)[None], zr, zi, state.basis.harmonics)[0]
-            second += np.multiply.outer(spectrum_to_real(spectrum[:, None], state.basis.harmonics)[:, 0], bend.out)
-        for part in bend.third:
-            if not len(part.zr):
-                continue
-            p, q = _values(along, part.zr, part.zi)
-            square = p * p
-            total = float((part.weights[0, 0, 0] * square) @ (p * q))
-            if part.slopes is not None:
-                k = 1j * (np.arange(along.shape[1]) + 0.5)
-                dp, dq = _values(np.ascontiguousarray(k * along), part.zr, part.zi)
-                total += float((part.slopes[0, 0, 0] * square) @ (3.0 * dp * q + p * dq))
-            third += total / (2.0 * np.pi)
-    bent = factor.solve(-0.5 * second.ravel())
+        along = np.stack((right @ bend.out, 2.0 * (left @ bend.out)))
+        found = np.zeros(len(state.x) + 1)
+        for part in bend.parts:
+            real_form.add_doubled_form(along, *part, found)
+        second += np.multiply.outer(found[:-1], bend.out)
+        third += float(found[-1])
+    bent = solve(-0.5 * second.ravel())
     return float(by_motion.ravel() @ bent) + third / 6.0
 
 
@@ -67,9 +59,3 @@ def _waves(vector: Array) -> ComplexArray:
     """Amplitudes of `Re sum_k c_k exp(i (k + 1/2) tau)`, shape (H + 1, size)."""
     waves: ComplexArray = vector[::2] - 1j * vector[1::2]
     return waves
-
-
-def _values(waves: ComplexArray, zr: Array, zi: Array) -> Array:
-    """These functions at instants, up to a sign that all of them share."""
-    result: Array = real_form.half_odd_values(waves, zr, zi)
-    return result

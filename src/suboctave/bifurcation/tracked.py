@@ -9,6 +9,18 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 
 #: kinds of bifurcation that can be followed in two parameters
 TRACKED_KINDS = ("LP", "BP", "PD", "NS", "grazing")
+#: kinds of the curves that pass through points of codimension two, or begin there
+CURVES_THROUGH = {
+    "GPD": ("PD", "LP"),
+    "R1": ("LP", "NS"),
+    "R2": ("PD", "NS"),
+    "LPPD": ("LP", "PD"),
+    "LPNS": ("LP", "NS"),
+    "PDNS": ("PD", "NS"),
+    "NSNS": ("NS",),
+}
+#: multipliers at ends of curves that are found on others
+_AT_ENDS = {"R1": 1.0, "R2": -1.0, "GPD": -1.0}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -18,7 +30,8 @@ class TrackedEvent(Bifurcation):
     Besides what a `Bifurcation` has (`null_vectors` and `kappa` are those of the tracked kind):
 
     curve
-        Kind of the bifurcations that the curve consists of.
+        Kind of the bifurcations that the curve consists of; where one ends in a point of another (R1, R2, GPD) the null
+        vectors are those of the other.
     names
         The two free parameters.
     extreme
@@ -55,7 +68,7 @@ class TrackedEvent(Bifurcation):
     def critical_multiplier(self) -> complex:
         """The multiplier on the unit circle that the curve's bifurcations have."""
         targets = {"LP": 1.0, "BP": 1.0, "PD": -1.0, "NS": cmath.exp(1j * self.kappa * self.orbit.period)}
-        target = targets.get(self.curve)
+        target = _AT_ENDS.get(self.kind, targets.get(self.curve))
         if target is None:
             return complex(self.multipliers[0])
         return complex(min(self.multipliers, key=lambda m: abs(m - target)))
@@ -74,4 +87,4 @@ class TrackedEvent(Bifurcation):
         return "; ".join(words)
 
 
-__all__ = ["TRACKED_KINDS", "TrackedEvent"]
+__all__ = ["CURVES_THROUGH", "TRACKED_KINDS", "TrackedEvent"]

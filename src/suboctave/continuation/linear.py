@@ -71,3 +71,35 @@ class Factor:
         """Natural logarithm of the determinant's modulus."""
         with np.errstate(divide="ignore"):
             return float(np.log(np.abs(self.lu.diagonal())).sum())
+
+
+class LeadingBlock:
+    """Solves with the leading block of a real matrix from the factors of the whole: `size` rows and columns of it, all
+    perhaps.
+
+    With the last columns of the inverse, `[V; C]`, and `z` the solution for a right-hand side filled with zeros, the
+    block's is `z - V C^-1 z_last`; its determinant is that of the whole times det C.
+    """
+
+    def __init__(self, whole: Factor, size: int) -> None:
+        self.whole = whole
+        self.size = size
+        last = np.zeros((len(whole.lu), len(whole.lu) - size), order="F")
+        last[size:] = np.eye(len(whole.lu) - size)
+        self.columns = whole.solve(last)
+        self.corner = Factor.of(self.columns[size:]) if len(whole.lu) > size else None
+
+    @property
+    def sign(self) -> float:
+        """Sign of the block's determinant; 0 if it is singular."""
+        return self.whole.sign * (1.0 if self.corner is None else self.corner.sign)
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve with the block."""
+        if self.corner is None:
+            return self.whole.solve(rhs)
+        filled = np.zeros(len(self.whole.lu))
+        filled[: self.size] = rhs
+        z = self.whole.solve(filled)
+        result: Array = z[: self.size] - self.columns[: self.size] @ self.corner.solve(z[self.size :])
+        return result

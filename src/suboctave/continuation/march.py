@@ -15,13 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation import kernels
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
 
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
+#: points from which on a march watches whether it goes round and round without passing its start
+_LONG = 256
+#: share of a step over which derivatives count as the same
+_SPARED = 5e-6
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,9 @@ class SteppingOptions:
 
 @dataclass(eq=False, slots=True)
 class CurvePoint:
-    """A point of a curve with its tangent (in u, unit length in scaled arclength)."""
+    """A point of a curve with its tangent (in u, unit length in scaled arclength); `factor` as in `Solved`, while the
+    point is new.
+    """
 
     curve: Curve
     u: Array
@@ -71,11 +77,46 @@ class CurvePoint:
     orientation: float
     arclength: float
     iterations: int
+    factor: Factor | None = None
 
     @property
     def parameter(self) -> float:
         """Value of the curve's free parameter."""
         return float(self.u[self.curve.parameter])
+
+
+class _Place:
+    """A point of a curve that a march may come back to."""
+
+    def __init__(self, point: CurvePoint) -> None:
+        self.point = point
+        #: its images in the discretisation of the last point
+        self._images: tuple[Curve, list[Array]] | None = None
+
+    def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """It again, if the step from `point` to `new` passes it in the same direction."""
+        w, own = new.weights, self.point
+        step = kernels.distance(new.u, point.u, w)
+        index = new.curve.parameter
+        if self._images is None or self._images[0] is not new.curve:
+            self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
+        images = self._images[1]
+        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
+            return None
+        heading = new.curve.transfer(own.tangent, own.curve)
+        for image, leaving in zip(images, new.curve.images(heading), strict=True):
+            from_point, to_new = w * (image - point.u), w * (new.u - image)
+            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
+                continue
+            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
+            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
+            if not (ahead and same_way):
+                continue
+            fraction = length(from_point) / (length(from_point) + length(to_new))
+            miss = length(w * (between(point, new, fraction) - image))
+            if miss < 0.05 * step + 1e-6:
+                return replace(own, arclength=point.arclength + length(from_point))
+        return None
 
 
 @dataclass(frozen=True)
@@ -94,7 +135,9 @@ def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: flo
     sign = solved.factor.sign
     if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:
         t, sign = -t, -sign
-    return CurvePoint(curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations)
+    return CurvePoint(
+        curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations, solved.factor
+    )
 
 
 def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
@@ -163,14 +206,14 @@ class March:
         self.closed = False
         self.ended = "not started"
         self._direction = direction
-        #: the start and its images in the discretisation of the last point
-        self._images: tuple[Curve, list[Array]] | None = None
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Points in order, the start first."""
         options = self.stepping
         point = self._set_out()
-        first = point
+        home = _Place(point)
+        mark: _Place | None = None
+        marked = 0
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
@@ -199,10 +242,16 @@ class March:
                 return
             largest = max(largest, new.curve.size(new.u))
             end = self._bound_passed(point, new)
-            back = None if count < 3 else self._returns(first, point, new)
+            back = None if count < 3 else home.passed(point, new)
             if back is not None:
                 self.closed, self.ended = True, "the curve closed on itself"
                 yield back
+                return
+            if mark is not None and count > marked + 3 and mark.passed(point, new) is not None:
+                self.ended = (
+                    f"came back to {new.curve.where(new.u)} without having passed its start: where two branches nearly "
+                    "touch it went over to another one. Try a smaller max_step"
+                )
                 return
             if end is not None:
                 landed = self._land(point, new, end)
@@ -216,6 +265,8 @@ class March:
                 return
             yield new
             count += 1
+            if count >= _LONG and count & (count - 1) == 0:
+                mark, marked = _Place(new), count
             step = self._next_step(point, new, new.arclength - point.arclength, deviation)
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
@@ -252,7 +303,8 @@ class March:
             try:
                 guess = np.empty(len(point.u))
                 kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
-                solved = correct(point.curve, guess, point.weights * point.tangent, point.weights, self.newton)
+                row = point.weights * point.tangent
+                solved = correct(point.curve, guess, row, point.weights, self.newton, spare=_SPARED * step)
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
@@ -338,28 +390,3 @@ class March:
         u[index] = bound
         arclength = point.arclength + length(new.weights * (u - point.u))
         return make_point(solved, new.curve, new.tangent, arclength)
-
-    def _returns(self, first: CurvePoint, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
-        """The start point again, if the step from `point` to `new` passes it in the same direction."""
-        w = new.weights
-        step = kernels.distance(new.u, point.u, w)
-        index = new.curve.parameter
-        if self._images is None or self._images[0] is not new.curve:
-            self._images = (new.curve, new.curve.images(new.curve.transfer(first.u, first.curve)))
-        images = self._images[1]
-        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
-            return None
-        heading = new.curve.transfer(first.tangent, first.curve)
-        for image, leaving in zip(images, new.curve.images(heading), strict=True):
-            from_point, to_new = w * (image - point.u), w * (new.u - image)
-            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
-                continue
-            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
-            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
-            if not (ahead and same_way):
-                continue
-            fraction = length(from_point) / (length(from_point) + length(to_new))
-            miss = length(w * (between(point, new, fraction) - image))
-            if miss < 0.05 * step + 1e-6:
-                return replace(first, arclength=point.arclength + length(from_point))
-        return None

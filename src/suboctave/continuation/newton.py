@@ -8,6 +8,7 @@ point.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,13 +69,32 @@ def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
     return Factor.of(filled(row, weights).T, overwrite=True)
 
 
-def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: NewtonOptions) -> Solved:
+def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
+    take: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
+    return take is not None and take(other)
+
+
+def correct(
+    curve: Curve,
+    guess: Array,
+    row: Array,
+    weights: Array,
+    options: NewtonOptions,
+    known: Factor | None = None,
+    spare: float = 0.0,
+) -> Solved:
     """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
 
     Parameters
     ----------
     row
         Scaled row, shape (N + 1,): the unit tangent in scaled variables, or a unit vector to keep a parameter.
+    known
+        Factors of a point close by with the same row and weights: for a first correction, which is then made however
+        good the guess is.
+    spare
+        Way in scaled arclength within which the derivatives of an iterate count as those of the point, if the
+        evaluation can keep them.
 
     Raises
     ------
@@ -82,10 +102,12 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
         If the iterations do not contract or run out.
     """
     u = guess.copy()
+    last: Evaluation | None = None
+    way = before = 0.0
     previous = np.inf
     contraction = 0.0
     first = 0.0
-    factor: Factor | None = None
+    factor = known
     for iteration in range(options.iterations + 1):
         evaluation = curve.evaluate(u)
         error = evaluation.error
@@ -93,19 +115,26 @@ def correct(curve: Curve, guess: Array, row: Array, weights: Array, options: New
             raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
         # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
         settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
-        if error <= options.tolerance and (settled or iteration == 0):
+        if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             distance = kernels.distance(u, guess, weights)
-            return Solved(u, evaluation, weights, bordered(evaluation, row, weights), iteration, distance, contraction)
+            if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
+                factor = bordered(evaluation, row, weights)
+            return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
         if iteration == options.iterations:
             break
-        # after a short step that contracts, the old factors take the next one as far
-        if factor is None or previous > _SHORT or contraction > 0.1:
+        # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
+        # ones are those of the point as well
+        stale = previous > _SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
+        if factor is None or (iteration > 0 and stale):
             factor = bordered(evaluation, row, weights)
+            last, way = evaluation, 0.0
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
+        before = error
         step = factor.solve(kernels.right_hand_side(evaluation.residual, row, weights, u, guess))
         share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
         u, size = kernels.moved(u, step, weights, share)
+        way += share * size
         if iteration == 0:
             first = size
         else:

@@ -19,7 +19,8 @@ class Evaluation(Protocol):
     """The equations at one u.
 
     It may have a method `bordered_transposed(row, weights)` too, for the transpose of `[jacobian / weights; row]` at
-    once.
+    once; and a method `takes_over(other)` that has it keep the derivatives of another evaluation a rounding away, if it
+    can, and says so.
     """
 
     @property

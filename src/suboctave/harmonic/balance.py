@@ -97,7 +97,9 @@ class HarmonicBalance:
         self._load_order = sorted(self.load_names)
         #: whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X
         self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
-        self._coefficients: tuple[tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None = None
+        self._coefficients: (
+            tuple[Mapping[str, float], tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None
+        ) = None
         self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
         self._row_weights: dict[int, Array] = {}
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
@@ -116,15 +118,17 @@ class HarmonicBalance:
 
     def with_samples(self, samples: tuple[int | None, ...]) -> HarmonicBalance:
         """The same equations with other frozen sample counts."""
-        if samples == self.samples:
-            return self
-        return HarmonicBalance(self.system, self.basis, self.values, self.linear, samples)
+        return self if samples == self.samples else self._like(self.basis, samples)
 
     def with_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         """The same equations in another basis."""
-        if basis == self.basis:
-            return self
-        return HarmonicBalance(self.system, basis, self.values, self.linear, self.samples)
+        return self if basis == self.basis else self._like(basis, self.samples)
+
+    def _like(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> HarmonicBalance:
+        other = HarmonicBalance(self.system, basis, self.values, self.linear, samples)
+        # the same mapping, so that a motion's values are known to be its own, with what the laws are there
+        other.values, other._own_coefficients = self.values, self._own_coefficients
+        return other
 
     @lazy
     def completed(self) -> HarmonicBalance:
@@ -206,10 +210,13 @@ class HarmonicBalance:
         """Coefficient values of every element, what it tells of its law at them, and that sorted by groups."""
         if values is self.values:
             return self._own_coefficients
+        known = self._coefficients
+        if known is not None and known[0] is values:
+            return known[2]
         key = tuple(values[name] for name in self._coefficient_names)
-        if self._coefficients is None or self._coefficients[0] != key:
-            self._coefficients = (key, self._sorted_coefficients(values))
-        return self._coefficients[1]
+        found = known[2] if known is not None and known[1] == key else self._sorted_coefficients(values)
+        self._coefficients = (values, key, found)
+        return found
 
     def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
         numbers = [e.coefficient_values(values) for e in self.system.elements]

@@ -21,12 +21,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.harmonic import group_kernels, kernels
+from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.closed_bends import ClosedBends
 from suboctave.harmonic.group_force import GroupLaw, uniform_count
 from suboctave.harmonic.nodal import NodalForce
 from suboctave.harmonic.nodal_third import nodal_third
-from suboctave.harmonic.quadrature import Nodes, even, graded_motion, search_grid, uniform_nodes
+from suboctave.harmonic.quadrature import Nodes, graded_motion, uniform_nodes
 from suboctave.harmonic.state import BalanceState
 from suboctave.harmonic.third_weights import Third
 from suboctave.lazy import lazy
@@ -54,13 +55,29 @@ class Bends:
         uv, vv = (np.zeros_like(own.uu) if w is None else w for w in (own.uv, own.vv))
         return own.zr, own.zi, np.array([[own.uu, uv], [uv, vv]])
 
+    @property
+    def parts(self) -> list[ClosedBends]:
+        """Both of a force along one direction that reads no rates."""
+        assert not isinstance(self.source, NodalForce)
+        law, index = self.source
+        if law.in_closed_form:
+            return self.state.closed_bends[index]
+        zr, zi, second = self.second
+        none, no_slope = np.zeros_like(zr), np.zeros(0)
+        found = [ClosedBends(zr, zi, second[0, 0], none, no_slope)]
+        for part in self.third:
+            slope = no_slope if part.slopes is None else part.slopes[0, 0, 0]
+            found.append(ClosedBends(part.zr, part.zi, np.zeros_like(part.zr), part.weights[0, 0, 0], slope))
+        return found
+
     @lazy
     def third(self) -> list[Third]:
         """Instants with their weights W and V."""
         if isinstance(self.source, NodalForce):
             return nodal_third(self.source)
         law, index = self.source
-        return list(_group_third(self.state, law, self.state.motions[index], self.moving))
+        closed = self.state.closed_bends[index]
+        return list(_group_third(self.state, law, closed, self.state.motions[index], self.moving))
 
 
 def bends_of(state: BalanceState) -> list[Bends]:
@@ -74,25 +91,12 @@ def bends_of(state: BalanceState) -> list[Bends]:
     return found + [Bends(state, n.own.out, n.own.ins, n.own.moving, n) for n in state.nodal]
 
 
-def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, moving: bool) -> Iterator[Third]:
+def _group_third(
+    state: BalanceState, law: GroupLaw, closed: list[ClosedBends], motion: ComplexArray, moving: bool
+) -> Iterator[Third]:
     balance, high, top = state.balance, motion.shape[0] - 1, state.balance.top
-    if law.pieces.shape[0]:
-        grid = search_grid(high)
-        comb, count = group_kernels.contact_comb(motion, law.pieces, grid.zr, grid.zi)
-        zr, zi, weight = np.ascontiguousarray(comb[:, :count])
-        slope, bend = _rates(motion, zr, zi)
-        yield _in_displacement(zr, zi, weight * bend / slope**2, -weight / slope, moving)
-    if law.polynomial.shape[0] > 3:
-        nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
-        u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
-        third = np.zeros_like(u)
-        for p in range(len(law.polynomial) - 1, 2, -1):
-            third = third * u + p * (p - 1) * (p - 2) * law.polynomial[p]
-        yield _in_displacement(nodes.zr, nodes.zi, nodes.weights * third, None, moving)
-    if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
-        third = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[1]
-        yield _in_displacement(sampled[0], sampled[1], third, None, moving)
+    for part in closed:
+        yield _in_displacement(part, moving)
     for members, points, widths in (
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),
@@ -120,21 +124,13 @@ def _group_third(state: BalanceState, law: GroupLaw, motion: ComplexArray, movin
         yield Third(nodes.zr, nodes.zi, weights, None)
 
 
-def _rates(motion: ComplexArray, zr: Array, zi: Array) -> tuple[Array, Array]:
-    """First and second derivative by tau at crossings; the first kept from zero where the motion only touches."""
-    k = 1j * np.arange(len(motion))
-    slope, bend = kernels.motion(np.ascontiguousarray(k * motion), zr, zi)
-    least = 1e-12 * float(np.abs(motion).max(initial=0.0))
-    return np.where(np.abs(slope) < least, least, slope), bend
-
-
-def _in_displacement(zr: Array, zi: Array, plain: Array, slope: Array | None, moving: bool) -> Third:
+def _in_displacement(part: ClosedBends, moving: bool) -> Third:
     """Weights of a law that has f_uuu only."""
-    shape = (2, 2, 2, len(zr)) if moving else (1, 1, 1, len(zr))
+    shape = (2, 2, 2, len(part.zr)) if moving else (1, 1, 1, len(part.zr))
     weights = np.zeros(shape)
-    weights[0, 0, 0] = plain
-    if slope is None:
-        return Third(zr, zi, weights, None)
+    weights[0, 0, 0] = part.third
+    if not part.slope.size:
+        return Third(part.zr, part.zi, weights, None)
     slopes = np.zeros(shape)
-    slopes[0, 0, 0] = slope
-    return Third(zr, zi, weights, slopes)
+    slopes[0, 0, 0] = part.slope
+    return Third(part.zr, part.zi, weights, slopes)

@@ -48,11 +48,13 @@ def _changes(state: BalanceState, name: str) -> list[tuple[Group, CoefficientCha
 
 
 def _of_told(state: BalanceState, law: GroupLaw, motion: ComplexArray, rates: dict[int, Array]) -> CoefficientChange:
-    zr, zi, weights, u, slope = graded_motion(motion, *law.told_places, state.balance.top)
+    zr, zi, weights, u = graded_motion(motion, *law.told_places, state.balance.top, moving=False)
+    # these laws do not ask for the velocity
+    still = np.zeros_like(u)
     rows = np.zeros((2, len(u)))
     for i, c in law.told:
         if i in rates:
-            force, stiffness, _ = state.balance.elements[i].coefficient_tangent(u, state.rate * slope, c)
+            force, stiffness, _ = state.balance.elements[i].coefficient_tangent(u, still, c)
             rows[0] += rates[i] @ force
             rows[1] += rates[i] @ stiffness
     rows *= weights

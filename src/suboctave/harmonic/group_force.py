@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from suboctave.errors import InputError
 from suboctave.harmonic import group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.closed_bends import ClosedBends
 from suboctave.harmonic.local_force import Curvature
 from suboctave.harmonic.quadrature import (
     FEWEST,
@@ -24,7 +25,6 @@ from suboctave.harmonic.quadrature import (
     even,
     graded_motion,
     on_circle,
-    search_grid,
     singularities,
     uniform_nodes,
 )
@@ -83,6 +83,11 @@ class GroupLaw:
     told: tuple[tuple[int, Array], ...]
     degree: int
     levels: tuple[tuple[int, int, float], ...] = ()
+
+    @property
+    def in_closed_form(self) -> bool:
+        """Whether no law needs to be asked at nodes."""
+        return not (self.sharp or self.uniform)
 
     @cached_property
     def told_places(self) -> tuple[Array, Array]:
@@ -222,7 +227,7 @@ def add_sampled_spectra(
     """
     top, high = out[0].shape[0] - 1, motion.shape[0] - 1
     if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
+        sampled = graded_motion(motion, *law.told_places, top, moving=False)
         group_kernels.add_smooth_steps(sampled, law.smooth_steps, law.line, out[0], out[1])
     if law.sharp:
         zr, zi, w, u, v = graded_motion(motion, law.points, law.widths, top)
@@ -263,31 +268,19 @@ def _add_sampled(
 
 def curvature_of(
     law: GroupLaw,
+    closed: list[ClosedBends],
     elements: tuple[Element, ...],
     samples: tuple[int | None, ...],
     motion: ComplexArray,
     rate: float,
     top: int,
 ) -> Curvature:
-    """Second derivatives of a group's force, as weights at instants: see `local_force.Curvature`."""
+    """Second derivatives of a group's force, as weights at instants: see `local_force.Curvature`.
+
+    `closed`: those of its laws that are known in closed form.
+    """
     high = motion.shape[0] - 1
-    parts: list[Curvature] = []
-    if law.pieces.shape[0]:
-        grid = search_grid(high)
-        comb, count = group_kernels.contact_comb(motion, law.pieces, grid.zr, grid.zi)
-        zr, zi, weight = np.ascontiguousarray(comb[:, :count])
-        parts.append(Curvature(zr, zi, weight, None, None))
-    if law.polynomial.shape[0] > 2:
-        nodes = uniform_nodes(even((law.polynomial.shape[0] - 1) * high + top + 1))
-        u = kernels.motion(motion, nodes.zr, nodes.zi)[0]
-        bend = np.zeros_like(u)
-        for p in range(len(law.polynomial) - 1, 1, -1):
-            bend = bend * u + p * (p - 1) * law.polynomial[p]
-        parts.append(Curvature(nodes.zr, nodes.zi, nodes.weights * bend, None, None))
-    if law.told:
-        sampled = graded_motion(motion, *law.told_places, top)
-        bend = group_kernels.bends_of_smooth_steps(sampled, law.smooth_steps)[0]
-        parts.append(Curvature(sampled[0], sampled[1], bend, None, None))
+    parts = [Curvature(part.zr, part.zi, part.second, None, None) for part in closed]
     for members, points, widths in (
         (law.sharp, law.points, law.widths),
         (law.uniform, None, None),

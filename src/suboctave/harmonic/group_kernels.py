@@ -12,8 +12,8 @@ import numpy as np
 
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.arctangent import add_step
-from suboctave.harmonic.instants import _jet, crossings_of
-from suboctave.harmonic.kernels import _FAST, contact_spectrum, motion, product_spectrum, spectra
+from suboctave.harmonic.instants import crossings_of
+from suboctave.harmonic.kernels import _FAST, contact_spectrum, displacement, motion, product_spectrum
 
 
 @kernel()
@@ -59,20 +59,49 @@ def add_polynomial(c, polynomial, zr, zi, force, stiffness):
     z: equidistant points on the circle, enough for the tangent.
     """
     n = zr.shape[0]
-    values = motion(c, zr, zi)
-    law = np.empty((2, n))
-    scale = 2.0 * math.pi / n
+    u, f, slope, weights = np.empty(n), np.zeros(n), np.zeros(n), np.full(n, 2.0 * math.pi / n)
+    displacement(c, zr, zi, u)
+    for p in range(polynomial.shape[0] - 1, -1, -1):
+        for j in range(n):
+            slope[j] = slope[j] * u[j] + f[j]
+            f[j] = f[j] * u[j] + polynomial[p]
+    add_pair(f, slope, weights, zr, zi, force, stiffness)
+
+
+@kernel(patience=QUICK, fastmath=_FAST)
+def add_pair(f, f_u, weights, zr, zi, force, stiffness):
+    """Add `1/(2 pi) sum_j weights_j g_j z_j^-q`, q = 0 .. top, of the sampled f and f_u to the spectra of force and
+    stiffness, in place.
+    """
+    n = zr.shape[0]
+    scale = 1.0 / (2.0 * math.pi)
+    pr, pi = np.empty(n), np.empty(n)
     for j in range(n):
-        f, slope = 0.0, 0.0
-        for p in range(polynomial.shape[0] - 1, -1, -1):
-            slope = slope * values[0, j] + f
-            f = f * values[0, j] + polynomial[p]
-        law[0, j] = f * scale
-        law[1, j] = slope * scale
-    found = spectra(law, zr, zi, force.shape[0] - 1)
-    for q in range(force.shape[0]):
-        force[q] += found[0, q]
-        stiffness[q] += found[1, q]
+        pr[j] = weights[j] * scale
+        pi[j] = 0.0
+    # two harmonics at a time: the arrays are read once for both
+    for q in range(0, force.shape[0], 2):
+        fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
+        gr, gi, tr, ti = 0.0, 0.0, 0.0, 0.0
+        for j in range(n):
+            a, b, c, d = pr[j], pi[j], zr[j], zi[j]
+            fr += f[j] * a
+            fi += f[j] * b
+            sr += f_u[j] * a
+            si += f_u[j] * b
+            e = a * c - b * d
+            b = a * d + b * c
+            gr += f[j] * e
+            gi += f[j] * b
+            tr += f_u[j] * e
+            ti += f_u[j] * b
+            pr[j] = e * c - b * d
+            pi[j] = e * d + b * c
+        force[q] += complex(fr, -fi)
+        stiffness[q] += complex(sr, -si)
+        if q + 1 < force.shape[0]:
+            force[q + 1] += complex(gr, -gi)
+            stiffness[q + 1] += complex(tr, -ti)
 
 
 @kernel(fastmath=_FAST)
@@ -106,29 +135,11 @@ def add_projected(f, f_u, f_v, weights, zr, zi, force, stiffness, damping):
             pr[j] = t
 
 
-@kernel()
-def bends_of_smooth_steps(sampled, steps):
-    """Second and third derivatives of arctan steps by the displacement, times the nodes' weights, (2, N); arguments as
-    in `add_smooth_steps`.
-    """
-    n = sampled.shape[1]
-    out = np.zeros((2, n))
-    for s in range(steps.shape[0]):
-        point, sharpness = steps[s, 0], 1.0 / steps[s, 1]
-        scale = steps[s, 2] * sharpness / math.pi
-        for j in range(n):
-            ratio = (sampled[3, j] - point) * sharpness
-            share = 1.0 / (1.0 + ratio * ratio)
-            out[0, j] += sampled[2, j] * scale * share
-            out[1, j] -= 2.0 * sampled[2, j] * scale * sharpness * ratio * share * share
-    return out
-
-
 @kernel(patience=QUICK, fastmath=_FAST)
 def add_smooth_steps(sampled, steps, line, force, stiffness):
     """Add the Fourier coefficients of arctan steps of the stiffness (`model.sampling.SharpSampling`), in place.
 
-    sampled: what `sharp_nodes` gives, (5, N); steps: point, width, step, (S, 3); line: constant and slope.
+    sampled: what `sharp_nodes` gives, (4, N); steps: point, width, step, (S, 3); line: constant and slope.
     """
     n = sampled.shape[1]
     zr, zi, weights, u = sampled[0], sampled[1], sampled[2], sampled[3]
@@ -139,58 +150,7 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
         f_u[j] = line[1]
     for s in range(steps.shape[0]):
         add_step(u, steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, f, f_u)
-    scale = 1.0 / (2.0 * math.pi)
-    pr = np.empty(n)
-    pi = np.empty(n)
-    for j in range(n):
-        pr[j] = weights[j] * scale
-        pi[j] = 0.0
-    # two harmonics at a time: the arrays are read once for both
-    for q in range(0, force.shape[0], 2):
-        fr, fi, sr, si = 0.0, 0.0, 0.0, 0.0
-        gr, gi, tr, ti = 0.0, 0.0, 0.0, 0.0
-        for j in range(n):
-            a, b, c, d = pr[j], pi[j], zr[j], zi[j]
-            fr += f[j] * a
-            fi += f[j] * b
-            sr += f_u[j] * a
-            si += f_u[j] * b
-            e = a * c - b * d
-            b = a * d + b * c
-            gr += f[j] * e
-            gi += f[j] * b
-            tr += f_u[j] * e
-            ti += f_u[j] * b
-            pr[j] = e * c - b * d
-            pi[j] = e * d + b * c
-        force[q] += complex(fr, -fi)
-        stiffness[q] += complex(sr, -si)
-        if q + 1 < force.shape[0]:
-            force[q + 1] += complex(gr, -gi)
-            stiffness[q + 1] += complex(tr, -ti)
-
-
-@kernel()
-def contact_comb(c, pieces, grid_r, grid_i):
-    """Instants at which the gaps of piecewise-linear pieces are crossed: cosines, sines, and the weights of `f_uu`
-    there, `side stiffness / |u'|`, with |u'| kept from zero where the motion grazes; how many of the columns count.
-    """
-    values = motion(c, grid_r, grid_i)
-    largest = 1e-300
-    for h in range(c.shape[0]):
-        largest = max(largest, abs(c[h]))
-    out = np.empty((3, 4 * grid_r.shape[0] * max(1, pieces.shape[0])))
-    count = 0
-    for p in range(pieces.shape[0]):
-        found, _above = crossings_of(c, pieces[p, 1], values)
-        for i in range(found.shape[0]):
-            zr, zi = math.cos(found[i]), math.sin(found[i])
-            speed = abs(_jet(c, zr, zi)[1])
-            out[0, count] = zr
-            out[1, count] = zi
-            out[2, count] = pieces[p, 2] * pieces[p, 0] / max(speed, 1e-12 * largest)
-            count += 1
-    return out, count
+    add_pair(f, f_u, weights, zr, zi, force, stiffness)
 
 
 @kernel()
@@ -277,47 +237,51 @@ def tangent_matrix(out, stiffness, damping, moving, rate, mean, starts, dofs, sh
     """
     count = stiffness.shape[1] // 2
     first = 0 if mean else 1
+    # the mean has a cosine only: what follows it lies one place further to the left
+    shift = 1 - first
+    high = stiffness.shape[1] - 1
+    spectra = np.empty((4, 2 * high + 1))
+    lines = np.empty((2, count, 2))
     for g in range(stiffness.shape[0]):
-        begin, end = starts[g], starts[g + 1]
-        k = stiffness[g]
-        c = damping[g]
+        # of all orders -high .. high, and seen through views: no index has to be asked for its sign
+        for q in range(high + 1):
+            spectra[0, high + q] = spectra[0, high - q] = stiffness[g, q].real
+            spectra[1, high + q], spectra[1, high - q] = stiffness[g, q].imag, -stiffness[g, q].imag
+            spectra[2, high + q] = spectra[2, high - q] = damping[g, q].real
+            spectra[3, high + q], spectra[3, high - q] = damping[g, q].imag, -damping[g, q].imag
         for i in range(count):
-            row_mean = mean and i == 0
-            row = 0 if row_mean else (2 * i - 1 if mean else 2 * i)
+            # the orders j - i and i + j
+            low, top = spectra[:, high - i :], spectra[:, high + i + first :]
             for j in range(count):
-                col_mean = mean and j == 0
-                col = 0 if col_mean else (2 * j - 1 if mean else 2 * j)
-                total = i + j + first
-                gr = k[i - j].real if i >= j else k[j - i].real
-                gi = k[i - j].imag if i >= j else -k[j - i].imag
-                pr, pi = k[total].real, k[total].imag
+                gr, gi = low[0, j], -low[1, j]
+                pr, pi = top[0, j], top[1, j]
                 a = gr + pr
                 b = gi - pi
                 e = -gi - pi
                 d = gr - pr
                 if moving[g]:
                     w = (j + 0.5 * first) * rate
-                    gr = c[i - j].real if i >= j else c[j - i].real
-                    gi = c[i - j].imag if i >= j else -c[j - i].imag
-                    pr, pi = c[total].real, c[total].imag
+                    gr, gi = low[2, j], -low[3, j]
+                    pr, pi = top[2, j], top[3, j]
                     a -= w * (gi - pi)
                     b += w * (gr + pr)
                     e -= w * (gr - pr)
                     d += w * (-gi - pi)
-                if row_mean:
-                    a *= 0.5
-                    b *= 0.5
-                for s in range(begin, end):
-                    for t in range(begin, end):
-                        v = shape[s] * shape[t]
-                        r, q = row * n + dofs[s], col * n + dofs[t]
-                        out[r, q] += v * a
-                        if not col_mean:
-                            out[r, q + n] += v * b
-                        if not row_mean:
-                            out[r + n, q] += v * e
-                            if not col_mean:
-                                out[r + n, q + n] += v * d
+                lines[0, j, 0], lines[0, j, 1] = a, b
+                lines[1, j, 0], lines[1, j, 1] = e, d
+            # the row of the mean holds halves, and has no sine beside it
+            rows, half = (1, 0.5) if mean and i == 0 else (2, 1.0)
+            row = max(0, 2 * i - shift)
+            for s in range(starts[g], starts[g + 1]):
+                for t in range(starts[g], starts[g + 1]):
+                    v = half * shape[s] * shape[t]
+                    for part in range(rows):
+                        target, line = out[(row + part) * n + dofs[s], dofs[t] :], lines[part]
+                        if mean:
+                            target[0] += v * line[0, 0]
+                        for j in range(shift, count):
+                            target[(2 * j - shift) * n] += v * line[j, 0]
+                            target[(2 * j - shift + 1) * n] += v * line[j, 1]
 
 
 @kernel()

@@ -13,36 +13,54 @@ import numpy as np
 from suboctave.compiled import QUICK, kernel
 
 _FAST = {"reassoc", "contract", "nsz"}
+#: points that are dealt with together
+_STRETCH = 256
 
 
 @kernel(patience=QUICK, fastmath=_FAST)
+def displacement(c, zr, zi, out):
+    """Values of `Re sum_k c_k z^k` at the points z, into `out` (N,)."""
+    n, top = zr.shape[0], c.shape[0] - 1
+    imaginary = np.empty(_STRETCH)
+    # stretch by stretch, so that the nearest cache holds all of it
+    for begin in range(0, n, _STRETCH):
+        x, co, si = out[begin : begin + _STRETCH], zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH]
+        y = imaginary[: x.shape[0]]
+        a, b = c[top].real, c[top].imag
+        for j in range(x.shape[0]):
+            x[j] = a
+            y[j] = b
+        # two harmonics at a time: what is between them stays in registers
+        k = top - 1
+        while k > 0:
+            a, b, d, e = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
+            for j in range(x.shape[0]):
+                t = x[j] * co[j] - y[j] * si[j] + a
+                u = x[j] * si[j] + y[j] * co[j] + b
+                x[j] = t * co[j] - u * si[j] + d
+                y[j] = t * si[j] + u * co[j] + e
+            k -= 2
+        if k == 0:
+            a = c[0].real
+            for j in range(x.shape[0]):
+                x[j] = x[j] * co[j] - y[j] * si[j] + a
+
+
+@kernel()
+def slope(c, factor):
+    """Complex coefficients `factor i k c_k` of the derivative with respect to tau, times a factor."""
+    out = np.empty_like(c)
+    for k in range(c.shape[0]):
+        out[k] = complex(-factor * k * c[k].imag, factor * k * c[k].real)
+    return out
+
+
+@kernel(patience=QUICK)
 def motion(c, zr, zi):
     """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
-    n = zr.shape[0]
-    out = np.empty((2, n))
-    top = c.shape[0] - 1
-    pr = np.empty(n)
-    pi = np.empty(n)
-    dr = np.empty(n)
-    di = np.empty(n)
-    for j in range(n):
-        pr[j] = c[top].real
-        pi[j] = c[top].imag
-        dr[j] = top * c[top].real
-        di[j] = top * c[top].imag
-    for k in range(top - 1, -1, -1):
-        a = c[k].real
-        b = c[k].imag
-        for j in range(n):
-            t = pr[j] * zr[j] - pi[j] * zi[j] + a
-            pi[j] = pr[j] * zi[j] + pi[j] * zr[j] + b
-            pr[j] = t
-            t = dr[j] * zr[j] - di[j] * zi[j] + k * a
-            di[j] = dr[j] * zi[j] + di[j] * zr[j] + k * b
-            dr[j] = t
-    for j in range(n):
-        out[0, j] = pr[j]
-        out[1, j] = -di[j]
+    out = np.empty((2, zr.shape[0]))
+    displacement(c, zr, zi, out[0])
+    displacement(slope(c, 1.0), zr, zi, out[1])
     return out
 
 

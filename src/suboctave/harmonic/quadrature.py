@@ -37,7 +37,7 @@ FEWEST, _MOST = 32, 1 << 15
 _SETTLED = 1e-11
 #: how many sets of graded nodes are kept, and those
 _REMEMBERED = 8
-_recent: dict[tuple[bytes, bytes, bytes, int], Array] = {}
+_recent: dict[tuple[bytes, bytes, bytes, int, bool], Array] = {}
 
 
 @dataclass(frozen=True)
@@ -98,19 +98,20 @@ def nodes_for(kind: Sampling, motion: ComplexArray, top: int, samples: int | Non
 
 def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -> Nodes:
     """Nodes for laws that are singular at u = points +- i widths: see `sharp_nodes`."""
-    return Nodes(*graded_motion(motion, points, widths, top)[:3])
+    return Nodes(*graded_motion(motion, points, widths, top, moving=False)[:3])
 
 
-def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int) -> Array:
-    """These nodes with the motion there: cosines, sines, weights, values, derivatives by tau, (5, N); not to be
-    written to: forces, curvatures and what a parameter changes ask for the same ones one after the other.
+def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int, moving: bool = True) -> Array:
+    """These nodes with the motion there: cosines, sines, weights, values and, if `moving`, derivatives by tau, (5, N)
+    or (4, N); not to be written to: forces, curvatures and what a parameter changes ask for the same ones one after the
+    other.
     """
-    key = (motion.tobytes(), points.tobytes(), widths.tobytes(), top)
+    key = (motion.tobytes(), points.tobytes(), widths.tobytes(), top, moving)
     found = _recent.get(key)
     if found is None:
         high = motion.shape[0] - 1
         grid = search_grid(high)
-        found = graded.sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables())
+        found = graded.sharp_nodes(motion, points, widths, top + high, moving, grid.zr, grid.zi, *rule_tables())
         while len(_recent) >= _REMEMBERED:
             _recent.pop(next(iter(_recent)), None)
         _recent[key] = found

@@ -12,11 +12,13 @@ and the linear part depends on omega through its blocks alone. The general case 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array
+from suboctave.harmonic.group_force import Group
 from suboctave.harmonic.kernels import polynomial, spectra, toeplitz_form
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.state import BalanceState
@@ -79,6 +81,38 @@ def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
         for k in range(1, high + 1):
             gx[2 * k - 1, dofs[s]] += shape[s] * found[0, k].real
             gx[2 * k, dofs[s]] -= shape[s] * found[0, k].imag
+
+
+@kernel()
+def add_doubled_form(waves, zr, zi, second, third, slope, out):
+    """Add `<f_uu p p>` in the integer basis and `<f_uuu p p p q>` along a direction to `out` (2 H + 2,).
+
+    waves (2, H + 1): amplitudes of p and q, `Re sum_k c_k exp(i (k + 1/2) tau)`; the rest as in `closed_bends`.
+    """
+    high = waves.shape[1] - 1
+    n = zr.shape[0]
+    values = half_odd_values(waves, zr, zi)
+    square = np.empty((1, n))
+    total = 0.0
+    for j in range(n):
+        p = values[0, j]
+        square[0, j] = second[j] * p * p
+        total += third[j] * p * p * p * values[1, j]
+    if slope.shape[0] > 0:
+        turned = np.empty_like(waves)
+        for k in range(high + 1):
+            for r in range(2):
+                turned[r, k] = complex(-(k + 0.5) * waves[r, k].imag, (k + 0.5) * waves[r, k].real)
+        rates = half_odd_values(turned, zr, zi)
+        for j in range(n):
+            p, q = values[0, j], values[1, j]
+            total += slope[j] * p * p * (3.0 * rates[0, j] * q + p * rates[1, j])
+    found = spectra(square, zr, zi, high)
+    out[0] += found[0, 0].real
+    for k in range(1, high + 1):
+        out[2 * k - 1] += 2.0 * found[0, k].real
+        out[2 * k] -= 2.0 * found[0, k].imag
+    out[2 * high + 1] += total / (2.0 * math.pi)
 
 
 @kernel()
@@ -147,12 +181,31 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     u = np.ascontiguousarray(left).reshape(-1, balance.size)
     v = np.ascontiguousarray(right).reshape(-1, balance.size)
     gx = np.zeros((basis.size, balance.size))
-    for group, bend in zip(balance.groups, state.curvatures, strict=True):
-        if bend.zr.size:
-            _add_group(u, v, mean, group.dofs, group.values, bend.zr, bend.zi, bend.uu, gx)
+    for group, zr, zi, second in _second(state):
+        _add_group(u, v, mean, group.dofs, group.values, zr, zi, second, gx)
     multiples = basis.multiples if mean else basis.half_multiples
     by_omega, by_kappa = _linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
     return gx, by_omega, 1j * by_kappa
 
 
-__all__ = ["applies", "half_odd_values", "real_gradient", "toeplitz_part"]
+def _second(state: BalanceState) -> Iterator[tuple[Group, Array, Array, Array]]:
+    """Directions with instants and weights of f_uu: a direction's laws in closed form one by one."""
+    laws = state.balance.coefficients(state.values)[2]
+    for g, (group, law) in enumerate(zip(state.balance.groups, laws, strict=True)):
+        if law.in_closed_form:
+            for part in state.closed_bends[g]:
+                yield group, part.zr, part.zi, part.second
+        else:
+            bend = state.curvatures[g]
+            yield group, bend.zr, bend.zi, bend.uu
+
+
+def by_kappa(state: BalanceState, mean: bool, left: Array, right: Array) -> complex:
+    """The derivative of `left^T J right` by kappa alone."""
+    assert isinstance(state.linear, StructuralMatrices)
+    u, v = (np.ascontiguousarray(one).reshape(-1, state.balance.size) for one in (left, right))
+    multiples = state.basis.multiples if mean else state.basis.half_multiples
+    return 1j * float(_linear_rates(u, v, mean, multiples, state.omega, state.linear.matrices)[1])
+
+
+__all__ = ["add_doubled_form", "applies", "by_kappa", "half_odd_values", "real_gradient", "toeplitz_part"]

@@ -25,11 +25,14 @@ left out:
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from suboctave.compiled import kernel
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
@@ -172,8 +175,8 @@ def choose_harmonics(
 class _Parts:
     """The harmonics k = 0 .. 2 H + 1 of a basis by gcd(k, nu): nu for the mean and the harmonics of the load.
 
-    masks
-        Which belong to each divisor, (divisors, 2 H + 2), as 0 and 1.
+    owner
+        The place of each one's divisor among them, (2 H + 2,).
     ends
         Where each class ends: before the first of its harmonics that is missing.
     cut
@@ -181,7 +184,7 @@ class _Parts:
     """
 
     divisors: tuple[int, ...]
-    masks: Array
+    owner: NDArray[np.int64]
     ends: tuple[int, ...]
     cut: np.ndarray
 
@@ -191,12 +194,13 @@ def _parts_of(basis: HarmonicBasis) -> _Parts:
     nu, high = basis.nu, basis.harmonics
     divisor = np.gcd(np.arange(2 * high + 2), nu)
     divisors = tuple(d for d in range(1, nu + 1) if nu % d == 0)
-    masks = np.array([divisor == d for d in divisors])
+    owner = np.searchsorted(divisors, divisor)
+    masks = [owner == i for i in range(len(divisors))]
     missing = np.arange(2 * high + 2) > high
     missing[basis.left_out] = True
     ends = tuple(int(np.flatnonzero(missing & mask)[0]) - 1 for mask in masks)
     cut = np.array([mask[basis.left_out].any() for mask in masks])
-    return _Parts(divisors, masks.astype(float), ends, cut)
+    return _Parts(divisors, owner, ends, cut)
 
 
 @lru_cache(maxsize=256)
@@ -205,24 +209,51 @@ def _fine_rungs(nu: int, lowest: float, most: float) -> tuple[int, ...]:
     return tuple(r for r in rungs if lowest <= r <= most)
 
 
+@kernel()
+def _rests(x, beyond, weight, owner, rest):
+    """What each class of a motion's harmonics has from k on, k = 0 .. 2 H + 2, relative to the motion, into `rest`
+    (divisors, 2 H + 3); returns the motion's size.
+
+    x (2 H + 1, n): coefficients; beyond (H + 1, n): complex amplitudes from H + 1 on; weight (n,); owner: see `_Parts`.
+    """
+    rows, n = x.shape
+    high = rows // 2
+    squares = np.zeros(2 * high + 2)
+    for i in range(n):
+        w = weight[i] * weight[i]
+        squares[0] += w * x[0, i] * x[0, i]
+        for k in range(1, high + 1):
+            squares[k] += w * (x[2 * k - 1, i] * x[2 * k - 1, i] + x[2 * k, i] * x[2 * k, i])
+        for k in range(high + 1):
+            a, b = beyond[k, i].real, beyond[k, i].imag
+            squares[high + 1 + k] += w * (a * a + b * b)
+    size = 0.0
+    for k in range(high + 1):
+        size += squares[k]
+    scale = 1.0 / size if size > 0.0 else 1.0
+    for d in range(rest.shape[0]):
+        total = 0.0
+        rest[d, 2 * high + 2] = 0.0
+        for k in range(2 * high + 1, -1, -1):
+            if owner[k] == d:
+                total += squares[k] * scale
+            rest[d, k] = math.sqrt(total)
+    return math.sqrt(size)
+
+
 class _Classes:
     """The harmonics of a sub-harmonic motion by gcd(k, nu), with what is left of each class beyond every harmonic."""
 
     def __init__(self, state: BalanceState, options: AdaptiveHarmonics) -> None:
         self.basis = basis = state.basis
         nu, high = basis.nu, basis.harmonics
-        weighted = state.completed.x * state.balance.scales()[0]
-        squares = np.sum(weighted * weighted, axis=1)
-        squares = np.append(squares[0], squares[1::2] + squares[2::2])
         parts = _parts_of(basis)
         self.divisors, self.ends, self.cut = parts.divisors, parts.ends, parts.cut
-        self.size = math.sqrt(float(squares[: high + 1].sum()))
-        shares = squares / self.size**2 if self.size > 0.0 else squares
+        x = state.x if basis.kept is None else state.completed.x[: basis.size]
+        rest = np.empty((len(parts.divisors), 2 * high + 3))
+        self.size = _rests(x, state.neglected, state.balance.scales()[0], parts.owner, rest)
         #: size of each class, and of what it has beyond k, relative to the motion
-        each = parts.masks * shares
-        sums = np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
-        self.whole = np.sqrt(sums[:, 0])
-        self.beyond = np.sqrt(np.concatenate((sums[:, 1:], np.zeros((len(sums), 1))), axis=1))
+        self.whole, self.beyond = rest[:, 0], rest[:, 1:]
         lowest = max(options.minimum, state.balance.highest_load)
         most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
         self.rungs = _fine_rungs(nu, lowest * nu, most * nu) or (max(lowest * nu, high),)
@@ -235,15 +266,16 @@ class _Classes:
         if filling or self._lack(tolerance):
             wanted = self._needed(_AIM * tolerance)
             return self._with([max(pair) for pair in zip(wanted, self.ends, strict=True)], dropping)
-        if not dropping and np.linalg.norm(self.beyond[:, int(0.9 * self.basis.harmonics)]) > _AIM * tolerance:
+        close = int(0.9 * self.basis.harmonics)
+        if not dropping and math.hypot(*self.beyond[:, close].tolist()) > _AIM * tolerance:
             return self.basis
         fewer = self._with(self._needed(_AIM * tolerance), dropping)
         return fewer if fewer.count < 0.9 * self.basis.count else self.basis
 
     def _lack(self, tolerance: float) -> bool:
         """Whether the present harmonics are too few, in all or in a class that is cut short."""
-        lacking = np.array([b[end] for b, end in zip(self.beyond, self.ends, strict=True)])
-        if np.linalg.norm(lacking) > tolerance:
+        lacking = self.beyond[np.arange(len(self.ends)), self.ends]
+        if math.hypot(*lacking.tolist()) > tolerance:
             return True
         if self.basis.kept is None:
             return False
@@ -254,7 +286,7 @@ class _Classes:
         double, share = 2 * self.basis.harmonics, bound
         while True:
             least = [min(double, self._rung(int(np.argmax(b <= share)))) for b in self.beyond]
-            left = np.linalg.norm([b[end] for b, end in zip(self.beyond, least, strict=True)])
+            left = math.hypot(*[float(b[end]) for b, end in zip(self.beyond, least, strict=True)])
             if left <= bound or share < bound / math.sqrt(len(self.divisors)):
                 break
             share *= 0.9
@@ -281,7 +313,7 @@ class _Classes:
         return float(min(ages + [sizes[self.basis.nu] / max(sizes.values())]))
 
     def _rung(self, end: int) -> int:
-        return next((r for r in self.rungs if r >= end), self.rungs[-1])
+        return self.rungs[min(bisect_left(self.rungs, end), len(self.rungs) - 1)]
 
     def _with(self, ends: list[int], dropping: bool) -> HarmonicBasis:
         """The basis whose classes end there, those of the load not before the highest one that is loaded."""

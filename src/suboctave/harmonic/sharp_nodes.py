@@ -19,7 +19,7 @@ import numpy as np
 
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.instants import _jet
-from suboctave.harmonic.kernels import motion
+from suboctave.harmonic.kernels import displacement, slope
 
 #: nodes of the Gauss-Legendre rules in the tables, from 0 to this
 ORDERS = 64
@@ -42,37 +42,14 @@ def tables() -> tuple[np.ndarray, np.ndarray]:
     return nodes, weights
 
 
-@kernel(patience=QUICK, fastmath=_FAST)
+@kernel(patience=QUICK)
 def _jets(c, zr, zi):
     """Value, first and second derivative of the motion at the points z, shape (3, N)."""
-    n = zr.shape[0]
-    top = c.shape[0] - 1
-    out = np.empty((3, n))
-    p = np.empty((3, n))
-    x, xi, dr, di, sr, si = out[0], p[0], out[1], p[1], out[2], p[2]
-    for j in range(n):
-        x[j] = c[top].real
-        xi[j] = c[top].imag
-        dr[j] = top * c[top].real
-        di[j] = top * c[top].imag
-        sr[j] = top * top * c[top].real
-        si[j] = top * top * c[top].imag
-    for k in range(top - 1, -1, -1):
-        a = c[k].real
-        b = c[k].imag
-        for j in range(n):
-            t = x[j] * zr[j] - xi[j] * zi[j] + a
-            xi[j] = x[j] * zi[j] + xi[j] * zr[j] + b
-            x[j] = t
-            t = dr[j] * zr[j] - di[j] * zi[j] + k * a
-            di[j] = dr[j] * zi[j] + di[j] * zr[j] + k * b
-            dr[j] = t
-            t = sr[j] * zr[j] - si[j] * zi[j] + k * k * a
-            si[j] = sr[j] * zi[j] + si[j] * zr[j] + k * k * b
-            sr[j] = t
-    for j in range(n):
-        dr[j] = -di[j]
-        sr[j] = -sr[j]
+    out = np.empty((3, zr.shape[0]))
+    first = slope(c, 1.0)
+    displacement(c, zr, zi, out[0])
+    displacement(first, zr, zi, out[1])
+    displacement(slope(first, 1.0), zr, zi, out[2])
     return out
 
 
@@ -225,23 +202,23 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
 
 
 @kernel()
-def _with_motion(c, zr, zi, w):
+def _with_motion(c, zr, zi, w, moving):
     """The result of `sharp_nodes`: one array, since handing arrays over costs more than filling them."""
-    out = np.empty((5, zr.shape[0]))
-    values = motion(c, zr, zi)
+    out = np.empty((5 if moving else 4, zr.shape[0]))
     for j in range(zr.shape[0]):
         out[0, j] = zr[j]
         out[1, j] = zi[j]
         out[2, j] = w[j]
-        out[3, j] = values[0, j]
-        out[4, j] = values[1, j]
+    displacement(c, zr, zi, out[3])
+    if moving:
+        displacement(slope(c, 1.0), zr, zi, out[4])
     return out
 
 
 @kernel(patience=QUICK)
-def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
-    """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion and its derivative by
-    tau there; (5, N).
+def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
+    """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion there and, if `moving`,
+    its derivative by tau; (5, N) or (4, N).
 
     Parameters
     ----------
@@ -302,4 +279,4 @@ def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
                 offset,
             )
             done += piece
-    return _with_motion(c, out_r[:count], out_i[:count], w[:count])
+    return _with_motion(c, out_r[:count], out_i[:count], w[:count], moving)

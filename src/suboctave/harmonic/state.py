@@ -16,6 +16,7 @@ import numpy as np
 from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.changes import changes_by
+from suboctave.harmonic.closed_bends import ClosedBends, closed_bends
 from suboctave.harmonic.group_force import Group, curvature_of
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion
@@ -99,13 +100,19 @@ class BalanceState:
         return nodal_forces(balance.own, known, balance.samples, amplitudes, self.basis, self.omega, balance.top)
 
     @lazy
+    def closed_bends(self) -> list[list[ClosedBends]]:
+        """Second and third derivatives of every group's laws that are known in closed form."""
+        laws, top = self.balance.coefficients(self.values)[2], self.balance.top
+        return [closed_bends(law, motion, top) for law, motion in zip(laws, self.motions, strict=True)]
+
+    @lazy
     def curvatures(self) -> list[Curvature]:
         """Second derivatives of every group's force, as weights at instants."""
         balance = self.balance
         laws = balance.coefficients(self.values)[2]
         return [
-            curvature_of(law, balance.elements, balance.samples, motion, self.rate, balance.top)
-            for law, motion in zip(laws, self.motions, strict=True)
+            curvature_of(law, closed, balance.elements, balance.samples, motion, self.rate, balance.top)
+            for law, closed, motion in zip(laws, self.closed_bends, self.motions, strict=True)
         ]
 
     @lazy
@@ -206,7 +213,8 @@ class BalanceState:
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
-        if not isinstance(self.linear, StructuralMatrices) or self.basis.kept is not None:
+        known = "jacobian" in self.__dict__
+        if known or not isinstance(self.linear, StructuralMatrices) or self.basis.kept is not None:
             out = np.column_stack((self.jacobian, np.zeros(self.balance.dimension)))
             out[:, -1] = self.residual_by(name)
             return out

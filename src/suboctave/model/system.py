@@ -17,7 +17,7 @@ from suboctave.errors import InputError, suggest
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.element import Array, BaseElement
 from suboctave.model.expression import RESERVED, Coefficient
-from suboctave.model.loads import Load, LoadComponent
+from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
 from suboctave.model.mass_check import check_mass
 from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
 from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpVelocitySampling
@@ -139,6 +139,26 @@ class System:
         result = _assemble(*parts, {**self.parameters, **changed}, self.name, self.dof_names)
         result._check_values(changed)
         return result
+
+    def with_scaled_loads(self, name: str = "load_scale") -> System:
+        """The same system whose oscillating loads are multiplied by a new parameter, 1 to begin with.
+
+        Constant loads and parametric excitation by elements stay as they are. For sweeps of the level of excitation
+        where loads have no common parameter.
+        """
+        if name in self.parameters:
+            raise InputError(f"the system has a parameter {name!r} already: give the scale of the loads another name")
+        loads = [
+            HarmonicLoad(
+                amplitude=f"{_name(name)}*({c.amplitude.text})" if c.harmonic else c.amplitude.text,
+                harmonic=c.harmonic,
+                phase=c.phase.text,
+                direction=c.direction,
+            )
+            for c in self._components
+        ]
+        parts = (self.mass, self.damping, self.stiffness, self.elements, tuple(loads))
+        return _assemble(*parts, {**self.parameters, name: 1.0}, self.name, self.dof_names)
 
     def check_parameter(self, name: str) -> None:
         """Raise `InputError`, with a suggestion, if there is no parameter of this name."""

@@ -154,8 +154,11 @@ def plot_brute_force(
     if curves is not None:
         legend |= draw_response(axes, datasets_of(curves, view), x=name, view=view, look=look)
     draw = _amplitudes if quantity == "amplitude" else _sections
+    marks: dict[str, Any] = {}
     for start in shown:
-        legend |= draw(axes, diagram.isel(start=known.index(start)), start, dof, look)
+        marks |= draw(axes, diagram.isel(start=known.index(start)), start, dof, look)
+    # beside curves, whose periods have the same names, marks say that they were found in time
+    legend |= {f"{name}, in time" if curves is not None else name: mark for name, mark in marks.items()}
     several = diagram.attrs["dofs"] > 1
     symbol = f"x_{{{dof}}}" if several else "x"
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"

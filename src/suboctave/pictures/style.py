@@ -163,6 +163,9 @@ KINDS = {
     "R3": KindStyle("1:3 resonance", "p", "#56B4E9", MARKER_SIZE * 1.1),
     "R4": KindStyle("1:4 resonance", "8", "#56B4E9"),
     "LPPD": KindStyle("fold-flip", "X", "#CC79A7", MARKER_SIZE * 1.05),
+    "LPNS": KindStyle("fold–Neimark–Sacker", "X", "#009E73", MARKER_SIZE * 1.05),
+    "PDNS": KindStyle("flip–Neimark–Sacker", "X", "#D55E00", MARKER_SIZE * 1.05),
+    "NSNS": KindStyle("double Neimark–Sacker", "X", "#0072B2", MARKER_SIZE * 1.05),
 }
 
 

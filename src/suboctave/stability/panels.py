@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from suboctave.compiled import QUICK, kernel
 from suboctave.harmonic.arctangent import add_step
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.kernels import displacement, slope
 from suboctave.stability.passages import depths, events_along, grown
 
 #: longest panels in v, next to a singularity and further away: with them the rule is good for 1e-7 of the part of the
@@ -121,39 +122,16 @@ def _panels(events, longest):
     return out[:count], start
 
 
-@kernel(patience=QUICK, fastmath={"reassoc", "contract", "nsz"})
+@kernel(patience=QUICK)
 def _series(c, f, zr, zi, scale, u, v, r):
     """`u = Re sum c_k z^k`, `v = scale du/dtau` and `r = -Re(f_0 + 2 sum f_k z^k)` at the points z; (N,) each."""
-    n = zr.shape[0]
-    top = c.shape[0] - 1
-    work = np.empty((4, n))
-    ui, vr, vi, ri = work[0], work[1], work[2], work[3]
-    for j in range(n):
-        u[j] = c[top].real
-        ui[j] = c[top].imag
-        vr[j] = top * c[top].real
-        vi[j] = top * c[top].imag
-        r[j] = f[top].real
-        ri[j] = f[top].imag
-    for k in range(top - 1, -1, -1):
-        a = c[k].real
-        b = c[k].imag
-        share = 1.0 if k > 0 else 0.5
-        e = share * f[k].real
-        g = share * f[k].imag
-        for j in range(n):
-            t = u[j] * zr[j] - ui[j] * zi[j] + a
-            ui[j] = u[j] * zi[j] + ui[j] * zr[j] + b
-            u[j] = t
-            t = vr[j] * zr[j] - vi[j] * zi[j] + k * a
-            vi[j] = vr[j] * zi[j] + vi[j] * zr[j] + k * b
-            vr[j] = t
-            t = r[j] * zr[j] - ri[j] * zi[j] + e
-            ri[j] = r[j] * zi[j] + ri[j] * zr[j] + g
-            r[j] = t
-    for j in range(n):
-        v[j] = -scale * vi[j]
-        r[j] *= -2.0
+    displacement(c, zr, zi, u)
+    displacement(slope(c, scale), zr, zi, v)
+    within = np.empty_like(c)
+    for k in range(c.shape[0]):
+        within[k] = complex(-2.0 * f[k].real, -2.0 * f[k].imag)
+    within[0] = complex(-f[0].real, 0.0)
+    displacement(within, zr, zi, r)
 
 
 @kernel()

@@ -10,7 +10,7 @@ import numpy as np
 
 UNKNOWN = -1  # in event_stable_after
 #: where, along a curve of bifurcations, a multiplier other than the critical ones reaches the unit circle
-_BY_ANOTHER = frozenset({"R1", "R2", "LPPD"})
+_BY_ANOTHER = frozenset({"R1", "R2", "LPPD", "LPNS", "PDNS", "NSNS"})
 
 
 @dataclass(frozen=True)

@@ -28,20 +28,24 @@ ERROR_3, ERROR_5 = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.
 FIELDS = (
     "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "h", "next", "t", "period",
     "omega", "sample", "slot", "left", "tries", "stuck", "failed", "peak", "calm", "weight",
-    "crest", "turning",
+    "crest", "turning", "spent",
 )  # fmt: skip
 (
     _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _H, _NEXT, _T, _PERIOD, _OMEGA, _SAMPLE,
     _SLOT, _LEFT, _TRIES, _STUCK, _FAILED, _PEAK, _CALM, _WEIGHT, _CREST,
-    _TURNING,
+    _TURNING, _SPENT,
 ) = range(len(FIELDS))  # fmt: skip
 _SHRINK, _GROW, _SAFETY = 0.3, 6.0, 0.9
 #: a corner is reached when it is this share of a period away, or after so many trials
 _LANDED, _TRIALS = 1e-10, 12
 #: the share of a period below which a step makes no sense
 _SHORTEST = 1e-13
+#: trials between two samples beyond which a motion is given up: it grows without bound, and quicker and quicker
+_MOST = 100000.0
 #: the share of its largest part that a degree of freedom counts for at least
 _SMALLEST_SHARE = 1e-3
+#: a corner is near if a step passes it within this share of the distance at its ends
+_NEAR = 0.1
 #: displacements above this share of the largest so far may be the largest
 _HIGH = 0.9
 
@@ -60,9 +64,10 @@ def _first_root(m0, d0, m1, d1):
             return -1.0
         root = math.sqrt(root)
         x = (-b + root) / (3.0 * a) if abs(a) > 1e-300 else -d0 / (2.0 * b)
-        if not 0.0 < x < 1.0 or ((a * x + b) * x + d0) * x + m0 >= 0.0:
-            return -1.0
-        return x
+        low = ((a * x + b) * x + d0) * x + m0
+        # the cubic is not the motion: where it comes near, the step is cut at its minimum, and the sign there decides
+        near = low < _NEAR * max(m0, m1) and 0.001 < x < 0.999
+        return x if 0.0 < x < 1.0 and (low < 0.0 or near) else -1.0
     if m0 <= 0.0:
         # begins at the corner: first away from it, or over it at once
         low = 0.5
@@ -161,6 +166,10 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
     if z[at[_LEFT] * lanes + l] <= 0.0:
         return 1
     h, period = z[at[_H] * lanes + l], z[at[_PERIOD] * lanes + l]
+    z[at[_SPENT] * lanes + l] += 1.0
+    if z[at[_SPENT] * lanes + l] > _MOST:
+        _fail(z, at, l, lanes, n)
+        return 1
     t = z[at[_T] * lanes + l]
     error = _error(z, at, l, lanes, n) / tolerance
     if not error <= 1.0:
@@ -256,6 +265,7 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
         sample += 1.0
         left = z[at[_LEFT] * lanes + l] - 1.0
         z[at[_LEFT] * lanes + l] = left
+        z[at[_SPENT] * lanes + l] = 0.0
         slot = int(z[at[_SLOT] * lanes + l])
         z[at[_SLOT] * lanes + l] = slot + 1.0
         if slot >= skip:

@@ -51,7 +51,8 @@ class Motions:
     end
         (B, 2n): the last states.
     failed
-        (B,): trajectories that left the range of numbers; they are NaN from there on.
+        (B,): trajectories that left the range of numbers, or took more than 100 000 steps between two samples; they are
+        NaN from there on.
     unsettled
         (B,): steps of Newmark's method whose equations were not solved to the tolerance.
     finished
@@ -348,7 +349,8 @@ def check_motions(motions: Motions, flow: Flow) -> None:
         first = int(np.flatnonzero(motions.failed)[0])
         raise ConvergenceError(
             f"{int(motions.failed.sum())} of {len(motions.failed)} trajectories (the first is number {first}) left the "
-            "range of numbers: the motion grows without bound, or a force is not finite where it goes"
+            "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite where "
+            "it goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
         )
     if motions.unsettled.any():
         raise ConvergenceError(

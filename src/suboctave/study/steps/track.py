@@ -1,4 +1,6 @@
-"""The step "track": a bifurcation of an earlier branch in two parameters, an extremum of such a curve in a third."""
+"""The step "track": a bifurcation of an earlier branch in two parameters, an extremum of such a curve in a third, or
+another curve from a point of codimension two.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from typing import Any, ClassVar
 
 from suboctave.analysis import Branch, track
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range
-from suboctave.bifurcation.tracked import TRACKED_KINDS
+from suboctave.bifurcation.tracked import CURVES_THROUGH, TRACKED_KINDS
 from suboctave.errors import suggest
 from suboctave.study.steps.base import Complaint, Context, Known, Range, Surroundings, chosen, tried
 from suboctave.study.steps.curves import CurveStep
@@ -22,6 +24,7 @@ class Track(CurveStep):
     parameter: str | list[str]
     bounds: Range | list[Range]
     omega: Range | None = None
+    onto: str | None = None
 
     @property
     def plane(self) -> tuple[str, str] | None:
@@ -56,10 +59,20 @@ class Track(CurveStep):
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
-        elif kind not in (*TRACKED_KINDS, "extremum"):
-            yield ("start", "bifurcation"), f"{kind} cannot be tracked{suggest(kind, TRACKED_KINDS)}"
+        elif kind not in (*TRACKED_KINDS, "extremum", *CURVES_THROUGH):
+            yield (
+                ("start", "bifurcation"),
+                f"{kind} cannot be tracked{suggest(kind, (*TRACKED_KINDS, *CURVES_THROUGH))}",
+            )
         elif kind == "extremum" and not isinstance(self.parameter, str):
             yield ("parameter",), "of an extremum is one name: the third parameter"
+        if self.onto is None or kind is None:
+            return
+        through = CURVES_THROUGH.get(kind)
+        if through is None:
+            yield ("onto",), f"chooses between the curves through a point of codimension two; {kind} is none"
+        elif self.onto not in through:
+            yield ("onto",), f"{self.onto!r}: the curves through {kind} are {' and '.join(through)}"
 
     def known(self, around: Surroundings) -> Known | None:
         """See `Step.known`: what varies along it are parameters, too."""
@@ -73,4 +86,6 @@ class Track(CurveStep):
         self._moved(start.orbit, context)
         if self.omega is not None:
             options["omega"] = (self.omega[0], self.omega[1])
+        if self.onto is not None:
+            options["onto"] = self.onto
         return track(start, self.parameter, self.bounds, **options)

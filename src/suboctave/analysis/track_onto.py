@@ -1,0 +1,196 @@
+"""From a point of codimension two onto the other curve of bifurcations that passes through it, or begins there.
+
+Where two curves cross (LPPD, LPNS, PDNS, NSNS) the point lies on both. At R1 and R2 Neimark-Sacker points begin on a
+curve of LP or PD: with g of `bifurcation.bordered` as a function of kappa, and k its distance from 0 or w0/2,
+
+    g = g_0 + i k g_1 + k^2 g_2 + ...,    g_i real,
+
+so that the equations of an NS, `Re g = 0` and `Im g / k = 0`, are smooth in k^2 and hold at k^2 = 0 where g_0 = g_1 =
+0: at R1, R2. The curve is entered at a small k, held fixed. On its other side, k^2 < 0, are neutral saddles, two real
+multipliers with product one, which bifurcate nowhere: no k is theirs, and the side need not be chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from suboctave.analysis.making import own_linear_part
+from suboctave.analysis.track_start import Box, curve_through, spans_of
+from suboctave.analysis.track_switch import limit_point_beside
+from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bordered import null_vectors
+from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
+from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import make_point
+from suboctave.continuation.newton import correct
+from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.perturbation import Kind
+
+__all__ = ["aside", "curve_onto", "start_onto"]
+
+#: distances of kappa from 0 or w0/2, in units of w0, at which Neimark-Sacker points are looked for beside a resonance
+_SHARES = (0.02, 0.01, 0.03, 0.005, 0.0025)
+#: the farthest that they lie from it, in scaled arclength, and their multipliers from the unit circle
+_NEAR, _CRITICAL = 0.2, 0.02
+#: component of the parameters' forces along the left null vector below which there is none
+_FORCED = 1e-6
+#: way along a curve from a point of codimension two, in scaled arclength, from which it is met like any other
+_ASIDE = 2e-3
+
+
+def curve_onto(item: Bifurcation, onto: str | None) -> str:
+    """Kind of the curve that is followed from a point of codimension two; default: the one that it was not found on.
+
+    Raises
+    ------
+    InputError
+        Where it lies on no such curve.
+    """
+    if item.kind not in CURVES_THROUGH or not isinstance(item, TrackedEvent):
+        if onto is not None:
+            raise InputError(
+                f"onto= chooses between the curves through a point of codimension two ({', '.join(CURVES_THROUGH)}); "
+                f"this is a {item.kind}: leave it out"
+            )
+        return item.kind
+    if item.turning:
+        raise InputError(
+            f"this {item.kind} lies on a curve of extrema in {', '.join(item.names)}: other curves are entered from "
+            "points of curves in two parameters"
+        )
+    kinds = CURVES_THROUGH[item.kind]
+    if onto is None:
+        return next((kind for kind in kinds if kind != item.curve), kinds[0])
+    if onto not in kinds:
+        raise InputError(
+            f"onto={onto!r}: the curves through a {item.kind} are {' and '.join(kinds)}{suggest(onto, kinds)}"
+        )
+    return onto
+
+
+def start_onto(
+    item: TrackedEvent,
+    kind: str,
+    names: tuple[str, ...],
+    box: Box,
+    newton: NewtonOptions,
+) -> Bifurcation:
+    """A bifurcation of a kind at a point of codimension two, or beside it where its curve begins there.
+
+    Raises
+    ------
+    InputError
+        If the curve lies outside the ranges.
+    ConvergenceError
+        If nothing of that kind is found.
+    """
+    if item.kind == "GPD" and kind == "LP":
+        if names != item.names:
+            raise InputError(
+                f"the limit points that leave this GPD are followed over {' and '.join(item.names)}, in which it was "
+                "found"
+            )
+        low, high = box.second
+        return limit_point_beside(item, high - low)
+    if kind == "LP" and _symmetric(item, names):
+        kind = "BP"
+    if kind != "NS":
+        return replace(item, curve=kind, kappa=0.0)
+    if item.kind in ("R1", "R2"):
+        return _beside_resonance(item, names, box, newton)
+    return replace(item, curve=kind, kappa=_frequency(item))
+
+
+def _symmetric(item: TrackedEvent, names: tuple[str, ...]) -> bool:
+    """Whether no parameter moves the multiplier +1: it belongs to branch points that a symmetry forces.
+
+    The equations of a limit point hold there, too, but are singular.
+    """
+    state = item.orbit.state()
+    left = null_vectors(state, Kind.INTEGER).left
+    scale = state.balance.row_weights(len(left))
+    for name in names:
+        slope = state.residual_by(name) * scale
+        if abs(float(left @ slope)) > _FORCED * length(slope):
+            return False
+    return True
+
+
+def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:
+    """A start a little beside a point of codimension two, which the curve then passes; the start where none is found.
+
+    Tests vanish at the point itself, and do not tell there that they change sign.
+    """
+    for way in (_ASIDE, -_ASIDE):
+        row = start.weights * start.tangent
+        try:
+            solved = correct(start.curve, start.u + way * start.tangent, row / length(row), start.weights, newton)
+        except ConvergenceError:
+            continue
+        point = make_point(solved, start.curve, start.tangent, 0.0)
+        assert isinstance(point.curve, TrackedCurve)
+        if box.around(point.curve.names, point.curve.named(point.u)):
+            return point
+    return start
+
+
+def _frequency(item: TrackedEvent) -> float:
+    """kappa of the pair on the unit circle; at an NSNS of the pair that its curve does not follow.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is none.
+    """
+    if item.curve == "NS" and item.kind != "NSNS":
+        return item.kappa
+    mu = item.multipliers
+    if item.curve == "NS":
+        mu = np.delete(mu, np.argmin(np.abs(mu - item.critical_multiplier())))
+    pairs = mu[mu.imag > 1e-9 * np.abs(mu)]
+    if not pairs.size:
+        raise ConvergenceError(f"this {item.kind} has no complex pair of multipliers")
+    pair = min(pairs, key=lambda m: abs(abs(m) - 1.0))
+    return float(np.angle(pair)) / item.orbit.period
+
+
+def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newton: NewtonOptions) -> Bifurcation:
+    """A Neimark-Sacker point close to a 1:1 or 1:2 resonance."""
+    orbit = item.orbit
+    rate = orbit.omega / orbit.basis.nu
+    balance = HarmonicBalance(orbit.system, orbit.basis, linear=own_linear_part(orbit))
+    outside, said = False, "they lie elsewhere, or more harmonics are needed"
+    for share in _SHARES:
+        kappa = (share if item.kind == "R1" else 0.5 - share) * rate
+        beside = replace(item, curve="NS", kappa=kappa)
+        try:
+            curve, u = curve_through(beside, balance, None, names, spans_of(item, names, box))
+            weights = curve.weights(u, 0.0)
+            held = np.zeros(len(u))
+            held[curve.balance.dimension] = 1.0
+            solved = correct(curve, u, held, weights, newton)
+        except ConvergenceError as failure:
+            said = str(failure)
+            continue
+        evaluation = solved.evaluation
+        assert isinstance(evaluation, TrackedEvaluation)
+        if length(weights * (solved.u - u)) > _NEAR or evaluation.doubt > _CRITICAL:
+            continue
+        state = evaluation.state
+        values = dict(state.values)
+        there = replace(orbit, balance=state.balance, coefficients=state.x.copy(), omega=state.omega, values=values)
+        found = replace(beside, orbit=there)
+        if box.around(names, {name: found.parameter(name) for name in names}):
+            return found
+        outside = True
+    at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in item.names)
+    if outside:
+        raise InputError(
+            f"the Neimark-Sacker points that begin in the {item.kind} at {at} lie outside the ranges: widen them"
+        )
+    raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {said}")

@@ -1,0 +1,156 @@
+"""Two events inside one step of a tracked curve: they cancel in the signs at its ends.
+
+Each test has a function that is smooth along the curve (`CurveTest.smooth`). Between two points at which it has the
+same sign, it is taken for the parabolas through these and either neighbour (on a curve's first and last step the
+parabola and the cubic through those of the one side). If one of them comes clearly nearer to zero inside than at both
+ends, or to zero but for the distance between them, a point is solved for where it does most, and the parts are looked
+at again. Nothing is evaluated where none does, as along most of a curve. What neither the ends nor their neighbours
+hint at is not found; smaller steps do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from suboctave.analysis.tracked_events import Found, located
+from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.analysis.tracked_tests import CurveTest, Extremum
+from suboctave.continuation import NewtonOptions
+from suboctave.continuation.march import point_between
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError
+
+__all__ = ["HiddenPairs"]
+
+#: share of the smaller end's value below which the function must be suspected to fall inside
+_FALLS = 0.8
+#: points solved for inside one step for one test
+_PROBES = 5
+#: shares of a step at which the interpolations are looked at
+_GRID = np.linspace(0.04, 0.96, 24)
+
+
+class HiddenPairs:
+    """Looks at every step when the points beside it are known."""
+
+    def __init__(self, tests: Sequence[CurveTest], newton: NewtonOptions) -> None:
+        self.tests = [test for test in tests if not isinstance(test, Extremum)]
+        self.newton = newton
+        self._known: list[tuple[TrackedSample, Array]] = []
+
+    def passed(self, sample: TrackedSample, warnings: list[str]) -> list[Found]:
+        """Take in the next point; the pairs found in the step before the last."""
+        if not self.tests:
+            return []
+        self._known = [*self._known[-3:], (sample, np.array([test.smooth(sample) for test in self.tests]))]
+        return self._look(len(self._known) - 3, warnings)
+
+    def rest(self, warnings: list[str]) -> list[Found]:
+        """The pairs found in the last step: nothing comes after it."""
+        found = self._look(len(self._known) - 2, warnings) if self.tests else []
+        self._known = []
+        return found
+
+    def _look(self, at: int, warnings: list[str]) -> list[Found]:
+        """Pairs between the known points `at` and `at + 1`."""
+        if at < 0 or len(self._known) < 3:
+            return []
+        found: list[Found] = []
+        near = self._known
+        samples = [sample for sample, _ in near]
+        places = np.array([sample.point.arclength for sample in samples])
+        if not np.all(np.diff(places) > 0.0):
+            return []
+        for test, functions in zip(self.tests, np.stack([f for _, f in near], axis=1), strict=True):
+            share = falling(places, _values(functions), at)
+            if share is None:
+                continue
+            try:
+                found += self._pair(test, samples, functions, at)
+            except ConvergenceError as failure:
+                where = samples[at].curve.where(samples[at].point.u)
+                warnings.append(f"whether two {test.kind} lie after {where} could not be told: {failure}")
+        return found
+
+    def _pair(self, test: CurveTest, samples: list[TrackedSample], functions: Array, at: int) -> list[Found]:
+        """The two events of one test in a step that may hide them."""
+        a, b = same_discretisation(samples[at], samples[at + 1], self.newton), samples[at + 1]
+        places = [sample.point.arclength for sample in samples]
+        start, way = places[at], places[at + 1] - places[at]
+        inside, known, low = [a, b], list(functions), at
+        for _ in range(_PROBES):
+            found = next(
+                (
+                    (i, share)
+                    for i in range(low, low + len(inside) - 1)
+                    if (share := falling(np.array(places), _values(np.array(known)), i)) is not None
+                ),
+                None,
+            )
+            if found is None:
+                break
+            i, share = found
+            place = places[i] + share * (places[i + 1] - places[i])
+            middle = TrackedSample(point_between(a.point, b.point, (place - start) / way, self.newton))
+            before, after = inside[i - low], inside[i - low + 1]
+            if test.changed(before, middle) and test.changed(middle, after):
+                both = [located(test, before, middle, self.newton), located(test, middle, after, self.newton)]
+                return [item for item in both if item is not None]
+            places.insert(i + 1, place)
+            known.insert(i + 1, test.smooth(middle))
+            inside.insert(i - low + 1, middle)
+        return []
+
+
+def _values(functions: Array) -> Array:
+    """A function from signs and logarithms, shape (m, 2), in units of its largest value."""
+    top = functions[:, 1].max()
+    if not np.isfinite(top):
+        return np.zeros(len(functions))
+    values: Array = functions[:, 0] * np.exp(functions[:, 1] - top)
+    return values
+
+
+def falling(places: Array, values: Array, at: int) -> float | None:
+    """Where between `places[at]` and the next a function of one sign may vanish, as a share of the way, or None."""
+    here = values[at : at + 2]
+    sign = float(np.sign(here[0]))
+    if sign == 0.0 or sign * here[1] <= 0.0:
+        return None
+    least = float(np.abs(here).min())
+    if at > 0 and at + 2 < len(places):
+        # parabolas leave the chord by no more than this
+        bend = max(abs(_second(places, values, i)) for i in (at - 1, at)) * (places[at + 1] - places[at]) ** 2 / 4.0
+        if bend <= (1.0 - _FALLS) * least:
+            return None
+        spans = [(at - 1, at + 2), (at, at + 3)]
+    elif at > 0:
+        spans = [(at - 1, at + 2), (max(0, at - 2), at + 2)]
+    else:
+        spans = [(at, at + 3), (at, min(len(places), at + 4))]
+    s = places[at] + _GRID * (places[at + 1] - places[at])
+    one, other = (sign * _interpolated(places[a:b], values[a:b], s) for a, b in spans)
+    lower, apart = np.minimum(one, other), np.abs(one - other)
+    for lowest, bound in ((lower, _FALLS * least), (lower - apart, 0.0)):
+        if lowest.min() < bound:
+            return float(_GRID[lowest.argmin()])
+    return None
+
+
+def _second(x: Array, f: Array, i: int) -> float:
+    """The second divided difference at three points from the i-th."""
+    first, last = ((f[j + 1] - f[j]) / (x[j + 1] - x[j]) for j in (i, i + 1))
+    return float((last - first) / (x[i + 2] - x[i]))
+
+
+def _interpolated(x: Array, f: Array, s: Array) -> Array:
+    """The polynomial through points, by Newton's divided differences."""
+    c = f.astype(float)
+    for k in range(1, len(x)):
+        c[k:] = (c[k:] - c[k - 1 : -1]) / (x[k:] - x[: len(x) - k])
+    value = np.full_like(s, c[-1])
+    for i in range(len(x) - 2, -1, -1):
+        value = value * (s - x[i]) + c[i]
+    return value

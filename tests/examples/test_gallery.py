@@ -1,0 +1,44 @@
+"""Every figure of the gallery runs from top to bottom, its assertion holds, and it draws only when told where."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "examples" / "gallery"
+SCRIPTS = sorted(FOLDER.glob("fig*.py"))
+PAGE = Path(__file__).parents[2] / "docs" / "gallery.md"
+
+
+def run(script, arguments, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setattr(sys, "argv", [str(script), *arguments])
+    runpy.run_path(str(script), run_name="__main__")
+
+
+def test_the_page_tells_of_all_figures():
+    page = PAGE.read_text()
+    assert len(SCRIPTS) >= 10
+    for script in SCRIPTS:
+        assert f"examples/gallery/{script.name}" in page
+    for picture in (PAGE.parent / "images" / "gallery").iterdir():
+        assert f"images/gallery/{picture.name}" in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_figure(script, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    several = "space.png]" in script.read_text()
+    names = ["figure.png", "space.png"] if several else ["figure.png"]
+    run(script, names, monkeypatch)
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+
+
+def test_without_a_path_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(FOLDER / "fig08_phase_portraits.py", [], monkeypatch)
+    assert not list(tmp_path.iterdir())
