@@ -233,7 +233,7 @@ def _probe(region: IsolaRegion, border: Border, node: TrackedPoint, isola: Isola
         if not legs:
             return Probe(place, middle, (low, high), None, "no limit points there")
         at = legs[int(np.argmin([abs(leg.omega_near(middle)[0] - node.orbit.omega) for leg in legs]))]
-        branch = closed_branch(at.limit_point(middle), isola.omega, legs, options)
+        branch = closed_branch(at.limit_point(middle), isola.omega, name, legs, options)
     except (ConvergenceError, InputError) as failure:
         return Probe(place, middle, (low, high), None, str(failure))
     turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]
