@@ -156,13 +156,16 @@ class RegimeCheck:
             f"{self.points} points, {len(self.landings)} trajectories: {100.0 * self.rate:.2f} % of those that settled "
             f"agree, {100.0 * self.agreeing:.2f} % of the points ({told})"
         )
+        lines: Counter[str] = Counter()
         for one in self.disagreements:
             what = period_name(one.period) if one.period else "nothing periodic"
             begun = "a random state" if one.start == "state" else f"the {one.start} motion"
-            text += (
-                f"\n  omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
-                f"{one.amplitude:.5g}; the map has {one.expected}: {one.verdict}"
-            )
+            lines[
+                f"omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
+                f"{one.amplitude:.4g}; the map has {one.expected}: {one.verdict}"
+            ] += 1
+        for line, times in lines.items():
+            text += f"\n  {line}" + (f" ({times} trajectories)" if times > 1 else "")
         return text
 
 
