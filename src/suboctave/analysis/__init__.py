@@ -8,11 +8,16 @@ from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagra
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.integration import Trajectory, integrate
-from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isola import Isola
+from suboctave.analysis.isola_map import isola_map
+from suboctave.analysis.isola_region import IsolaMap
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.lyapunov import LyapunovExponents, lyapunov_exponents
 from suboctave.analysis.lyapunov_map import LyapunovMap, lyapunov_map
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
+from suboctave.analysis.regime_map import RegimeMap
+from suboctave.analysis.regimes import regime_map
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
@@ -31,10 +36,12 @@ __all__ = [
     "BranchPoint",
     "BruteForceDiagram",
     "Isola",
+    "IsolaMap",
     "Isolas",
     "LyapunovExponents",
     "LyapunovMap",
     "PoincareSections",
+    "RegimeMap",
     "Results",
     "Seeds",
     "Separation",
@@ -51,12 +58,14 @@ __all__ = [
     "find_subharmonics",
     "frequency_response",
     "integrate",
+    "isola_map",
     "load",
     "locate_extremum",
     "lyapunov_exponents",
     "lyapunov_map",
     "periodic_orbit",
     "poincare_sections",
+    "regime_map",
     "stability",
     "switch_branch",
     "track",
