@@ -36,7 +36,10 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize(
+    "name",
+    ["stops", "two", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rounded", "dampers", "text"))],
+)
 def test_state_transition_matrix(name):
     system = SYSTEMS[name]
     state = np.linspace(0.4, -0.7, 2 * system.n)

@@ -145,13 +145,13 @@ class Catalogue:
         return out
 
     def _cycle(self, solution: PeriodicSolution) -> tuple[Array, Array]:
-        flow = Flow(self.system, "accurate", tolerance=1e-12, lanes=8)
+        flow = Flow(self.system, "accurate", tolerance=1e-12)
         motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1)
         points = np.vstack([solution.state[None], motions.states[0][:-1]])
         return points, self._extents(points)
 
     def _extents(self, points: Array) -> Array:
-        flow = Flow(self.system, "accurate", tolerance=1e-10, lanes=8)
+        flow = Flow(self.system, "accurate", tolerance=1e-10)
         motions = flow.over(points[0], self.omega, len(points), self.values, measure=True, workers=1)
         assert motions.peaks is not None
         mass = np.diagonal(self.system.mass.value({**self.system.parameters, **self.values}))

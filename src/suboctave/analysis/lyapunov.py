@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 
 from suboctave.analysis.forces import check_forces
-from suboctave.analysis.integration import FEW, _not_negative, start_state
+from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.two_trajectories import Separation, TwoTrajectories, separate
 from suboctave.errors import InputError, suggest
@@ -274,7 +274,7 @@ def lyapunov_exponents(
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=count)
     with reporting(progress, "Lyapunov exponents") as report:
         check_forces(system, first, float(omega), values)
-        starts = _starts(system, first, omega, values, transient, trajectories, tolerance)
+        starts = _starts(flow, first, omega, values, transient, trajectories)
         motions = flow.over(starts, omega, transient + periods, values, transient, workers=workers, report=report)
     if not motions.finished.all():
         raise KeyboardInterrupt
@@ -333,21 +333,13 @@ def smooth_weights(count: int) -> Array:
     return w / w.sum()
 
 
-def _starts(
-    system: System,
-    first: Array,
-    omega: float,
-    values: Mapping[str, float],
-    transient: int,
-    count: int,
-    tol: float | None,
-) -> Array:
+def _starts(flow: Flow, first: Array, omega: float, values: Mapping[str, float], transient: int, count: int) -> Array:
     """States (count, 2n): the end of a transient, and others about it."""
-    base = Flow(system, "accurate", tolerance=tol, lanes=FEW)
-    motions = base.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True)
+    system = flow.system
+    motions = flow.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True)
     if not motions.finished.all():
         raise KeyboardInterrupt
-    check_motions(motions, base)
+    check_motions(motions, flow)
     assert motions.peaks is not None
     mass = np.diagonal(system.mass.value({**system.parameters, **values}))
     sizes = extents(motions.peaks[0].max(axis=0), float(omega), mass)

@@ -5,7 +5,7 @@
 Two stable motions, a large and a small one, at the same load. Their basins wind about each other, and the unstable
 motion in between lies on their border.
 
-    python ex19_basins.py [figure.png]
+    python ex24_basins.py [figure.png]
 """
 
 import sys

@@ -3,7 +3,7 @@
 An oscillator with a stop on one side and another one further away, driven hard. Neighbouring motions part by a factor
 of 1.4 in every period of the load.
 
-    python ex18_chaos.py [figure.png]
+    python ex23_chaos.py [figure.png]
 """
 
 import sys
