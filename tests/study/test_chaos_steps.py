@@ -42,7 +42,8 @@ what = "states"
 
 
 def test_as_by_a_script(study_file):
-    finished = {one.name: one.result for one in run_study(read_study(study_file(STUDY))).finished}
+    done = run_study(read_study(study_file(STUDY))).finished
+    finished = dict(zip(("response", "rates", "shares", "states"), (one.result for one in done), strict=True))
     system = so.library.duffing(c=0.1, F=0.3)
     rates = so.lyapunov_exponents(system, omega=1.5, periods=200, trajectories=4)
     assert np.array_equal(finished["rates"]["exponent"], rates.exponents)

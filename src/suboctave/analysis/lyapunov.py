@@ -308,7 +308,10 @@ def averaged(rates: Array) -> tuple[bool, Array, Array, Array]:
     pieces = _STRETCHES if periods >= 8 * _STRETCHES else 1
     length = periods // pieces
     cut = rates[:, periods - pieces * length :].reshape(several * pieces, length, k)
+    # over whole trajectories; what stretches differ from it by is what they may all have in common
+    whole = np.einsum("p,bpk->bk", smooth_weights(periods), rates).mean(axis=0)
     best: tuple[bool, Array, Array, Array] | None = None
+    least = np.inf
     for smooth in (False, True):
         weights = smooth_weights(length) if smooth else np.full(length, 1.0 / length)
         told = np.einsum("p,npk->nk", weights, cut)
@@ -318,8 +321,12 @@ def averaged(rates: Array) -> tuple[bool, Array, Array, Array]:
         if several > 1:
             each = told.reshape(several, pieces, k).mean(axis=1)
             error = np.maximum(error, each.std(axis=0, ddof=1) / np.sqrt(several))
-        if best is None or np.sum(error[:-1] ** 2) < np.sum(best[2][:-1] ** 2):
-            best = smooth, told.mean(axis=0), error, told
+        mean = told.mean(axis=0)
+        score = float(np.sum(error[:-1] ** 2))
+        if smooth:
+            mean, error = whole, np.maximum(error, np.abs(whole - mean))
+        if best is None or score < least:
+            best, least = (smooth, mean, error, told), score
     assert best is not None
     return best
 

@@ -191,6 +191,11 @@ def lyapunov_map(
         told = cut @ weights
         means.append(told.mean(axis=1))
         errors.append(told.std(axis=1, ddof=1) / np.sqrt(_STRETCHES))
+    # over the whole trajectory it is better still; what it differs by is what all stretches may have in common
+    whole = motions.growth[:, :, 0] @ smooth_weights(periods)
+    errors[1], means[1] = np.maximum(errors[1], np.abs(whole - means[1])), whole
+    # stretches of a regular motion may all be wrong by the same
+    errors[0] = np.maximum(errors[0], np.abs(whole - means[0]))
     smooth = errors[1] < 0.5 * errors[0]  # the less of two estimates of few stretches is smaller by chance, too
     per_time = np.tile(frequencies, shape[0]) / (2.0 * np.pi)
     mean, error = (np.where(smooth, two[1], two[0]) * per_time for two in (means, errors))
