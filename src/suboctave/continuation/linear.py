@@ -94,6 +94,11 @@ class LeadingBlock:
         """Sign of the block's determinant; 0 if it is singular."""
         return self.whole.sign * (1.0 if self.corner is None else self.corner.sign)
 
+    @property
+    def log_determinant(self) -> float:
+        """Natural logarithm of the modulus of the block's determinant."""
+        return self.whole.log_determinant + (0.0 if self.corner is None else self.corner.log_determinant)
+
     def solve(self, rhs: Array) -> Array:
         """Solve with the block."""
         if self.corner is None:
