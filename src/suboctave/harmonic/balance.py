@@ -72,7 +72,8 @@ class HarmonicBalance:
         self.dimension = self.size * basis.count
         self.samples = samples if samples is not None else (None,) * len(system.elements)
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
-        self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
+        #: parameters that the linear part depends on
+        self.matrix_names = system.mass.names | system.damping.names | system.stiffness.names
         #: the elements that are evaluated direction by direction, and those with nodes of their own
         self.elements: tuple[Element, ...] = tuple(
             e for e in system.elements if isinstance(e, Element) and not e.own_nodes
@@ -145,7 +146,7 @@ class HarmonicBalance:
         """
         used = self.values if values is None else values
         linear = self.linear
-        if used is not self.values and any(used[n] != self.values[n] for n in self._matrix_names):
+        if used is not self.values and any(used[n] != self.values[n] for n in self.matrix_names):
             linear = self.linear.rebuilt(used)
         return BalanceState(self, linear, self.spread(np.asarray(x, float)), float(omega), used)
 
