@@ -8,7 +8,8 @@ graded nodes, other laws one uniform grid, so that the motion is evaluated once 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,7 @@ from suboctave.model.sampling import (
 )
 
 _NONE = np.zeros(0)
+_NO_ROWS = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,8 @@ class GroupLaw:
         The elements (index, coefficients) that these belong to.
     degree
         Highest degree of polynomials that need samples.
-    levels
-        Displacements at which a law has a corner, or is sharp: element, which of its own, displacement.
+    all
+        All elements: index, what it tells, coefficients.
     """
 
     pieces: Array
@@ -82,7 +84,12 @@ class GroupLaw:
     line: Array
     told: tuple[tuple[int, Array], ...]
     degree: int
-    levels: tuple[tuple[int, int, float], ...] = ()
+    all: tuple[tuple[int, Sampling, Array], ...] = ()
+
+    @cached_property
+    def levels(self) -> tuple[tuple[int, int, float], ...]:
+        """Displacements at which a law has a corner, or is sharp: element, which of its own, displacement."""
+        return tuple((i, place, at) for i, kind, c in self.all for place, at in enumerate(told_levels(kind, c)))
 
     @property
     def in_closed_form(self) -> bool:
@@ -101,14 +108,12 @@ class GroupLaw:
         polynomials: list[tuple[float, ...]] = []
         sharp, uniform, told = [], [], []
         steps: list[tuple[float, float, float]] = []
-        line = np.zeros(2)
+        line = [0.0, 0.0]
         points: list[Array] = []
         widths: list[Array] = []
-        levels: list[tuple[int, int, float]] = []
         degree = 0
         for i in group.members:
             kind, c = kinds[i], numbers[i]
-            levels += [(i, place, level) for place, level in enumerate(told_levels(kind, c))]
             if isinstance(kind, PiecewiseLinear):
                 pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
             elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
@@ -116,7 +121,8 @@ class GroupLaw:
             elif isinstance(kind, SharpSampling) and kind.steps is not None:
                 told.append((i, c))
                 steps += zip(kind.points, kind.widths, kind.steps, strict=True)
-                line += (kind.constant, kind.slope)
+                line[0] += kind.constant
+                line[1] += kind.slope
             elif isinstance(kind, SharpSampling):
                 sharp.append((i, c))
                 where = singularities(kind)
@@ -126,23 +132,30 @@ class GroupLaw:
                 uniform.append((i, c))
                 if isinstance(kind, PolynomialSampling):
                     degree = max(degree, kind.degree)
-        total = np.zeros(max((len(p) for p in polynomials), default=0))
-        for p in polynomials:
-            total[: len(p)] += p
-        none = np.zeros(0)
+        total = np.array(polynomials[0] if len(polynomials) == 1 else _added(polynomials), dtype=float)
         return cls(
-            np.array(pieces, dtype=float).reshape(-1, 3),
+            np.array(pieces, dtype=float) if pieces else _NO_ROWS,
             total,
             tuple(sharp),
             tuple(uniform),
-            np.concatenate(points) if points else none,
-            np.concatenate(widths) if widths else none,
-            np.array(steps, dtype=float).reshape(-1, 3),
-            line,
+            np.concatenate(points) if points else _NONE,
+            np.concatenate(widths) if widths else _NONE,
+            np.array(steps, dtype=float) if steps else _NO_ROWS,
+            np.array(line),
             tuple(told),
             degree,
-            tuple(levels),
+            tuple([(i, kinds[i], numbers[i]) for i in group.members]),
         )
+
+
+def _added(polynomials: list[tuple[float, ...]]) -> list[float]:
+    """The sum of polynomials, by their coefficients."""
+    return [sum(parts) for parts in zip_longest(*polynomials, fillvalue=0.0)]
+
+
+@lru_cache(maxsize=64)
+def _zeros(count: int) -> NDArray[np.int64]:
+    return np.zeros(count, dtype=np.int64)
 
 
 class PackedLaws(NamedTuple):
@@ -177,11 +190,11 @@ class PackedLaws(NamedTuple):
             law = laws[0]
             return cls(
                 law.pieces,
-                np.zeros(len(law.pieces), dtype=np.int64),
+                _zeros(len(law.pieces)),
                 np.array((0, len(law.pieces))),
                 law.polynomial[None],
                 law.smooth_steps,
-                np.zeros(len(law.smooth_steps), dtype=np.int64),
+                _zeros(len(law.smooth_steps)),
                 law.line[None],
                 bool(law.told or law.sharp or law.uniform),
             )
