@@ -25,7 +25,7 @@ _BEHIND = 2
 #: points from which on a march watches whether it goes round and round without passing its start
 _LONG = 256
 #: share of a step over which derivatives count as the same
-_SPARED = 5e-6
+_SPARED = 2e-5
 
 
 @dataclass(frozen=True)
