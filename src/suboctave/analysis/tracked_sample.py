@@ -222,8 +222,19 @@ def nearest_point(
 def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Unit vector that the scaled Jacobian at u maps to zero: the curve's direction there."""
     jacobian = curve.evaluate(u).jacobian / weights
-    q = np.linalg.qr(jacobian.T, mode="complete")[0]
-    result: np.ndarray = q[:, -1]
+    last = np.zeros(len(u))
+    last[-1] = 1.0
+    row = last
+    for _ in range(2):
+        factor = Factor.of(np.vstack((jacobian, row)))
+        found = factor.solve(last) if not factor.singular else None
+        if found is None or not np.isfinite(found).all():
+            break
+        # from the second time on the row is the direction itself, so that the matrix is as regular as can be
+        row = found / length(found)
+    else:
+        return row
+    result: np.ndarray = np.linalg.qr(jacobian.T, mode="complete")[0][:, -1]
     return result
 
 

@@ -215,3 +215,13 @@ def determinant_sign(lu, pivots):
         if lu[i, i] < 0.0:
             sign = -sign
     return sign
+
+
+@kernel()
+def log_modulus(lu):
+    """Natural logarithm of the modulus of the determinant of a factorised matrix."""
+    total = 0.0
+    for i in range(lu.shape[0]):
+        size = abs(lu[i, i])
+        total += math.log(size) if size > 0.0 else -math.inf
+    return total

@@ -69,8 +69,7 @@ class Factor:
     @property
     def log_determinant(self) -> float:
         """Natural logarithm of the determinant's modulus."""
-        with np.errstate(divide="ignore"):
-            return float(np.log(np.abs(self.lu.diagonal())).sum())
+        return float(kernels.log_modulus(self.lu))
 
 
 class LeadingBlock:

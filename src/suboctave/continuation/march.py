@@ -24,6 +24,8 @@ from suboctave.errors import ConvergenceError, InputError
 _BEHIND = 2
 #: points from which on a march watches whether it goes round and round without passing its start
 _LONG = 256
+#: how often a step is halved towards the bound that it passes; Newton's method does the rest
+_HALVED = 20
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-5
 
@@ -374,7 +376,7 @@ class March:
         """The point on the bound between two neighbours."""
         index = point.curve.parameter
         low, high = 0.0, 1.0
-        for _ in range(60):
+        for _ in range(_HALVED):
             middle = 0.5 * (low + high)
             beyond = (between(point, new, middle)[index] - bound) * (new.parameter - bound) > 0.0
             low, high = (low, middle) if beyond else (middle, high)
