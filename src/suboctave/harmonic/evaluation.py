@@ -15,11 +15,18 @@ from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.group_force import add_sampled_spectra
-from suboctave.harmonic.group_kernels import add_pieces, add_polynomial, balance_residual, tangent_matrix
+from suboctave.harmonic.group_force import PackedLaws, add_sampled_spectra
+from suboctave.harmonic.group_kernels import (
+    add_pieces,
+    add_polynomial,
+    add_smooth_steps,
+    balance_residual,
+    tangent_matrix,
+)
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.nodal import add_tangent
-from suboctave.harmonic.quadrature import uniform_nodes
+from suboctave.harmonic.quadrature import rule_tables, uniform_nodes
+from suboctave.harmonic.sharp_nodes import sharp_nodes
 
 if TYPE_CHECKING:
     from suboctave.harmonic.state import BalanceState
@@ -90,6 +97,41 @@ def evaluate(
             finite = finite and math.isfinite(table[r, g, 0].real) and math.isfinite(table[r, g, 0].imag)
     balance_residual(x, blocks, table[0], load, starts, dofs, shape, weight, parts, sizes)
     return finite
+
+
+@kernel()
+def evaluate_told(
+    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
+    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+):  # fmt: skip
+    """`evaluate` with laws that have arctan steps; the table's spectra are zero before.
+
+    Parameters
+    ----------
+    points, widths, steps, step_first
+        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
+        each direction's begin, (G + 1,).
+    line
+        Constant and slope of the laws that they belong to, (G, 2).
+    rule_nodes, rule_weights
+        `sharp_nodes.tables()`.
+    """
+    along_directions(x, starts, dofs, shape, motions)
+    degree = table.shape[2] + motions.shape[1] - 2
+    # not a literal, for which the nodes would be compiled once more
+    moving = degree < 0
+    for g in range(motions.shape[0]):
+        low, high = step_first[g], step_first[g + 1]
+        if high > low:
+            sampled = sharp_nodes(
+                motions[g], points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes,
+                rule_weights,
+            )  # fmt: skip
+            add_smooth_steps(sampled, steps[low:high], line[g], table[0, g], table[1, g])
+    return evaluate(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
+        table, motions, parts, sizes,
+    )  # fmt: skip
 
 
 @kernel()
@@ -164,7 +206,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     count, size = len(balance.groups), balance.size
     packed, nodes = balance.packed_laws(state.values)
     table = np.zeros((3, count, balance.top + 1), dtype=complex)
-    if packed.sampled:
+    if packed.sampled and not packed.told:
         laws = balance.coefficients(state.values)[2]
         for g, (law, motion) in enumerate(zip(laws, state.motions, strict=True)):
             out = (table[0, g], table[1, g], table[2, g])
@@ -176,7 +218,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         matrices, blocks = _NO_MATRICES, np.ascontiguousarray(state.blocks, dtype=complex)
     motions = np.empty((count, basis.harmonics + 1), dtype=complex)
     parts, sizes = np.empty((3, *state.x.shape)), np.empty(4)
-    finite = evaluate(
+    given = (
         state.x,
         state.omega,
         basis.multiples,
@@ -190,11 +232,9 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         nodes,
         balance.load(state.values, state.omega),
         balance.scales()[1],
-        table,
-        motions,
-        parts,
-        sizes,
     )
+    filled = (table, motions, parts, sizes)
+    finite = evaluate_told(*given, *told_steps(packed), *filled) if packed.told else evaluate(*given, *filled)
     known = state.__dict__
     known["motions"], known["blocks"] = motions, blocks
     if not balance.own:
@@ -202,6 +242,11 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     if not finite:
         _refuse(state)
     return table, parts, sizes
+
+
+def told_steps(packed: PackedLaws) -> tuple[Array, ...]:
+    """Arctan steps as `evaluate_told` wants them, from `points` to `rule_weights`."""
+    return (*packed.places, packed.steps, packed.step_first, packed.line, *rule_tables())
 
 
 def _refuse(state: BalanceState) -> None:
