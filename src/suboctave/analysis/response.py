@@ -209,26 +209,9 @@ class ResponseCurve:
         blocks, parts = np.empty((high + 1, size, size), dtype=complex), np.empty((3, 2 * high + 1, size))
         table = np.empty((3, groups, balance.top + 1), dtype=complex)
         motions, sizes, numbers = np.empty((groups, high + 1), dtype=complex), np.empty(4), np.empty(5)
-        ended = corrected(
-            guess,
-            row,
-            weights,
-            options.tolerance,
-            options.correction,
-            options.iterations,
-            spare,
-            *known[0],
-            u,
-            tangent,
-            lu,
-            pivots,
-            blocks,
-            table,
-            motions,
-            parts,
-            sizes,
-            numbers,
-        )
+        limits = (options.tolerance, options.correction, options.iterations, spare)
+        filled = (u, tangent, lu, pivots, blocks, table, motions, parts, sizes, numbers)
+        ended = corrected(*(guess, row, weights, *limits, *known[0], *filled))
         error, iterations, way, contraction, sign = numbers.tolist()
         if ended == UNSOLVED:
             raise not_converged(self, guess, error, int(iterations))
@@ -290,6 +273,8 @@ class ResponseCurve:
 
     def transfer(self, u: Array, origin: Curve) -> Array:
         """See `Curve.transfer`."""
+        if origin is self:
+            return u
         assert isinstance(origin, ResponseCurve)
         if origin.balance is self.balance or origin.balance.basis == self.balance.basis:
             return u

@@ -1,4 +1,4 @@
-"""LU factors inside compiled code: the LAPACK that Numba links for `numpy.linalg`, and the solution with its factors."""
+"""LU factors inside compiled code, by the LAPACK that Numba links for `numpy.linalg`, and solutions with them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _REAL = ord("d")
 def factorise(transposed, pivots):
     """LU factors of a matrix whose transpose is given, in place; returns whether it is singular.
 
-    pivots (n,): filled with the row that each row was exchanged with, counted from 0, as `scipy.linalg.lapack` has them.
+    pivots (n,): filled with the row that each row was exchanged with, counted from 0, as `scipy.linalg.lapack` does.
     """
     n = transposed.shape[0]
     found = np.empty(n, dtype=F_INT_nptype)

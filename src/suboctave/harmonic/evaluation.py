@@ -7,7 +7,7 @@ system spends more time than in them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -129,8 +129,8 @@ def evaluate_told(
             )  # fmt: skip
             add_smooth_steps(sampled, steps[low:high], line[g], table[0, g], table[1, g])
     return evaluate(
-        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
-        table, motions, parts, sizes,
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, table, motions, parts, sizes,
     )  # fmt: skip
 
 
@@ -234,7 +234,10 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         balance.scales()[1],
     )
     filled = (table, motions, parts, sizes)
-    finite = evaluate_told(*given, *told_steps(packed), *filled) if packed.told else evaluate(*given, *filled)
+    if packed.told:
+        finite = evaluate_told(*(*given, *told_steps(packed), *filled))
+    else:
+        finite = evaluate(*given, *filled)
     known = state.__dict__
     known["motions"], known["blocks"] = motions, blocks
     if not balance.own:
@@ -244,7 +247,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     return table, parts, sizes
 
 
-def told_steps(packed: PackedLaws) -> tuple[Array, ...]:
+def told_steps(packed: PackedLaws) -> tuple[Any, ...]:
     """Arctan steps as `evaluate_told` wants them, from `points` to `rule_weights`."""
     return (*packed.places, packed.steps, packed.step_first, packed.line, *rule_tables())
 
