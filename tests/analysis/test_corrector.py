@@ -26,7 +26,9 @@ def between_stops():
         so.ElasticStop(direction=[-1.0, 1.0], stiffness=5.0, gap=0.03),
     ]
     stiffness = np.array([[3.0, -1.0], [-1.0, 2.0]])
-    return so.System(np.diag([1.0, 0.7]), 0.05 * stiffness, stiffness, elements, [so.HarmonicLoad(dof=0, amplitude=0.6)])
+    return so.System(
+        np.diag([1.0, 0.7]), 0.05 * stiffness, stiffness, elements, [so.HarmonicLoad(dof=0, amplitude=0.6)]
+    )
 
 
 SYSTEMS = {
@@ -128,7 +130,7 @@ def test_factors_in_compiled_code():
     expected = Factor.of(matrix.copy())
     transposed, pivots, solution = matrix.T.copy(), np.empty(23, dtype=np.int32), right.copy()
     assert not factorise(transposed, pivots)
-    assert transposed.T == pytest.approx(expected.lu, abs=1e-13)
+    assert pytest.approx(expected.lu, abs=1e-13) == transposed.T
     assert (pivots == expected.pivots).all()
     solve_factorised(transposed, pivots, solution)
     assert matrix @ solution == pytest.approx(right, abs=1e-12)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import evaluate_told, told_steps
+from suboctave.harmonic.group_kernels import add_pieces
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, motion_size, truncation
 from suboctave.harmonic.state import BalanceState
@@ -162,9 +163,9 @@ class ResponseCurve:
         return ResponseEvaluation(self.balance.at(x, omega, values), self.name, self.reference)
 
     @lazy
-    def _known(self) -> tuple[tuple[Any, ...], bool] | None:
-        """What `corrector.corrected` is told of these equations, and whether there are arctan steps; None where they
-        are not of its kind.
+    def _known(self) -> tuple[tuple[Any, ...], list[Callable[..., Any]]] | None:
+        """What `corrector.corrected` is told of these equations, and those of the kernels called for them that other
+        laws need not; None where they are not of its kind.
         """
         balance = self.balance
         plain = self.name == "omega" and balance.steady and balance.basis.kept is None
@@ -180,7 +181,7 @@ class ResponseCurve:
             balance.basis.multiples,
             balance.linear.matrices,
             *balance.directions,
-            packed.pieces,
+            packed.pieces if len(packed.pieces) else None,
             packed.first,
             packed.polynomial,
             balance.grid,
@@ -188,7 +189,8 @@ class ResponseCurve:
             balance.load(balance.values, 1.0),
             balance.scales()[1],
         )
-        return equations + (told_steps(packed) if packed.told else (None,) * 7), packed.told
+        parts = [part for part, needed in ((evaluate_told, packed.told), (add_pieces, len(packed.pieces))) if needed]
+        return equations + (told_steps(packed) if packed.told else (None,) * 7), parts
 
     def corrected(
         self, guess: Array, row: Array, weights: Array, options: NewtonOptions, spare: float
@@ -201,8 +203,8 @@ class ResponseCurve:
             If the iterations do not contract or run out.
         """
         known, balance = self._known, self.balance
-        # the steps' kernels are compiled one by one, not all at one go
-        if known is None or (known[1] and not ready(evaluate_told)):
+        # what it calls is compiled one by one, not all at one go
+        if known is None or not all(map(ready, known[1])):
             return None
         n, high, size, groups = len(guess), balance.basis.harmonics, balance.size, len(balance.groups)
         u, tangent, lu, pivots = np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, dtype=np.int32)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.compiled import kernel, ready
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -66,7 +66,8 @@ def evaluate(
     starts, dofs, shape
         Directions, as in `balance_residual`.
     pieces, first
-        Stiffness, gap and side of piecewise-linear pieces (P, 3), direction by direction: where each begins, (G + 1,).
+        Stiffness, gap and side of piecewise-linear pieces (P, 3), or None without any, direction by direction: where
+        each begins, (G + 1,).
     polynomial
         Coefficients of u^0, u^1, ... along every direction (G, D).
     grid, nodes
@@ -88,7 +89,8 @@ def evaluate(
     finite = True
     for g in range(motions.shape[0]):
         c = motions[g]
-        if first[g + 1] > first[g]:
+        # without pieces nobody waits for the compilation of what they need
+        if pieces is not None and first[g + 1] > first[g]:
             add_pieces(c, pieces[first[g] : first[g + 1]], grid[0], grid[1], table[0, g], table[1, g])
         if polynomial.shape[1] > 0:
             add_polynomial(c, polynomial[g], nodes[0], nodes[1], table[0, g], table[1, g])
@@ -211,6 +213,14 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         for g, (law, motion) in enumerate(zip(laws, state.motions, strict=True)):
             out = (table[0, g], table[1, g], table[2, g])
             add_sampled_spectra(law, balance.elements, balance.samples, motion, state.rate, out)
+    pieces = packed.pieces if len(packed.pieces) else None
+    if pieces is not None and ready(evaluate) and not ready(add_pieces):
+        # compiled one after the other, where `evaluate` has been compiled for laws without pieces
+        grid = balance.grid
+        for g, motion in enumerate(state.motions):
+            own = pieces[packed.first[g] : packed.first[g + 1]]
+            add_pieces(motion, own, grid[0], grid[1], table[0, g], table[1, g])
+        pieces = None
     if isinstance(linear, StructuralMatrices):
         matrices = linear.matrices
         blocks = np.empty((basis.harmonics + 1, size, size), dtype=complex)
@@ -225,7 +235,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         matrices,
         blocks,
         *balance.directions,
-        packed.pieces,
+        pieces,
         packed.first,
         packed.polynomial,
         balance.grid,
