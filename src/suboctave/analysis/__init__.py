@@ -6,9 +6,14 @@ from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagra
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.integration import Trajectory, integrate
-from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isola import Isola
+from suboctave.analysis.isola_map import isola_map
+from suboctave.analysis.isola_region import IsolaMap
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
+from suboctave.analysis.regime_map import RegimeMap
+from suboctave.analysis.regimes import regime_map
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
@@ -24,8 +29,10 @@ __all__ = [
     "BranchPoint",
     "BruteForceDiagram",
     "Isola",
+    "IsolaMap",
     "Isolas",
     "PoincareSections",
+    "RegimeMap",
     "Results",
     "Seeds",
     "Table",
@@ -39,10 +46,12 @@ __all__ = [
     "find_subharmonics",
     "frequency_response",
     "integrate",
+    "isola_map",
     "load",
     "locate_extremum",
     "periodic_orbit",
     "poincare_sections",
+    "regime_map",
     "stability",
     "switch_branch",
     "track",
