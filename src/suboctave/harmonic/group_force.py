@@ -169,8 +169,12 @@ class PackedLaws(NamedTuple):
     steps, step_owner, line
         Gap, width, stiffness of arctan steps (S, 3) and their directions (S,); constant and slope of the laws that they
         belong to, (G, 2).
+    step_first, places
+        Where each direction's steps begin, (G + 1,); gaps and widths of the steps, (S,) each.
     sampled
         Whether any direction has laws that need nodes of their own, arctan steps among them.
+    told
+        Whether arctan steps are all of these.
     """
 
     pieces: Array
@@ -180,7 +184,10 @@ class PackedLaws(NamedTuple):
     steps: Array
     step_owner: NDArray[np.int64]
     line: Array
+    step_first: NDArray[np.int64]
+    places: tuple[Array, Array]
     sampled: bool
+    told: bool
 
     @classmethod
     def of(cls, laws: list[GroupLaw]) -> PackedLaws:
@@ -196,28 +203,40 @@ class PackedLaws(NamedTuple):
                 law.smooth_steps,
                 _zeros(len(law.smooth_steps)),
                 law.line[None],
+                np.array((0, len(law.smooth_steps))),
+                law.told_places,
                 bool(law.told or law.sharp or law.uniform),
+                _only_told(laws),
             )
         number = np.arange(len(laws))
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
         for g, law in enumerate(laws):
             polynomial[g, : len(law.polynomial)] = law.polynomial
         counts = [len(law.pieces) for law in laws]
+        steps = np.concatenate([np.zeros((0, 3))] + [law.smooth_steps for law in laws])
         return cls(
             np.concatenate([np.zeros((0, 3))] + [law.pieces for law in laws]),
             np.repeat(number, counts),
             np.cumsum([0, *counts]),
             polynomial,
-            np.concatenate([np.zeros((0, 3))] + [law.smooth_steps for law in laws]),
+            steps,
             np.repeat(number, [len(law.smooth_steps) for law in laws]),
             np.array([law.line for law in laws]).reshape(-1, 2),
+            np.cumsum([0] + [len(law.smooth_steps) for law in laws]),
+            (steps[:, 0].copy(), steps[:, 1].copy()),
             any(law.told or law.sharp or law.uniform for law in laws),
+            _only_told(laws),
         )
 
     def nodes(self, high: int, top: int) -> Array:
         """Points on the circle for the polynomials, enough for their tangents: cosines and sines, (2, N)."""
         degree = self.polynomial.shape[1] - 1
         return on_circle(even(degree * high + top + 1)) if degree >= 0 else on_circle(0)
+
+
+def _only_told(laws: list[GroupLaw]) -> bool:
+    known = all(law.in_closed_form and (len(law.smooth_steps) > 0 or not law.told) for law in laws)
+    return known and any(law.told for law in laws)
 
 
 def add_sampled_spectra(
