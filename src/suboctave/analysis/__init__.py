@@ -2,6 +2,7 @@
 
 from suboctave.analysis.attractors import Attractor
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.branch_verification import BranchVerification, VerifiedBifurcation, VerifiedPoint
 from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagram
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
@@ -22,6 +23,7 @@ __all__ = [
     "BifurcationDiagram",
     "Branch",
     "BranchPoint",
+    "BranchVerification",
     "BruteForceDiagram",
     "Isola",
     "Isolas",
@@ -32,6 +34,8 @@ __all__ = [
     "TrackedBranch",
     "Trajectory",
     "Verification",
+    "VerifiedBifurcation",
+    "VerifiedPoint",
     "bifurcation_diagram",
     "brute_force_diagram",
     "continue_branch",
