@@ -9,8 +9,10 @@ from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.integration import Trajectory, integrate
 from suboctave.analysis.isola import Isola, Isolas
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.measured import Measured, read_measured
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
 from suboctave.analysis.results import Results, Table, load
+from suboctave.analysis.stepped_sine import SteppedSine, stepped_sine
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
@@ -27,9 +29,11 @@ __all__ = [
     "BruteForceDiagram",
     "Isola",
     "Isolas",
+    "Measured",
     "PoincareSections",
     "Results",
     "Seeds",
+    "SteppedSine",
     "Table",
     "TrackedBranch",
     "Trajectory",
@@ -47,7 +51,9 @@ __all__ = [
     "locate_extremum",
     "periodic_orbit",
     "poincare_sections",
+    "read_measured",
     "stability",
+    "stepped_sine",
     "switch_branch",
     "track",
     "verify",

@@ -1,0 +1,397 @@
+"""`stepped_sine`: the virtual stepped-sine test, as a rig would run it; Alcorta et al. 2019, section 5.4.
+
+The frequency goes in steps, the motion is carried on and the load's phase is continuous. At each step the motion
+settles, then response and load are measured over whole periods. With X_m and P_m the components at omega of response
+and load in measured period m,
+
+    X_1 = P sum_m X_m conj(P_m) / sum_m |P_m|^2,
+
+the cross-spectrum over the auto-spectrum of the load (the estimate H1) times the load's amplitude P: what a
+harmonic-balance branch calls `harmonic(1)`, phase relative to the load. Noise on the measured response averages out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.analysis.attractors import TOLERANCE, Attractor, attractor_of
+from suboctave.analysis.checks import check_range, is_number
+from suboctave.analysis.integration import FEW, start_state
+from suboctave.analysis.poincare import check_observe, check_tolerance
+from suboctave.analysis.progress import Report, reporting, timed
+from suboctave.errors import InputError, suggest
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.model.element import Array
+from suboctave.model.system import System
+from suboctave.timedomain.batch import Flow, Motions, check_count, check_motions
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["SteppedSine", "stepped_sine"]
+
+_DIRECTIONS = ("up", "down", "both")
+_SAMPLES = 128
+
+
+@dataclass(eq=False)
+class SteppedSine:
+    """A virtual stepped-sine test in S directions over V frequencies.
+
+    Attributes
+    ----------
+    omega
+        (V,), increasing whatever the direction.
+    directions
+        S of "up", "down".
+    multiples
+        (K,): the components that were measured, in multiples of omega.
+    components
+        (S, V, K, n): their complex amplitudes `c` in `x = Re c exp(i k omega t)`, t from phase 0 of the load; nan where
+        nothing was measured.
+    response
+        (S, V, n): the fundamental by cross- over auto-spectrum, times the load's amplitude; phase relative to the load.
+    largest
+        (S, V, n): the largest |x| between the samples too, without noise.
+    period
+        (S, V): in periods of the load, 0 where nothing repeats (not settled, quasi-periodic, chaotic), -1 where nothing
+        was measured.
+    ends
+        (S, V, 2n): the states at the end of each step, at phase 0 of the load.
+    tapped
+        (S,): at which frequency the tap was given, nan without one.
+    complete
+        False where an interruption (Ctrl-C) left steps out.
+    """
+
+    omega: Array
+    directions: tuple[str, ...]
+    multiples: Array
+    components: ComplexArray
+    response: ComplexArray
+    largest: Array
+    period: NDArray[np.int_]
+    ends: Array
+    tapped: Array
+    complete: bool
+    settle: int
+    measure: int
+    noise: float
+    observed: int
+    system: System
+    seconds: float = 0.0
+
+    def of(self, direction: str | None = None) -> int:
+        """Which row a direction is; without a name that of the only one."""
+        if direction is None:
+            if len(self.directions) > 1:
+                raise InputError("say which direction: up or down")
+            return 0
+        if direction not in self.directions:
+            raise InputError(f"there is no sweep {direction!r}{suggest(str(direction), self.directions)}")
+        return self.directions.index(direction)
+
+    def harmonic(self, k: float = 1, dof: int | None = None, direction: str | None = None) -> ComplexArray:
+        """Complex amplitudes (V,) at `k omega`; that of the fundamental is `response`."""
+        row, at = self.of(direction), self.observed if dof is None else check_observe(self.system, dof)
+        if k == 1:
+            return self.response[row, :, at]
+        found = np.flatnonzero(np.abs(self.multiples - k) < 1e-9)
+        if not found.size:
+            raise InputError(f"k={k:g} was not measured: harmonics= asks for it; there are {self.multiples.tolist()}")
+        return self.components[row, :, int(found[0]), at]
+
+    def amplitude(self, direction: str | None = None) -> Array:
+        """|X_1| of the observed degree of freedom, (V,)."""
+        return np.abs(self.harmonic(1, None, direction))
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per measured step: direction, omega, amplitude and phase of the fundamental, others, period."""
+        import pandas as pd
+
+        rows = []
+        for s, direction in enumerate(self.directions):
+            for v in np.flatnonzero(self.period[s] >= 0):
+                x = complex(self.response[s, v, self.observed])
+                row = {"direction": direction, "omega": self.omega[v], "amplitude": abs(x),
+                       "phase_deg": math.degrees(math.atan2(x.imag, x.real))}  # fmt: skip
+                for k, c in zip(self.multiples, self.components[s, v, :, self.observed], strict=True):
+                    if k != 1.0:
+                        row[f"harmonic_{k:g}"] = abs(c)
+                rows.append(row | {"largest": self.largest[s, v, self.observed], "period": self.period[s, v]})
+        names = ["direction", "omega", "amplitude", "phase_deg"]
+        names += [f"harmonic_{k:g}" for k in self.multiples if k != 1.0]
+        return pd.DataFrame(rows, columns=[*names, "largest", "period"])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Components on (direction, omega, multiple, dof), real and imaginary parts apart, and what produced them."""
+        import xarray
+
+        axes = ("direction", "omega")
+        return xarray.Dataset(
+            {
+                "response_real": ((*axes, "dof"), self.response.real),
+                "response_imag": ((*axes, "dof"), self.response.imag),
+                "component_real": ((*axes, "multiple", "dof"), self.components.real),
+                "component_imag": ((*axes, "multiple", "dof"), self.components.imag),
+                "largest": ((*axes, "dof"), self.largest),
+                "period": (axes, self.period),
+                "parameters": (("parameter",), np.array(list(self.system.parameters.values()), dtype=float)),
+            },
+            coords={
+                "direction": list(self.directions),
+                "omega": self.omega,
+                "multiple": self.multiples,
+                "dof": list(self.system.dof_names or range(self.system.n)),
+                "parameter": list(self.system.parameters),
+            },
+            attrs={
+                "contents": "stepped sine",
+                "settle": self.settle,
+                "measure": self.measure,
+                "noise": self.noise,
+                "observed": self.observed,
+                "dofs": self.system.n,
+                "complete": int(self.complete),
+                "system": self.system.name,
+                "suboctave": __version__,
+            },
+        )
+
+    def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
+        """Draw the measured fundamentals, over branches and beside data of a rig if any are given; saved to a path.
+
+        Options are those of `pictures.plot_stepped_sine`: `harmonic`, `dof`, `title`, `size`.
+        """
+        from suboctave.pictures.stepped import plot_stepped_sine
+
+        return plot_stepped_sine(self.to_xarray(), path, curves=curves, measured=measured, **options)
+
+    def __repr__(self) -> str:
+        done, settled = int((self.period >= 0).sum()), int((self.period > 0).sum())
+        taps = [f", tapped at omega = {w:.6g} on the way {d}" for w, d in zip(self.tapped, self.directions, strict=True)
+                if np.isfinite(w)]  # fmt: skip
+        return (
+            f"SteppedSine(omega from {self.omega[0]:g} to {self.omega[-1]:g}, {' and '.join(self.directions)}, "
+            f"{done} steps, {settled} of them settled{''.join(taps)}{'' if self.complete else ', not complete'})"
+        )
+
+
+@timed
+def stepped_sine(
+    system: System,
+    omega: Any,
+    *,
+    steps: int = 200,
+    direction: str = "up",
+    settle: int = 200,
+    measure: int = 60,
+    state: Any = None,
+    tap: tuple[float, int, float] | None = None,
+    harmonics: Sequence[float] = (0, 0.5, 1, 2, 3),
+    noise: float = 0.0,
+    seed: int = 0,
+    tolerance: float | None = None,
+    period_tolerance: float = TOLERANCE,
+    observe: int | None = None,
+    progress: Any = None,
+) -> SteppedSine:
+    """Step a sine through a range of frequencies and measure the response, as a rig does.
+
+    Parameters
+    ----------
+    omega
+        `(from, to)`, in `steps` equal steps; or all of an array. The order is irrelevant.
+    direction
+        "up", "down", or "both": two tests, each from `state`.
+    settle, measure
+        Periods of the load at each step before, and over which, is measured. Sub-harmonic motions need a `measure` that
+        their period divides (60: up to 6T, and 10T).
+    state
+        Where each test begins, (2n,), a periodic motion or an attractor; default rest.
+    tap
+        `(omega, dof, velocity)`: when a test arrives at or first passes this frequency, the velocity of a degree of
+        freedom is changed by so much, at phase 0 of the load and after settling. It may lead to another motion.
+    harmonics
+        Multiples of omega whose components are measured; `measure` times each must be whole. The fundamental always is.
+    noise, seed
+        Standard deviation of white noise on the samples of the response, in its unit, and the seed of the generator.
+    tolerance, period_tolerance, observe, progress
+        As in `poincare_sections`.
+
+    Raises
+    ------
+    InputError
+        Before any work; also if no load is sinusoidal with the frequency omega.
+    ConvergenceError
+        If the motion leaves the range of numbers.
+    """
+    start = start_state(system, state)
+    grid = _frequencies(omega, steps)
+    if direction not in _DIRECTIONS:
+        raise InputError(f"direction={direction!r}: up, down or both{suggest(str(direction), _DIRECTIONS)}")
+    directions = ("up", "down") if direction == "both" else (direction,)
+    settle, measure = check_count("settle", settle), check_count("measure", measure)
+    multiples = _multiples(harmonics, measure)
+    where = _tap(system, tap, grid)
+    if not (is_number(noise) and noise >= 0.0):
+        raise InputError(f"noise must be a standard deviation in the unit of the response, 0 or more, not {noise!r}")
+    check_tolerance(period_tolerance)
+    test = _Test(system, grid, settle, measure, multiples, float(noise), check_observe(system, observe))
+    _loads(system, float(grid[0]))
+    flows = tuple(Flow(system, "accurate", samples, 1000, tolerance, lanes=FEW) for samples in (1, _SAMPLES))
+    shape = (len(directions), len(grid))
+    out = SteppedSine(
+        grid, directions, multiples, np.full((*shape, len(multiples), system.n), np.nan, dtype=complex),
+        np.full((*shape, system.n), np.nan, dtype=complex), np.full((*shape, system.n), np.nan),
+        np.full(shape, -1), np.full((*shape, 2 * system.n), np.nan), np.full(len(directions), np.nan), True, settle,
+        measure, float(noise), test.observe, system,
+    )  # fmt: skip
+    with reporting(progress, "stepped sine") as report:
+        try:
+            test.run(flows, out, start, where, np.random.default_rng(seed), period_tolerance, report)
+        except KeyboardInterrupt:
+            out.complete = False
+    return out
+
+
+@dataclass
+class _Test:
+    """One test on its way."""
+
+    system: System
+    grid: Array
+    settle: int
+    measure: int
+    multiples: Array
+    noise: float
+    observe: int
+
+    def run(
+        self,
+        flows: tuple[Flow, ...],
+        out: SteppedSine,
+        start: Array,
+        tap: tuple[float, int, float] | None,
+        random: np.random.Generator,
+        period_tolerance: float,
+        report: Report | None,
+    ) -> None:
+        """Both directions side by side, step by step."""
+        count, n = len(self.grid), self.system.n
+        ways = out.directions
+        states = np.repeat(start[None], len(ways), axis=0)
+        for step in range(count):
+            columns = [step if way == "up" else count - 1 - step for way in ways]
+            w = self.grid[columns]
+            if tap is not None:
+                at = np.array(
+                    [here >= tap[0] if way == "up" else here <= tap[0] for way, here in zip(ways, w, strict=True)]
+                )
+                at &= np.isnan(out.tapped)
+                if at.any():
+                    states[at] = _over(flows[0], states[at], w[at], self.settle).end
+                    states[at, n + tap[1]] += tap[2]
+                    out.tapped[at] = w[at]
+            states = _over(flows[0], states, w, self.settle).end
+            motions = _over(flows[1], states, w, self.measure, measured=True)
+            states = motions.end.copy()
+            for s, v in enumerate(columns):
+                assert motions.peaks is not None
+                x, peaks = motions.states[s], motions.peaks[s]
+                largest = peaks.reshape(self.measure, -1, n).max(axis=1)
+                told = self._told(x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]), period_tolerance)
+                out.period[s, v], out.largest[s, v], out.ends[s, v] = told.period, largest.max(axis=0), states[s]
+                samples = x[:, :n] + (random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
+                out.components[s, v], out.response[s, v] = self._measured(samples, float(w[s]))
+            if report is not None:
+                report((step + 1) / count, f"omega = {w[0]:.6g}")
+
+    def _told(self, points: Array, largest: Array, omega: float, tolerance: float) -> Attractor:
+        parameters = self.system.parameters
+        return attractor_of(self.system, points, largest, omega, parameters, tolerance, self.observe)
+
+    def _measured(self, x: Array, omega: float) -> tuple[ComplexArray, ComplexArray]:
+        """Components (K, n), and the fundamental (n,) by cross- over auto-spectrum."""
+        # samples lie at the ends of the intervals: the first at phase 2 pi / samples
+        turn = np.arange(1, len(x) + 1) / _SAMPLES
+        scale = np.where(self.multiples == 0.0, 1.0, 2.0)
+        waves = np.exp(-2j * np.pi * np.outer(self.multiples, turn))
+        components = (waves @ x) * (scale / len(x))[:, None]
+        load = _loads(self.system, omega)
+        phase = 2.0 * np.pi * turn
+        p = np.real(load * np.exp(1j * phase))
+        carrier = np.exp(-1j * phase)
+        per_period = (2.0 / _SAMPLES) * (carrier[:, None] * x).reshape(self.measure, _SAMPLES, -1).sum(axis=1)
+        loads = (2.0 / _SAMPLES) * (carrier * p).reshape(self.measure, _SAMPLES).sum(axis=1)
+        cross = np.sum(per_period * np.conj(loads)[:, None], axis=0)
+        return components, abs(load) * cross / np.sum(np.abs(loads) ** 2)
+
+
+def _over(flow: Flow, states: Array, omega: Array, periods: int, measured: bool = False) -> Motions:
+    """Follow states; their samples and the largest displacements in between are kept of what is measured."""
+    skip = 0 if measured else periods * flow.samples
+    motions = flow.over(states, omega, periods, skip=skip, measure=measured, workers=1)
+    if not motions.finished.all():
+        raise KeyboardInterrupt
+    check_motions(motions, flow)
+    return motions
+
+
+def _loads(system: System, omega: float) -> complex:
+    """Complex amplitude of the reference: the first load with the frequency omega."""
+    values = {**system.parameters, "omega": omega}
+    for component in system.load_components():
+        if component.harmonic == 1:
+            amplitude, phase = component.amplitude.value(values), component.phase.value(values)
+            if amplitude != 0.0:
+                return complex(amplitude * np.exp(1j * phase))
+    raise InputError(
+        "a stepped-sine test needs a load with the frequency omega (harmonic=1) whose amplitude is not zero"
+    )
+
+
+def _frequencies(omega: Any, steps: int) -> Array:
+    if isinstance(omega, tuple) and len(omega) == 2:
+        first, last = check_range("omega", omega, True)
+        return np.linspace(min(first, last), max(first, last), check_count("steps", steps) + 1)
+    try:
+        array = np.asarray(omega, dtype=float)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (array <= 0.0).any():
+        raise InputError("omega: give a range (from, to), or an array of positive frequencies")
+    return np.unique(array)
+
+
+def _multiples(harmonics: Sequence[float], measure: int) -> Array:
+    try:
+        array = np.atleast_1d(np.asarray(list(harmonics), dtype=float))
+    except (TypeError, ValueError):
+        array = np.array([np.nan])
+    if not array.size or not np.isfinite(array).all() or (array < 0.0).any() or (array >= _SAMPLES / 4).any():
+        raise InputError(f"harmonics must be multiples of omega from 0 to {_SAMPLES // 4 - 1}, not {harmonics!r}")
+    whole = array * measure
+    if (np.abs(whole - whole.round()) > 1e-9).any():
+        raise InputError(
+            f"harmonics={harmonics!r}: {measure} measured periods hold no whole number of each; change measure"
+        )
+    return np.unique(np.append(array, 1.0))
+
+
+def _tap(system: System, tap: Any, grid: Array) -> tuple[float, int, float] | None:
+    if tap is None:
+        return None
+    if not isinstance(tap, tuple | list) or len(tap) != 3 or not (is_number(tap[0]) and is_number(tap[2])):
+        raise InputError(f"tap must be (omega, dof, change of velocity), not {tap!r}")
+    if not grid[0] <= tap[0] <= grid[-1]:
+        raise InputError(f"tap: omega = {tap[0]:g} is not within the test, {grid[0]:g} to {grid[-1]:g}")
+    return float(tap[0]), check_observe(system, tap[1]), float(tap[2])
