@@ -128,10 +128,11 @@ def test_branch_points_and_a_parameter():
 def test_multipliers_of_a_million():
     """Small motions about the top between two wells: the product of the growth is exp(2 pi r / omega)."""
     hill = so.System(
-        mass=1.0, damping=0.1, stiffness=-1.0, elements=[so.CubicSpring(dof=0, coefficient=1.0)],
-        loads=[so.HarmonicLoad(dof=0, amplitude=1e-3)],
+        mass=1.0, damping=0.1, stiffness="k", elements=[so.CubicSpring(dof=0, coefficient=1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude=1e-3)], parameters={"k": 1.0},
     )  # fmt: skip
-    branch = so.frequency_response(hill, (0.4, 0.45), start=[0.0, 0.0])
+    down = so.continue_branch(hill, parameter="k", bounds=(1.0, -1.0), omega=0.45)
+    branch = so.frequency_response(hill.with_parameters(k=-1.0), (0.45, 0.4), start=down.orbits[-1])
     assert branch.amplitude.max() < 2e-3
     check = so.verify(branch)
     assert check.agrees, check

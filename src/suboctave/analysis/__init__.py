@@ -12,7 +12,8 @@ from suboctave.analysis.isolas import find_isolas
 from suboctave.analysis.measured import Measured, read_measured
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
 from suboctave.analysis.results import Results, Table, load
-from suboctave.analysis.stepped_sine import SteppedSine, stepped_sine
+from suboctave.analysis.stepped_result import SteppedSine
+from suboctave.analysis.stepped_sine import stepped_sine
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
