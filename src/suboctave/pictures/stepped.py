@@ -10,7 +10,7 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
-from suboctave.pictures.in_time import _APERIODIC, _POINTING, _check, _colour, _dof, _finish, _frame, _name
+from suboctave.pictures.in_time import _POINTING, _check, _colour, _dof, _finish, _frame, _name
 from suboctave.pictures.response import draw_response, dress
 from suboctave.pictures.view import View
 
@@ -29,6 +29,8 @@ def plot_stepped_sine(
     measured: Any = None,
     harmonic: float = 1,
     dof: int | None = None,
+    xlim: Sequence[float] | None = None,
+    ylim: Sequence[float] | None = None,
     title: str | None = None,
     size: str | tuple[float, float] = (6.4, 4.2),
 ) -> Figure:
@@ -42,6 +44,8 @@ def plot_stepped_sine(
         `Measured`, or several of them; of the fundamental only.
     harmonic, dof
         Which multiple of omega; which degree of freedom (default the observed one).
+    xlim, ylim
+        Part of the axes that is shown, (from, to); default the frequencies of the test, and all amplitudes.
 
     Raises
     ------
@@ -53,6 +57,7 @@ def plot_stepped_sine(
     _check(test, "stepped sine")
     dof = _dof(test, dof)
     data = _several(measured, harmonic)
+    limits = View(xlim=xlim, ylim=ylim)
     values = _component(test, harmonic, dof)
     figure, axes, look = _frame(size)
     legend: dict[str, Any] = {}
@@ -63,7 +68,7 @@ def plot_stepped_sine(
     for s, direction in enumerate(test["direction"].to_numpy()):
         for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
             here = periods[s] == period
-            name = _APERIODIC if period == 0 else _name(period)
+            name = "not settled" if period == 0 else _name(period)
             legend[f"{name}, stepped {direction}"] = axes.plot(
                 omega[here],
                 values[s][here],
@@ -83,8 +88,8 @@ def plot_stepped_sine(
     dress(axes, r"$\omega$", f"$|{symbol}|$", look)
     every = np.concatenate([omega, *(one.omega for one in data)])
     spread = np.ptp(every) or abs(every[0])
-    axes.set_xlim(every.min() - 0.02 * spread, every.max() + 0.02 * spread)
-    axes.set_ylim(bottom=0.0)
+    axes.set_xlim(*(limits.xlim or (every.min() - 0.02 * spread, every.max() + 0.02 * spread)))
+    axes.set_ylim(*(limits.ylim or (0.0, None)))
     return _finish(figure, axes, legend, look, title, path)
 
 
