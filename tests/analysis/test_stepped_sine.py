@@ -1,4 +1,4 @@
-"""`stepped_sine` against closed forms, harmonic balance, and what a tap must find; measured files and their mistakes."""
+"""`stepped_sine` against closed forms, harmonic balance, and what a tap must find; mistakes in measured files."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_a_file_that_is_not_there(tmp_path):
         so.read_measured(tmp_path / "none.csv", **COLUMNS)
 
 
-# ----------------------------------------------------------------------------------------------------- the published isola
+# ---------------------------------------------------------------------------------------------- the published isola
 @pytest.mark.slow
 def test_a_tap_leads_onto_the_published_isola():
     """At j = 0.5 sweeps pass the isola by; a tap at omega = 2.3 leads onto it, in both directions to its ends."""

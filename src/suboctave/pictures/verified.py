@@ -72,5 +72,5 @@ def plot_verified(
             gid="not confirmed",
             clip_on=False,
         )[0]
-    axes.set_ylim(bottom=min(axes.get_ylim()[0], 0.0))
+    axes.set_ylim(bottom=0.0)
     return _finish(figure, axes, legend, look, title, path)
