@@ -139,3 +139,13 @@ def test_an_event_must_return_a_number(duffing_curve):
     bad = so.Event("bad", lambda orbit: float("nan"))
     with pytest.raises(so.InputError, match=r"event 'bad' returned nan at omega = .*finite number"):
         so.frequency_response(duffing_curve.system, (3.0, 2.9), events=[bad])
+
+
+def test_a_doubling_that_more_harmonics_move_is_listed_once():
+    """Close to the extremum of the period doublings: one of two lies behind a point with few harmonics, ahead with
+    more.
+    """
+    system = so.library.reference_oscillator(regularization=3000.0, j=0.1771)
+    for omega in ((2.12, 1.98), (2.1, 2.0), (1.98, 2.12)):
+        doublings = sorted(b.omega for b in so.frequency_response(system, omega).bifurcations["PD"])
+        assert doublings == pytest.approx([2.02092649, 2.02261178], abs=1e-6)

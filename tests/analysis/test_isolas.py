@@ -73,6 +73,11 @@ def test_stable_parts_by_shooting(isolas):
         assert so.verify(branch.orbits[index]).agrees
 
 
+def test_the_answer_does_not_depend_on_how_one_looks(isolas):
+    (isola,) = so.find_isolas(reference(), (1.9, 4.2), "j", (0.0, 1.0), values=2)
+    assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
+
+
 @pytest.mark.parametrize("gap", [0.3, 0.5, 0.9])
 def test_the_answer_does_not_depend_on_where_one_stands(isolas, gap):
     (isola,) = so.find_isolas(reference(j=gap), OMEGA[::-1], "j", (1.0, 0.0))
@@ -207,16 +212,35 @@ def test_ends_can_be_tracked_again(isolas):
     assert isola.born == pytest.approx(curve.parameter("j")[end], abs=2e-6)
 
 
+def test_a_budget_ends_it_politely():
+    isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), seconds=1e-6)
+    assert list(isolas) == []
+    assert any("seconds are over" in note for note in isolas.notes)
+
+
+def test_ctrl_c_keeps_what_is_there():
+    def stop(share, where):
+        if "closed" in where:
+            raise KeyboardInterrupt
+
+    isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), values=2, progress=stop)
+    assert list(isolas) == []
+    assert isolas.limit_points
+    assert any("interrupted" in note for note in isolas.notes)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"parameter": "k"}, "parameter"),
+        ({"parameter": "omega"}, "omega varies anyway"),
         ({"values": 1}, "at least 2"),
         ({"values": [0.5, 1.5]}, "within the bounds"),
         ({"search": (0,)}, "periods"),
         ({"search": "2"}, "periods"),
         ({"levels": (0.0,)}, "levels"),
         ({"depth": -1}, "depth"),
+        ({"seconds": 0.0}, "seconds"),
         ({"max_curves": True}, "max_curves"),
         ({"seeds": 3}, "Seeds"),
         ({"omega": (0.0, 1.0)}, "omega"),

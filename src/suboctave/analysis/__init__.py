@@ -7,10 +7,15 @@ from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagra
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
 from suboctave.analysis.integration import Trajectory, integrate
-from suboctave.analysis.isola import Isola, Isolas
+from suboctave.analysis.isola import Isola
+from suboctave.analysis.isola_map import isola_map
+from suboctave.analysis.isola_region import IsolaMap
 from suboctave.analysis.isolas import find_isolas
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.measured import Measured, read_measured
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
+from suboctave.analysis.regime_map import RegimeMap
+from suboctave.analysis.regimes import regime_map
 from suboctave.analysis.results import Results, Table, load
 from suboctave.analysis.stepped_result import SteppedSine
 from suboctave.analysis.stepped_sine import stepped_sine
@@ -29,9 +34,11 @@ __all__ = [
     "BranchVerification",
     "BruteForceDiagram",
     "Isola",
+    "IsolaMap",
     "Isolas",
     "Measured",
     "PoincareSections",
+    "RegimeMap",
     "Results",
     "Seeds",
     "SteppedSine",
@@ -48,11 +55,13 @@ __all__ = [
     "find_subharmonics",
     "frequency_response",
     "integrate",
+    "isola_map",
     "load",
     "locate_extremum",
     "periodic_orbit",
     "poincare_sections",
     "read_measured",
+    "regime_map",
     "stability",
     "stepped_sine",
     "switch_branch",

@@ -258,7 +258,10 @@ class _Follower:
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self._guard.doubt(*complaint)
-        self.trace.bifurcations += behind_their_grazings(found)
+        # with more harmonics a bifurcation that a hidden pair was counted for may lie ahead again
+        met = self.trace.bifurcations[-4:]
+        fresh = [pair for pair in found if not any(same_event(pair[1], other) for other in met)]
+        self.trace.bifurcations += behind_their_grazings(fresh)
         if self._watch is not None and not resting:
             for located, p, q in self._watch.passed(a, b):
                 self._insert(self._bifurcation(located, p, q))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
+from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +22,7 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.system import System
 
-if TYPE_CHECKING:
-    import pandas
-
-__all__ = ["Isola", "IsolaEnd", "Isolas"]
+__all__ = ["Isola", "IsolaEnd"]
 
 
 class IsolaEnd(TrackedEvent, float):
@@ -71,10 +69,6 @@ class Isola:
         Between which values it is detached; (low, high).
     ends
         What happens at the lower and at the upper end, `IsolaEnd` or None; `reasons` says it in words.
-    limit_points
-        Its limit points over omega and the parameter, within the range, from end to end.
-    further
-        Curves of further limit points on it, if there are any.
     notes
         What could not be settled.
     """
@@ -102,10 +96,26 @@ class Isola:
         self.options = options
         self.notes = tuple(notes)
         self.nu = self.legs[0].nu
-        curves = curves_of(self.legs, bounds)
-        self.limit_points: TrackedBranch = curves[0]
-        self.further: tuple[TrackedBranch, ...] = tuple(curves[1:])
         self._known = dict(known)
+
+    @cached_property
+    def _curves(self) -> tuple[TrackedBranch, ...]:
+        return tuple(curves_of(self.legs, self.range))
+
+    @property
+    def limit_points(self) -> TrackedBranch:
+        """Its limit points over omega and the parameter, within the range, from end to end."""
+        return self._curves[0]
+
+    @property
+    def further(self) -> tuple[TrackedBranch, ...]:
+        """Curves of further limit points on it, if there are any."""
+        return self._curves[1:]
+
+    @property
+    def known(self) -> dict[float, Branch]:
+        """The closed branches that have been followed so far, by the value of the parameter, ascending."""
+        return dict(sorted(self._known.items()))
 
     @property
     def born(self) -> IsolaEnd | None:
@@ -133,9 +143,12 @@ class Isola:
         low, high = self.range
         if not is_number(value) or not low <= value <= high:
             raise InputError(f"this isola exists for {self.parameter} from {low:.9g} to {high:.9g}, not at {value!r}")
-        if value not in self._known:
-            self._known[value] = self._followed(float(value), progress)
-        return self._known[value]
+        known = self._known.get(float(value))
+        if known is None:
+            known = self._followed(float(value), progress)
+            if not known.interrupted:
+                self._known[float(value)] = known
+        return known
 
     def stable_ranges(self, value: float) -> list[tuple[float, float]]:
         """Between which frequencies there are stable motions on the closed branch at a value; pairs of omega."""
@@ -156,6 +169,39 @@ class Isola:
             f"no limit point of the isola was found at {self.parameter} = {value:.9g}"
             + (f" ({failure})" if failure else "")
         )
+
+    def plot(self, path: Any = None, values: int | Sequence[float] = 5, responses: Any = (), **options: Any) -> Any:
+        """Draw it in space: the surface of its closed branches, its limit points, its birth.
+
+        Parameters
+        ----------
+        path
+            Where the figure is saved, if one is given.
+        values
+            At how many values of the parameter, almost from end to end, its closed branch is drawn; or these values.
+        responses
+            Branches or diagrams that are drawn besides, such as responses at some of these values.
+        options
+            As of `suboctave.plot_space`.
+        """
+        from suboctave.analysis.isola_tables import isola_datasets
+        from suboctave.pictures import plot_space
+
+        given = list(responses) if isinstance(responses, list | tuple) else [responses]
+        return plot_space([*isola_datasets(self, self._places(values)), *given], path, **options)
+
+    def _places(self, values: Any) -> list[float]:
+        """Values of the parameter at which closed branches are wanted, within the range; InputError otherwise."""
+        low, high = self.range
+        if isinstance(values, int) and not isinstance(values, bool) and values >= 1:
+            first, last = low + 0.02 * (high - low), high - 0.08 * (high - low)
+            return [float(v) for v in np.linspace(first, last, values)]
+        places = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
+        if not places or not all(is_number(value) and value in self for value in places):
+            raise InputError(
+                f"values must be how many, or numbers from {low:.9g} to {high:.9g}, where the isola is, not {values!r}"
+            )
+        return [float(value) for value in places]
 
     def __repr__(self) -> str:
         low, high = self.range
@@ -254,79 +300,3 @@ def _joined(chain: Sequence[Leg], bounds: tuple[float, float]) -> TrackedBranch:
 
 def _within(event: Bifurcation, points: Sequence[TrackedPoint]) -> bool:
     return bool(points) and points[0].arclength < event.arclength < points[-1].arclength
-
-
-class Isolas(Sequence[Isola]):
-    """Isolas in the order of the values at which they are born, and what was learnt on the way.
-
-    Attributes
-    ----------
-    system, parameter, bounds, omega
-        What was asked.
-    limit_points, doublings
-        All curves of limit points and of period doublings that were followed, in (omega, parameter).
-    notes
-        What could not be settled; empty if nothing was left open.
-    """
-
-    def __init__(
-        self,
-        isolas: Iterable[Isola],
-        system: System,
-        parameter: str,
-        bounds: tuple[float, float],
-        omega: tuple[float, float],
-        limit_points: Sequence[TrackedBranch] = (),
-        doublings: Sequence[TrackedBranch] = (),
-        notes: Iterable[str] = (),
-        said: str = "",
-    ) -> None:
-        self._items = tuple(sorted(isolas, key=lambda isola: (isola.born is None, isola.born or isola.range[1])))
-        self.system = system
-        self.parameter = parameter
-        self.bounds = bounds
-        self.omega = omega
-        self.limit_points = tuple(limit_points)
-        self.doublings = tuple(doublings)
-        self.notes = tuple(notes)
-        self.said = said
-        self.seconds = float("nan")
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    @overload
-    def __getitem__(self, which: int) -> Isola: ...
-    @overload
-    def __getitem__(self, which: slice) -> tuple[Isola, ...]: ...
-    def __getitem__(self, which: int | slice) -> Isola | tuple[Isola, ...]:
-        return self._items[which]
-
-    def __iter__(self) -> Iterator[Isola]:
-        return iter(self._items)
-
-    def at(self, value: float) -> list[Branch]:
-        """The closed branches that exist at a value of the parameter."""
-        return [isola.at(value) for isola in self if value in isola]
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row for each isola: period, range, where it is born and merges, and the frequencies there."""
-        import pandas
-
-        name = self.parameter
-        rows = []
-        for isola in self:
-            row: dict[str, Any] = {"period": period_name(isola.nu), "from": isola.range[0], "to": isola.range[1]}
-            for word, end in (("born", isola.born), ("merges", isola.merges)):
-                row[f"{word} {name}"] = float("nan") if end is None else float(end)
-                row[f"{word} omega"] = float("nan") if end is None else end.omega
-            rows.append(row)
-        return pandas.DataFrame(rows)
-
-    def __repr__(self) -> str:
-        text = self.said
-        for isola in self:
-            text += "\n" + repr(isola)
-        for note in self.notes:
-            text += f"\nnote: {note}"
-        return text

@@ -17,22 +17,32 @@ from suboctave.analysis.isola_survey import Loop, Survey
 from suboctave.analysis.limit_curves import Leg
 from suboctave.bifurcation.tracked import TrackedEvent
 
-__all__ = ["Life", "life_of"]
+__all__ = ["Life", "extend"]
 
 _BISECTIONS = 10
+#: share of the way to an event at which the branch is looked at before it
+_BEFORE = 1e-3
 
 
 @dataclass
 class Life:
-    """The range of a detached branch: the legs that its limit points lie on, its ends, loops that are known."""
+    """The range of a detached branch: the legs that its limit points lie on, its ends, loops that are known.
+
+    To begin with a single value.
+    """
 
     legs: list[Leg]
     loops: list[Loop]
-    low: float = 0.0
-    high: float = 0.0
+    low: float
+    high: float
     ends: tuple[IsolaEnd | None, IsolaEnd | None] = (None, None)
-    reasons: tuple[str, str] = ("", "")
+    reasons: tuple[str, str] = ("not followed to lower values", "not followed to higher values")
     notes: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, loop: Loop) -> Life:
+        """A branch that is detached at a value."""
+        return cls(list(loop.legs), [loop], loop.value, loop.value)
 
     def covers(self, leg: Leg, value: float) -> bool:
         """Whether a leg's limit point at a value lies on it."""
@@ -57,21 +67,19 @@ class _End:
         return None if self.event is None else IsolaEnd.of(self.event, name, self.centre)
 
 
-def life_of(loop: Loop, survey: Survey, others: Sequence[Life] = ()) -> Life:
-    """The range over which a detached branch stays so, and is none of the others."""
-    life = Life(list(loop.legs), [loop])
-    low, high = (_extended(loop, upper, survey, life, others) for upper in (False, True))
-    life.low, life.high = low.value, high.value
-    life.ends = (low.as_end(survey.name), high.as_end(survey.name))
-    life.reasons = (low.reason, high.reason)
-    return life
+def extend(life: Life, survey: Survey, others: Sequence[Life]) -> None:
+    """Find the range over which a detached branch stays so, and is none of the others."""
+    (loop,) = life.loops
+    low = _extended(loop, False, survey, life, others)
+    life.low, life.ends, life.reasons = low.value, (low.as_end(survey.name), None), (low.reason, life.reasons[1])
+    high = _extended(loop, True, survey, life, others)
+    life.high, life.ends, life.reasons = high.value, (life.ends[0], high.as_end(survey.name)), (low.reason, high.reason)
 
 
 def _extended(loop: Loop, upper: bool, survey: Survey, life: Life, others: Sequence[Life]) -> _End:
     """Go on in one direction until the branch vanishes, meets another one, or the range ends."""
     name = survey.name
     bound = survey.bounds[1] if upper else survey.bounds[0]
-    passed = False
     while True:
         step = next(iter(_relevant(loop, upper, survey)), None)
         if step is None:
@@ -87,7 +95,7 @@ def _extended(loop: Loop, upper: bool, survey: Survey, life: Life, others: Seque
             return _End(value, None, False, f"at {name} = {value:.9g} it could not be followed further")
         if not after.detached:
             chosen = _culprit(own or events)
-            if passed or chosen is None:
+            if chosen is None or not (own or _detached_before(value, lasting[0], loop, survey, life)):
                 return _bisected(lasting[0], loop, after, survey, life)
             return _End(value, chosen, False, _merging(name, value, chosen, after))
         other = next((o for o in others if any(o.covers(leg, behind) for leg in after.legs)), None)
@@ -108,6 +116,15 @@ def _extended(loop: Loop, upper: bool, survey: Survey, life: Life, others: Seque
         _take(life, after)
         return _End(bound, None, False, f"{name} = {bound:.9g}, the end of the bounds, cuts its range")
     return _bisected(last[0], loop, after, survey, life)
+
+
+def _detached_before(value: float, leg: Leg, loop: Loop, survey: Survey, life: Life) -> bool:
+    """Whether a branch is detached until just before an event that is none of its own limit points."""
+    before = survey.loop(leg, value - _BEFORE * (value - loop.value))
+    if before is None or not before.detached:
+        return False
+    _take(life, before)
+    return True
 
 
 def _relevant(loop: Loop, upper: bool, survey: Survey) -> Iterable[tuple[float, list[TrackedEvent]]]:

@@ -6,8 +6,10 @@ from them. Each limit point is followed over the parameter unless it lies on a c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any
 
 from suboctave.analysis.branch import Branch
@@ -22,14 +24,18 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.system import System
 
-__all__ = ["Loop", "Survey"]
+__all__ = ["SAME_OMEGA", "Loop", "OutOfTime", "Survey"]
 
 #: frequencies that differ by less, relatively, are one
-_SAME = 1e-6
+SAME_OMEGA = 1e-6
 #: events that are closer, in units of the range, are met together
 _TOGETHER = 1e-7
 #: a limit point lies at most this many distances between neighbours away from the curve's chord
 _BESIDE = 3.0
+
+
+class OutOfTime(Exception):
+    """The time that a search was given is over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +66,8 @@ class Survey:
         Curves of limit points over the parameter, their legs, curves of period doublings.
     met
         Branches that bifurcate from a response, or are one, by the value of the parameter.
+    until
+        When `perf_counter` has passed this nothing new is begun.
     """
 
     system: System
@@ -76,6 +84,7 @@ class Survey:
     notes: list[str] = field(default_factory=list)
     met: dict[float, list[Branch]] = field(default_factory=dict)
     report: Callable[[float, str], None] | None = None
+    until: float = math.inf
     _explained: set[tuple[float, int]] = field(default_factory=set)
     _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
 
@@ -91,8 +100,14 @@ class Survey:
 
     def say(self, share: float, where: str) -> None:
         """Tell whoever wants to know."""
+        self.check_time()
         if self.report is not None:
             self.report(share, where)
+
+    def check_time(self) -> None:
+        """Raise `OutOfTime` where no more is to be begun."""
+        if perf_counter() > self.until:
+            raise OutOfTime
 
     # ---------------------------------------------------------------------------------------------------- responses
     def look(self, value: float) -> None:
@@ -136,17 +151,17 @@ class Survey:
                 there = leg.limit_point(value)
             except ConvergenceError:
                 continue
-            if abs(there.omega - item.omega) <= _SAME * item.omega and same_motion(there.orbit, item.orbit):
+            if _beside(there, item) and same_motion(there.orbit, item.orbit):
                 return leg
         return None
 
     def known(self, item: Bifurcation, value: float) -> Leg | None:
         """The leg that a limit point lies on, after following it over the parameter if it is new; None if it fails."""
         leg = self.leg_of(item, value)
-        if leg is not None or any(v == value and abs(b.omega - item.omega) <= _SAME * b.omega for v, b in self._lost):
+        if leg is not None or any(v == value and _beside(b, item) for v, b in self._lost):
             return leg
         curve = self._tracked(item, value)
-        if curve is not None:
+        if curve is not None and not self._repeats(curve):
             self.curves.append(curve)
             self.legs += legs_of(curve, self.name)
             leg = self.leg_of(item, value)
@@ -155,6 +170,12 @@ class Survey:
             if curve is not None:
                 self.note(f"the limit point at omega = {item.omega:.6g}, {self.name} = {value:.6g} is not on its curve")
         return leg
+
+    def _repeats(self, curve: TrackedBranch) -> bool:
+        """Whether a curve is one that is known, met where the known one was not found again."""
+        turns = [event for event in curve.bifurcations.met if isinstance(event, TrackedEvent) and event.isola]
+        known = (e for c in self.curves if c.nu == curve.nu for e in c.bifurcations.met)
+        return any(_beside(a, b) and same_motion(a.orbit, b.orbit) for b in known for a in turns)
 
     def doubling(self, item: Bifurcation, value: float) -> None:
         """Follow a period doubling over the parameter, unless its curve is known."""
@@ -165,6 +186,7 @@ class Survey:
             self.doublings.append(curve)
 
     def _tracked(self, item: Bifurcation, value: float) -> TrackedBranch | None:
+        self.check_time()
         where = f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}"
         if len(self.curves) + len(self.doublings) >= self.most:
             self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
@@ -179,6 +201,7 @@ class Survey:
     # --------------------------------------------------------------------------------------------------------- loops
     def loop(self, leg: Leg, value: float) -> Loop | None:
         """The branch through a leg's limit point at a value; None where it cannot be followed."""
+        self.check_time()
         try:
             found = leg.limit_point(value)
             same = [other for other in self.legs if other.curve is leg.curve]
@@ -231,6 +254,10 @@ class Survey:
             group.append(event)
         if group:
             yield group[0].parameter(self.name), group
+
+
+def _beside(a: Bifurcation, b: Bifurcation) -> bool:
+    return abs(a.omega - b.omega) <= SAME_OMEGA * b.omega
 
 
 def _passes(curve: TrackedBranch, name: str, item: Bifurcation, value: float) -> bool:

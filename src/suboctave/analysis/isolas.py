@@ -13,7 +13,9 @@ there).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -27,9 +29,10 @@ from suboctave.analysis.checks import (
     is_number,
     make_settings,
 )
-from suboctave.analysis.isola import Isola, Isolas
-from suboctave.analysis.isola_life import Life, life_of
-from suboctave.analysis.isola_survey import Loop, Survey
+from suboctave.analysis.isola import Isola
+from suboctave.analysis.isola_life import Life, extend
+from suboctave.analysis.isola_survey import Loop, OutOfTime, Survey
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.limit_curves import Leg
 from suboctave.analysis.load_levels import branches_by_load
@@ -66,6 +69,7 @@ def find_isolas(
     search: Sequence[int] | None = None,
     seeds: Seeds | None = None,
     max_curves: int = 64,
+    seconds: float | None = None,
     max_step: float | None = None,
     observe: int | None = None,
     progress: Any = None,
@@ -97,11 +101,14 @@ def find_isolas(
         1.5 and 5, at three of the values, until one is found; () for never.
     search
         Periods (2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values among the nonlinear resonances
-        of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was found otherwise; () for never.
+        of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was found otherwise, at three
+        of the values; () for never.
     seeds
         How finely that is done.
     max_curves
         Curves of bifurcations after which no more are followed.
+    seconds
+        Time after which nothing new is begun and what has been found is given; None for as long as it takes.
     max_step
         As in `frequency_response` and `track`.
 
@@ -125,6 +132,8 @@ def find_isolas(
     widen the bounds, or search for its period.
     """
     check_parameter(system, parameter)
+    if parameter == "omega":
+        raise InputError("parameter is the design parameter; omega varies anyway, in the range omega=(from, to)")
     low, high = sorted(check_bounds(system, parameter, bounds))
     first, last = sorted(check_range("omega", omega, positive=True))
     check_system(system, (first, last))
@@ -135,6 +144,8 @@ def find_isolas(
     for name, number, least in (("depth", depth, 0), ("max_curves", max_curves, 1)):
         if isinstance(number, bool) or not isinstance(number, int) or number < least:
             raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
+    if seconds is not None and not (is_number(seconds) and seconds > 0.0):
+        raise InputError(f"seconds must be a positive number, not {seconds!r}")
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
     options = {
@@ -148,7 +159,9 @@ def find_isolas(
         survey = Survey(
             system, parameter, (low, high), (first, last), harmonics, depth, options, max_curves, report=report
         )
+        survey.until = math.inf if seconds is None else perf_counter() + seconds
         lives: list[Life] = []
+        few = sorted({places[0], places[len(places) // 2], places[-1]})
         try:
             for number, value in enumerate(places):
                 survey.say(_SHARE * number / len(places), f"{parameter} = {value:.6g}")
@@ -158,11 +171,14 @@ def find_isolas(
             for level in _LEVELS if strengths is None else strengths:
                 if strengths is None and lives:
                     break
-                for value in places if strengths else sorted({places[0], places[len(places) // 2], places[-1]}):
+                for value in places if strengths else few:
                     _by_loads(survey, lives, value, level)
-            for value in places if orders or (orders is None and not lives) else ():
-                for order in orders or _SEARCHED:
-                    _by_resonance(survey, lives, value, order, seeds or _SEEDS)
+            if orders or (orders is None and not lives):
+                for value in places if orders else few:
+                    for order in orders or _SEARCHED:
+                        _by_resonance(survey, lives, value, order, seeds or _SEEDS)
+        except OutOfTime:
+            survey.note(f"{seconds:g} seconds are over: what is here is what had been found by then")
         except KeyboardInterrupt:
             survey.note("interrupted: what is here is what had been found by then")
     found = [
@@ -239,7 +255,9 @@ def _consider(survey: Survey, lives: list[Life], loop: Loop) -> None:
     """A branch that is detached lives over some range; any other is known from now on."""
     if loop.detached and loop.legs:
         survey.say(_SHARE, f"closed branch at {survey.name} = {loop.value:.6g}")
-        lives.append(life_of(loop, survey, lives))
+        life = Life.of(loop)
+        lives.append(life)
+        extend(life, survey, lives[:-1])
     else:
         survey.attach(loop)
 

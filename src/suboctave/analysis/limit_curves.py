@@ -35,6 +35,8 @@ __all__ = ["Leg", "as_point", "bifurcation_at_value", "legs_of", "same_motion", 
 
 #: a solved limit point lies at most this many distances between its neighbours away from where it was expected
 _AWAY = 3.0
+#: and at most this share of the way between them outside, which rounding may account for
+_ASIDE = 1e-2
 #: share of the way between two nodes below which steps are not halved again
 _SMALLEST = 0.02
 #: harmonics of two motions that are one differ by less, relative to their size
@@ -192,11 +194,19 @@ class Leg:
     ) -> Bifurcation:
         span = float(np.ptp(self.omega)) or expected
         found = bifurcation_at_value(LIMIT_POINT, orbit, x, omega, self.name, value, span, self.curve.options)
-        if abs(found.omega - expected) > _AWAY * reach:
+        if abs(found.omega - expected) > _AWAY * reach or not -_ASIDE <= self._share(found) <= 1.0 + _ASIDE:
             raise ConvergenceError(
                 f"the limit point near omega = {expected:.6g}, {self.name} = {value:.6g} was not found again"
             )
         return found
+
+    def _share(self, found: Bifurcation) -> float:
+        """How far between the nodes beside its value a motion lies; outside of (0, 1) it is of a neighbouring leg."""
+        i = self._segment(found.parameter(self.name))
+        orbits = [node.orbit for node in self.nodes[i : i + 2]] + [found.orbit]
+        basis = max((orbit.basis.filled for orbit in orbits), key=lambda b: b.harmonics)
+        a, b, x = (orbit.basis.resized(orbit.coefficients, basis).ravel() for orbit in orbits)
+        return float((x - a) @ (b - a)) / (float((b - a) @ (b - a)) or 1.0)
 
     def _approached(self, value: float, expected: float, reach: float) -> Bifurcation:
         """The limit point at a value in small steps from the nodes beside it, where contacts that graze are near."""

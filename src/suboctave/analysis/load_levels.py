@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from suboctave.analysis.branch import Branch
-from suboctave.analysis.isola_survey import Survey
+from suboctave.analysis.isola_survey import SAME_OMEGA, Survey
+from suboctave.analysis.limit_curves import same_motion
 from suboctave.analysis.making import own_linear_part
 from suboctave.analysis.subharmonics import lies_on
 from suboctave.analysis.verbs import continue_branch
@@ -36,15 +37,15 @@ def branches_by_load(survey: Survey, value: float, level: float) -> Iterator[Bra
     scaled = system.with_scaled_loads(_LEVEL)
     bounds = (min(1.0, level), max(1.0, level))
     around = Survey(scaled, _LEVEL, bounds, survey.omega, survey.harmonics, survey.depth, survey.options, survey.most)
+    around.until = survey.until
     around.look(level)
     known = list(survey.met.get(value, []))
     for leg in around.legs:
         if not leg.contains(1.0):
             continue
         try:
-            found = leg.limit_point(1.0)
-            orbit = _own(found.orbit, system)
-            if any(branch.nu == orbit.basis.nu and lies_on(branch, orbit) for branch in known):
+            orbit = _own(leg.limit_point(1.0).orbit, system)
+            if any(_met_on(branch, orbit) for branch in known):
                 continue
             low, high = min(*survey.omega, orbit.omega), max(*survey.omega, orbit.omega)
             known.append(continue_branch(orbit, "omega", (low, high), **survey.options))
@@ -52,6 +53,14 @@ def branches_by_load(survey: Survey, value: float, level: float) -> Iterator[Bra
             survey.note(f"at {survey.name} = {value:.6g}, a limit point from stronger loads: {failure}")
             continue
         yield known[-1]
+
+
+def _met_on(branch: Branch, orbit: PeriodicOrbit) -> bool:
+    """Whether a limit point lies on a branch: it is one of its own, or lies between two of its points."""
+    if branch.nu != orbit.basis.nu:
+        return False
+    near = (b.orbit for b in branch.bifurcations["LP"] if abs(b.omega - orbit.omega) <= SAME_OMEGA * orbit.omega)
+    return any(same_motion(other, orbit) for other in near) or lies_on(branch, orbit)
 
 
 def _own(orbit: PeriodicOrbit, system: System) -> PeriodicOrbit:

@@ -1,4 +1,4 @@
-"""What a study leaves: branches, diagrams and tables by name, with what produced them; and `load`, which reads them."""
+"""What a study leaves: branches, diagrams, isolas and tables by name, with their provenance; and `load`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.analysis.branch import Branch
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.saved import branch_from_dataset, branch_to_dataset
 from suboctave.analysis.saved_diagram import diagram_from_datasets, diagram_to_datasets
+from suboctave.analysis.saved_isolas import isolas_from_datasets, isolas_to_datasets
 from suboctave.analysis.tree import BifurcationDiagram
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Result", "Results", "Table", "from_datasets", "load", "provenance", "save", "to_datasets"]
 
 #: what a group of a file may hold
-_BRANCH, _TABLE, _DIAGRAM = "branch", "table", "diagram"
+_BRANCH, _TABLE, _DIAGRAM, _ISOLAS = "branch", "table", "diagram", "isolas"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Table:
 
 
 #: what an analysis gives
-Result = Branch | BifurcationDiagram | Table
+Result = Branch | BifurcationDiagram | Isolas | Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,11 @@ class Results(Mapping[str, Result]):
         """The bifurcation diagrams among the results."""
         return {name: item for name, item in self.items_by_name.items() if isinstance(item, BifurcationDiagram)}
 
+    @property
+    def isolas(self) -> dict[str, Isolas]:
+        """The isolas among the results, by analysis."""
+        return {name: item for name, item in self.items_by_name.items() if isinstance(item, Isolas)}
+
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """All of it as one NetCDF file (.nc), a group for each analysis; docs/results.md describes the layout.
 
@@ -136,6 +143,9 @@ class Results(Mapping[str, Result]):
 def _said(item: Result) -> str:
     if isinstance(item, Table):
         return "table"
+    if isinstance(item, Isolas):
+        curves = len(item.limit_points) + len(item.doublings)
+        return f"{len(item)} isola{'s' * (len(item) != 1)} over {item.parameter}, {curves} curves"
     what = "points" if isinstance(item, Branch) else "branches"
     return f"{len(item)} {what}, {len(item.bifurcations)} bifurcations"
 
@@ -154,14 +164,16 @@ def provenance() -> dict[str, str]:
 def to_datasets(item: Result, details: Mapping[str, Any] | None = None) -> dict[str, xarray.Dataset]:
     """A result as datasets that a file or the journal can hold, `details` among the attributes of the one named "".
 
-    A branch and a table are one dataset; a diagram has one more for each of its branches.
+    A branch and a table are one dataset; a diagram has one more for each of its branches, isolas one for each curve.
     """
     said = dict(details or {})
     if isinstance(item, Branch):
         return {"": branch_to_dataset(item).assign_attrs({**said, "contents": _BRANCH})}
-    if isinstance(item, BifurcationDiagram):
-        head, *branches = diagram_to_datasets(item).items()
-        told = {"": head[1].assign_attrs({**said, "contents": _DIAGRAM})}
+    if isinstance(item, BifurcationDiagram | Isolas):
+        tree = isinstance(item, BifurcationDiagram)
+        parts = diagram_to_datasets(item) if isinstance(item, BifurcationDiagram) else isolas_to_datasets(item)
+        head, *branches = parts.items()
+        told = {"": head[1].assign_attrs({**said, "contents": _DIAGRAM if tree else _ISOLAS})}
         return told | {name: dataset.assign_attrs({"contents": _BRANCH}) for name, dataset in branches}
     import xarray
 
@@ -182,14 +194,16 @@ def from_datasets(
         return branch_from_dataset(dataset, allow_code, linear), details
     if details.get("contents") == _DIAGRAM:
         return diagram_from_datasets(groups, allow_code, linear), details
+    if details.get("contents") == _ISOLAS:
+        return isolas_from_datasets(groups, allow_code, linear), details
     if details.get("contents") != _TABLE:
         raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
     columns = {name: array_of(dataset, name) for name in str(details.get("columns", "")).splitlines()}
     return Table(columns, str(details.get("title", ""))), details
 
 
-def save(item: Branch | BifurcationDiagram, path: str | Path, overwrite: bool = False) -> Path:
-    """One branch or diagram as a NetCDF file (.nc) of its own."""
+def save(item: Branch | BifurcationDiagram | Isolas, path: str | Path, overwrite: bool = False) -> Path:
+    """One branch or diagram, or isolas, as a NetCDF file (.nc) of its own."""
     target = files.free_place(path, overwrite, (".nc",))
     files.write(target, to_datasets(item), provenance())
     return target
@@ -197,8 +211,8 @@ def save(item: Branch | BifurcationDiagram, path: str | Path, overwrite: bool = 
 
 def load(
     path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None
-) -> Branch | BifurcationDiagram | Results:
-    """Read a results file: the branch or diagram that was saved, or the `Results` of a study.
+) -> Branch | BifurcationDiagram | Isolas | Results:
+    """Read a results file: the branch, diagram or isolas that were saved, or the `Results` of a study.
 
     Parameters
     ----------
@@ -219,7 +233,7 @@ def load(
     root = groups[""]
     read: dict[str, tuple[Result, dict[str, Any]]] = {}
     try:
-        if root.attrs.get("contents") in (_BRANCH, _DIAGRAM):
+        if root.attrs.get("contents") in (_BRANCH, _DIAGRAM, _ISOLAS):
             item, _ = from_datasets(groups, allow_code, linear)
             assert not isinstance(item, Table)
             return item

@@ -40,7 +40,7 @@ from suboctave.store.plain import from_json, to_json
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["branch_from_dataset", "branch_to_dataset"]
+__all__ = ["branch_from_dataset", "branch_to_dataset", "system_arrays", "written_system"]
 
 _CLASSES = {
     c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
@@ -256,16 +256,27 @@ class _Prefixed(dict[str, np.ndarray]):
         self.arrays[f"system_{key}"] = value
 
 
+def written_system(system: System) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """A system as plain data, and its large arrays as variables of a file."""
+    arrays: dict[str, np.ndarray] = {}
+    return describe(system, _Prefixed(arrays)), arrays
+
+
+def system_arrays(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
+    """The large arrays of systems among the variables of a file, by the names that descriptions have for them."""
+    return {
+        str(name)[len("system_") :]: np.asarray(variable.values)
+        for name, variable in dataset.variables.items()
+        if str(name).startswith("system_array_")
+    }
+
+
 class _Reader:
     def __init__(self, dataset: xarray.Dataset, allow_code: bool, linear: LinearPart | None) -> None:
         self.dataset = dataset
         self.record = from_json(str(dataset["record"].item()), _CLASSES)
         self.tables = self.record["tables"]
-        stored = {
-            str(name)[len("system_") :]: np.asarray(variable.values)
-            for name, variable in dataset.variables.items()
-            if str(name).startswith("system_array_")
-        }
+        stored = system_arrays(dataset)
         self.systems = [build(text, stored, allow_code) for text in self.tables["systems"]]
         self.system = self.systems[self.record["system"]]
         self.balances = [self._balance(d, linear) for d in self.tables["discretisations"]]

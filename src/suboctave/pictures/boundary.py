@@ -29,7 +29,10 @@ from suboctave.pictures.boundary_lines import (
     plane_of,
     stations,
 )
+from suboctave.pictures.boundary_marks import event_drawing, event_words, mark_events, small_mark
 from suboctave.pictures.legend import place_legend
+from suboctave.pictures.periods import tinted
+from suboctave.pictures.regions import CENTRE, MERGING, end_text, regions, split, with_ends
 from suboctave.pictures.response import dress
 from suboctave.pictures.saving import png_bytes, save_figure
 from suboctave.pictures.strokes import strokes, without_repeats
@@ -42,14 +45,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["Plane", "check_boundaries", "plane_axes", "plot_boundaries"]
+__all__ = ["PALE", "Plane", "check_boundaries", "plane_axes", "plot_boundaries"]
 
 #: what the strokes mean here
 BORDER, WITHIN = "borders stable motions", "within unstable motions"
 SUBCRITICAL = "subcritical"
 _UPWARDS = "_upwards"
-#: millimetres between the small marks along a line, and how large these are beside the others
-_SPACING, SMALL = 11.0, 0.55
+#: millimetres between the small marks along a line
+_SPACING = 11.0
+#: share of white in the region of an isola
+PALE = 0.82
 #: so many extrema are named by their values
 _NAMED = 4
 
@@ -122,6 +127,9 @@ def plot_boundaries(
 
     Parameters
     ----------
+    curves
+        Their datasets; with that of isolas among them the regions of these are shaded in the plane of their
+        parameters, and their ends are marked.
     x, y
         The axes, "omega" or parameters; default: the two that were free.
     labels
@@ -136,7 +144,9 @@ def plot_boundaries(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    group = check_boundaries(curves)
+    several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
+    given, heads = split(several)
+    group = [with_ends(dataset, heads) for dataset in check_boundaries(given)]
     if projected and y is not None:
         raise InputError("y= names a parameter; with a quantity= that is what is drawn upwards")
     horizontal, upwards = _first(group, x) if projected else plane_axes(group, x, y)
@@ -161,7 +171,7 @@ def plot_boundaries(
     styles = boundary_styles(group, names)
     cut = [parts(dataset, plane.across, _UPWARDS) for dataset in prepared]
     _lines(axes, prepared, styles, plane, look)
-    legend = _entries(prepared, cut, names, styles, plane, look)
+    legend = _shade(axes, heads, plane) | _entries(prepared, cut, names, styles, plane, look)
     for dataset in prepared:
         mark_events(axes, dataset, places(dataset, plane).T, look, plane.marked(dataset))
     # a named size is a width: what stands above the frame adds height
@@ -267,6 +277,23 @@ def _lines(
             )
 
 
+def _shade(axes: Axes, heads: Sequence[xarray.Dataset], plane: Plane) -> dict[str, Any]:
+    """The regions of isolas, where the axes are those of their plane; their entries in the legend."""
+    from matplotlib.patches import Patch
+
+    entries: dict[str, Any] = {}
+    for region in regions(heads):
+        names = ["omega", region.parameter]
+        if sorted(names) != sorted((plane.across, plane.upwards or "")):
+            continue
+        parts = dict(zip(names, region.outline, strict=True))
+        (across, up), colour = plane.factors(), tinted(region.colour, PALE)
+        x, y = parts[plane.across] * across, parts[str(plane.upwards)] * up
+        axes.fill(x, y, facecolor=colour, linewidth=0.0, zorder=1.5, gid="isola")
+        entries[region.words] = Patch(facecolor=colour, linewidth=0.0)
+    return entries
+
+
 def _entries(
     prepared: Sequence[xarray.Dataset],
     cut: Sequence[Sequence[Part]],
@@ -280,7 +307,7 @@ def _entries(
 
     entries: dict[str, Line2D] = {}
     for dataset, name, curve in zip(prepared, names, styles, strict=True):
-        small = _small(kind_of(dataset), curve, look, hollow=False)
+        small = small_mark(kind_of(dataset), curve, look, hollow=False)
         entries[name] = Line2D([], [], color=curve.colour, linewidth=look.line * curve.width, **small)
     every = [part for pieces in cut for part in pieces]
     if any(part.stable is False for part in every):
@@ -289,7 +316,7 @@ def _entries(
                 dash = _dash(stable, style.ONE_CURVE)
                 entries[words] = Line2D([], [], color=style.SOFT, linewidth=look.line, linestyle=dash)
     if any(part.subcritical for part in every):
-        hollow = _small("PD", style.ONE_CURVE, look, hollow=True)
+        hollow = small_mark("PD", style.ONE_CURVE, look, hollow=True)
         entries[SUBCRITICAL] = Line2D([], [], linestyle="none", **hollow)
     kinds = {
         kind for dataset in prepared for kind, _, which in style.marks(dataset) if plane.marked(dataset)[which].any()
@@ -302,24 +329,6 @@ def _entries(
 
 def _dash(stable: bool | None, curve: style.CurveStyle) -> Any:
     return curve.dash if stable is False else style.STABLE_DASH
-
-
-def event_words(kind: str) -> str:
-    """What a legend says of a kind of event; the short name is the one written beside it."""
-    name = style.kind_style(kind).name
-    return name if kind in ("extremum", name) else f"{kind}: {name}"
-
-
-def _small(kind: str, curve: style.CurveStyle, look: style.Look, *, hollow: bool) -> dict[str, Any]:
-    """A mark along a line."""
-    mark = style.kind_style(kind)
-    return {
-        "marker": mark.marker,
-        "markersize": SMALL * mark.size * look.marker,
-        "markerfacecolor": "white" if hollow else curve.colour,
-        "markeredgecolor": curve.colour,
-        "markeredgewidth": look.edge,
-    }
 
 
 def _along(
@@ -343,39 +352,16 @@ def _along(
         if not keep:
             continue
         x, y = axes.transData.inverted().transform(np.array(keep)).T
-        drawing = _small(kind_of(dataset), curve, look, hollow=part.subcritical)
+        drawing = small_mark(kind_of(dataset), curve, look, hollow=part.subcritical)
         axes.plot(x, y, linestyle="none", zorder=3.5, gid="along-hollow" if part.subcritical else "along", **drawing)
-
-
-def mark_events(axes: Any, dataset: xarray.Dataset, at: np.ndarray, look: style.Look, marked: np.ndarray) -> None:
-    """Markers of extrema and points of codimension two; `at`, (2, events) or, in space, (3, events).
-
-    `marked`, (events,): which of them.
-    """
-    for kind, mark, every in style.marks(dataset):
-        which = every[marked[every]]
-        if not which.size:
-            continue
-        axes.plot(*at[:, which], zorder=5, gid=kind, clip_on=False, **event_drawing(mark, look))
-
-
-def event_drawing(mark: style.KindStyle, look: style.Look) -> dict[str, Any]:
-    """How a kind of event is marked."""
-    return {
-        "linestyle": "none",
-        "marker": mark.marker,
-        "markersize": mark.size * look.marker,
-        "markerfacecolor": mark.colour,
-        "markeredgecolor": style.INK,
-        "markeredgewidth": look.edge,
-    }
 
 
 def _name_events(
     figure: Figure, axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane, look: style.Look
 ) -> None:
-    """Codimension-two points by their short names, the extrema of what is drawn upwards by their values."""
+    """Codimension-two points by their short names; extrema of what is drawn upwards and isolas' ends by values."""
     spots, texts = [], []
+    ends: list[tuple[np.ndarray, str]] = []
     extrema = []
     for dataset in prepared:
         at = places(dataset, plane)
@@ -384,7 +370,10 @@ def _name_events(
         for place, kind, extreme, wanted in zip(at, kinds, told, marked, strict=True):
             if not wanted:
                 continue
-            if str(kind) != "extremum":
+            if kind in (CENTRE, MERGING):
+                value = place[0] if plane.upwards == "omega" else None if plane.upwards is None else place[1]
+                ends.append((place, end_text(str(kind), value)))
+            elif str(kind) != "extremum":
                 spots.append(place)
                 texts.append(str(kind))
             elif plane.upwards is not None and str(extreme).endswith(f" of {plane.upwards}"):
@@ -392,5 +381,7 @@ def _name_events(
     if len(extrema) <= _NAMED:
         spots = [place for place, _ in extrema] + spots
         texts = [text for _, text in extrema] + texts
+    spots = [place for place, _ in ends] + spots
+    texts = [text for _, text in ends] + texts
     inside = [i for i, place in enumerate(spots) if math.isfinite(place[0]) and math.isfinite(place[1])]
     annotate(figure, axes, np.array([spots[i] for i in inside]), [texts[i] for i in inside], look)

@@ -23,9 +23,14 @@ if TYPE_CHECKING:
 
 __all__ = ["AXIS", "DASHES", "FONT", "SYMBOLS", "Words", "figure_data", "layout_of", "short"]
 
-SYMBOLS = {
+SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "o": "circle",
     "v": "triangle-down",
+    (4, 1, 0): "star-diamond",
+    (3, 1, 0): "star-triangle-up",
+    (3, 1, 180): "star-triangle-down",
+    (4, 1, 45): "star-square",
+    "^": "triangle-up",
     "s": "square",
     "D": "diamond",
     "x": "x-thin",

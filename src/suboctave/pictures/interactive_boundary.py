@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.pictures import style
-from suboctave.pictures.boundary import BORDER, SUBCRITICAL, WITHIN, event_words
+from suboctave.pictures.boundary import BORDER, PALE, SUBCRITICAL, WITHIN
 from suboctave.pictures.boundary_lines import (
     boundary_names,
     boundary_styles,
@@ -20,9 +20,12 @@ from suboctave.pictures.boundary_lines import (
     kind_of,
     subcritical_pieces,
 )
+from suboctave.pictures.boundary_marks import event_words
 from suboctave.pictures.interactive import AXIS, DASHES, FONT, SYMBOLS, Words, layout_of, short
-from suboctave.pictures.periods import period_colour, period_of, tinted
-from suboctave.pictures.space import SHADE, Space, strokes_in_space
+from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
+from suboctave.pictures.regions import CENTRE, MERGING, Region, end_text, regions, split, with_ends
+from suboctave.pictures.space import CLEAR, SHADE
+from suboctave.pictures.space_view import Space, strokes_in_space, surfaces_in_space
 from suboctave.pictures.strokes import Line, line
 from suboctave.store.layout import coordinate
 
@@ -33,14 +36,25 @@ __all__ = ["plane_data", "space_data"]
 
 _UP = "_up"
 #: what symbols there are in space; circles for all others
-_SOLID_SYMBOLS = {"s": "square", "D": "diamond", "d": "diamond", "P": "cross", "x": "x", "X": "x"}
+_SOLID_SYMBOLS: dict[Any, str] = {
+    (4, 1, 0): "diamond",
+    "s": "square",
+    "D": "diamond",
+    "d": "diamond",
+    "P": "cross",
+    "x": "x",
+    "X": "x",
+}
 
 
 def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, name: str) -> dict[str, Any]:
-    """Traces and layout of boundaries over the plane of two parameters, ready for JSON."""
+    """Traces and layout of boundaries over the plane of two parameters, ready for JSON; regions of isolas behind."""
+    heads = split(list(curves.values()))[1]
+    curves = {label: with_ends(data, heads) for label, data in curves.items() if not any(data is h for h in heads)}
     group = list(curves.values())
     kinds = boundary_names(group)
-    data: list[dict[str, Any]] = []
+    shaded = [region for region in regions(heads) if {"omega", region.parameter} == {across, upwards}]
+    data = [_region(region, across) for region in shaded]
     events: list[dict[str, Any]] = []
     for index, (label, dataset) in enumerate(curves.items()):
         curve = boundary_styles(group, kinds)[index]
@@ -52,8 +66,29 @@ def plane_data(curves: Mapping[str, xarray.Dataset], across: str, upwards: str, 
         data += _lines(whole, words, said, curve)
         data += _subcritical(dataset, whole, words, said, curve)
         events += _events(dataset, coordinate(dataset, across)[1], at_events, words, said)
+    events.sort(key=lambda trace: bool(trace["name"].startswith("isola")))  # the ends of isolas on top
+    named: set[str] = set()
+    for trace in events:  # a kind stands once in the legend
+        trace["showlegend"] = trace["name"] not in named
+        named.add(trace["name"])
     layout = layout_of(_spelt(across), html.escape(_spelt(upwards)))
     return {"data": data + events, "layout": layout, "name": name}
+
+
+def _region(region: Region, across: str) -> dict[str, Any]:
+    omega, value = (short(part.tolist()) for part in region.outline)
+    x, y = (omega, value) if across == "omega" else (value, omega)
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": html.escape(region.words),
+        "x": x,
+        "y": y,
+        "fill": "toself",
+        "fillcolor": tinted(region.colour, PALE),
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+    }
 
 
 def _lines(whole: Line, words: Words, said: str, curve: style.CurveStyle) -> list[dict[str, Any]]:
@@ -143,7 +178,7 @@ def _events(dataset: xarray.Dataset, x: np.ndarray, y: np.ndarray, words: Words,
                 "legendgroup": named,
                 "x": short(x[chosen].tolist()),
                 "y": short(y[chosen].tolist()),
-                "text": [html.escape(kind)] * len(chosen),
+                "text": [html.escape(end_text(kind, None) if kind in (CENTRE, MERGING) else kind)] * len(chosen),
                 "textposition": "middle right",
                 "hovertext": [words.of_event(int(i)) for i in chosen],
                 "hovertemplate": f"{said}: {named}<br>%{{hovertext}}<extra></extra>",
@@ -161,12 +196,19 @@ def _events(dataset: xarray.Dataset, x: np.ndarray, y: np.ndarray, words: Words,
 def space_data(curves: Mapping[str, xarray.Dataset], across: str, depth: str, name: str) -> dict[str, Any]:
     """Traces and layout of response curves and boundaries in space, ready for JSON."""
     space = Space(across, depth)
+    surfaces = surfaces_in_space(list(curves.values()), space)
+    heads = split(list(curves.values()))[1]
+    curves = {
+        label: with_ends(data, heads) if is_boundary(data) else data
+        for label, data in curves.items()
+        if not any(data is head for head in heads)
+    }
     bounds = [dataset for dataset in curves.values() if is_boundary(dataset)]
     kinds = boundary_names(bounds)
     styles = dict(zip(map(id, bounds), boundary_styles(bounds, kinds), strict=True))
     low = min(float(np.nanmin(space.values(dataset)[0][2])) for dataset in curves.values())
     floor = min(low, 0.0)
-    data: list[dict[str, Any]] = []
+    data = [_surface(grid, period_colour(nu), f"{period_name(nu)} isola") for nu, grid in surfaces]
     for label, dataset in curves.items():
         curve = styles.get(id(dataset))
         said = html.escape(label)
@@ -205,6 +247,20 @@ def space_data(curves: Mapping[str, xarray.Dataset], across: str, depth: str, na
         },
     }
     return {"data": data, "layout": layout, "name": name, "space": True}
+
+
+def _surface(grid: np.ndarray, colour: str, said: str) -> dict[str, Any]:
+    return {
+        "type": "surface",
+        "name": said,
+        "showlegend": True,
+        **{letter: [short(row.tolist()) for row in part] for letter, part in zip("xyz", grid, strict=True)},
+        "colorscale": [[0, colour], [1, colour]],
+        "showscale": False,
+        "opacity": CLEAR,
+        "hoverinfo": "skip",
+        "contours": {f"{letter}": {"highlight": False} for letter in "xyz"},
+    }
 
 
 def _in_space(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from suboctave.errors import InputError
 from suboctave.pictures.boundary import plot_boundaries
 from suboctave.pictures.boundary_lines import is_boundary
+from suboctave.pictures.regions import is_isolas
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.view import View
 
@@ -51,7 +52,7 @@ def plot(
     ----------
     curves
         A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a bifurcation diagram (all its branches),
-        a sequence of these, or the results of a study.
+        isolas (their curves and regions, over frequency and parameter), a sequence of these, or the results of a study.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
     quantity
@@ -97,7 +98,9 @@ def plot(
         quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel, xlim, ylim, marks
     )
     datasets = datasets_of(curves, view)
-    tracked = [is_boundary(dataset) for dataset in datasets]
+    if any(is_isolas(dataset) for dataset in datasets):  # in the plane, without the closed branches
+        datasets = [dataset for dataset in datasets if "isola" not in dataset.attrs]
+    tracked = [is_boundary(dataset) or is_isolas(dataset) for dataset in datasets]
     if tracked and all(tracked):
         return plot_boundaries(
             datasets, path, x=x, y=y, labels=labels, title=title, size=size, view=view, projected=projected
@@ -109,6 +112,7 @@ def plot(
             "there are curves of bifurcations among response curves: plot_space draws them together, x= one over the "
             "other; or draw each kind by itself"
         )
+    datasets = [dataset for dataset in datasets if not is_isolas(dataset)]
     return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
 
 
@@ -121,7 +125,8 @@ def _several(curves: Any) -> list[Any]:
     """The branches and diagrams of what is given."""
     named = getattr(curves, "branches", None)
     if isinstance(named, Mapping):  # results of a study
-        return [*named.values(), *getattr(curves, "diagrams", {}).values()]
+        others = (getattr(curves, kind, {}).values() for kind in ("diagrams", "isolas"))
+        return [*named.values(), *(item for group in others for item in group)]
     return list(curves) if isinstance(curves, list | tuple) else [curves]
 
 
@@ -132,6 +137,6 @@ def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
     if isinstance(item, xarray.Dataset):
         return [item]
     if not hasattr(item, "to_xarray"):
-        raise InputError(f"plot draws branches, diagrams and their datasets, not {type(item).__name__}")
+        raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {type(item).__name__}")
     found = item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
     return list(found.values()) if isinstance(found, dict) else [found]

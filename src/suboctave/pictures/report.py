@@ -7,14 +7,12 @@ texts need none. Everything that comes from a user is escaped.
 from __future__ import annotations
 
 import base64
-import html
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -24,6 +22,8 @@ from suboctave.pictures.boundary_lines import is_boundary, plane_of
 from suboctave.pictures.interactive import figure_data
 from suboctave.pictures.page import POLICY, SCRIPT, STYLE, plotly_source
 from suboctave.pictures.report_boundaries import Shown, boundary_figure, boundary_overviews, space_figure
+from suboctave.pictures.report_isolas import IsolasPart, isolas_figures, isolas_part, isolas_words
+from suboctave.pictures.report_text import cell, finite, html_table, number, safe, small, spelt
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.saving import svg_text
 from suboctave.store.files import free_place, replace_file
@@ -38,7 +38,7 @@ __all__ = ["write_report"]
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page
 _TOLD = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
-_RECORDS = {"record", "digest", "contents", "tracked", "plane"}
+_RECORDS = {"record", "digest", "contents", "tracked", "plane", "isola", "at"}
 _LONG = 400
 _BESIDE = 56  # characters in a row of a table that stands beside its figure
 
@@ -51,8 +51,8 @@ def write_report(
     Parameters
     ----------
     results
-        Names of analyses and their curves: datasets (`to_xarray`), branches, or bifurcation diagrams. Datasets on the
-        dimension `row` are shown as tables.
+        Names of analyses and their curves: datasets (`to_xarray`), branches, bifurcation diagrams, or isolas. Datasets
+        on the dimension `row` are shown as tables.
     path
         A file ending in .html or .htm; written beside its place and renamed.
     title
@@ -83,10 +83,16 @@ class _Diagram:
     legend: list[str] | None
 
 
-def _part(name: str, item: Any) -> xarray.Dataset | _Diagram:
+_Part: TypeAlias = "xarray.Dataset | _Diagram | IsolasPart"
+
+
+def _part(name: str, item: Any) -> _Part:
     import xarray
 
     given: Any = item.to_xarray() if hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset) else item
+    isolas = isolas_part(given) if isinstance(given, dict) else None
+    if isolas is not None:
+        return isolas
     if isinstance(given, dict) and given:
         curves = {str(label): _dataset(name, dataset) for label, dataset in given.items()}
         return _Diagram(str(item), curves, getattr(item, "legend", None))
@@ -105,32 +111,36 @@ def _dataset(name: str, dataset: Any) -> xarray.Dataset:
     return dataset
 
 
-def _page(parts: Mapping[str, xarray.Dataset | _Diagram], title: str) -> str:
-    datasets = {name: part for name, part in parts.items() if not isinstance(part, _Diagram)}
+def _page(parts: Mapping[str, _Part], title: str) -> str:
+    datasets = {name: part for name, part in parts.items() if not isinstance(part, _Diagram | IsolasPart)}
     diagrams = {name: part for name, part in parts.items() if isinstance(part, _Diagram)}
+    isolas = {name: part for name, part in parts.items() if isinstance(part, IsolasPart)}
     curves = {name: data for name, data in datasets.items() if data.sizes.get("point", 0)}
     everything = [*datasets.values(), *(data for diagram in diagrams.values() for data in diagram.curves.values())]
+    everything += [part.head for part in isolas.values()]
     anchors = {name: f"part-{index}" for index, name in enumerate(parts)}
-    sections = [f"<h1>{_safe(title)}</h1>", _summary(everything)]
+    sections = [f"<h1>{safe(title)}</h1>", _summary(everything)]
     if len(parts) > 1:
-        links = [f'<a href="#{anchors[name]}">{_safe(name)}</a>' for name in parts]
+        links = [f'<a href="#{anchors[name]}">{safe(name)}</a>' for name in parts]
         sections.append(f"<nav>{''.join(links)}</nav>")
         sections += _overviews(curves)
     for name in parts:
-        sections.append(f'<section id="{anchors[name]}"><h2>{_safe(name)}</h2>')
+        sections.append(f'<section id="{anchors[name]}"><h2>{safe(name)}</h2>')
         if name in diagrams:
             sections.append(_diagram(name, diagrams[name]))
+        elif name in isolas:
+            sections.append(_isolas(name, isolas[name]))
         else:
             sections.append(_curve(name, datasets[name]) if name in curves else _table_of(datasets[name]))
         sections.append("</section>")
-    drawn = curves or diagrams
+    drawn = curves or diagrams or any(part.every for part in isolas.values())
     packed = f'<script type="text/plain" id="plotly-packed">{plotly_source()}</script>' if drawn else ""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        f'<meta name="generator" content="suboctave {_safe(__version__)}">\n'
-        f"<title>{_safe(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+        f'<meta name="generator" content="suboctave {safe(__version__)}">\n'
+        f"<title>{safe(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
         + "\n".join(sections)
         + f"\n{packed}\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
     )
@@ -140,9 +150,16 @@ def _diagram(name: str, diagram: _Diagram) -> str:
     """All curves in one figure, the tree, and each branch by itself."""
     free = str(next(iter(diagram.curves.values())).attrs["free"])
     each = "".join(
-        f"<h2>{_safe(name)}, branch {_safe(label)}</h2>{_curve(label, data)}" for label, data in diagram.curves.items()
+        f"<h2>{safe(name)}, branch {safe(label)}</h2>{_curve(label, data)}" for label, data in diagram.curves.items()
     )
-    return f"{_figure(diagram.curves, free, diagram.legend)}<pre>{_safe(diagram.text)}</pre>{each}"
+    return f"{_figure(diagram.curves, free, diagram.legend)}<pre>{safe(diagram.text)}</pre>{each}"
+
+
+def _isolas(name: str, part: IsolasPart) -> str:
+    """Table and sentences, regions, surfaces, and each curve and closed branch by itself."""
+    figures = "".join(_framed(shown) for shown in isolas_figures(part, _file_name({name: part.head})))
+    each = "".join(f"<h2>{safe(name)}, {safe(label)}</h2>{_curve(label, data)}" for label, data in part.every.items())
+    return isolas_words(part) + figures + each
 
 
 def _summary(datasets: Sequence[xarray.Dataset]) -> str:
@@ -150,7 +167,7 @@ def _summary(datasets: Sequence[xarray.Dataset]) -> str:
     systems = dict.fromkeys(str(data.attrs["system"]) for data in datasets if data.attrs.get("system"))
     words = [f"suboctave {', '.join(versions) or __version__}", *systems]
     hint = "Hover over a curve for its values, drag to zoom, click in the legend to hide."
-    return f'<p class="soft">{_safe(" · ".join(words))}</p><p class="soft hint">{hint}</p>'
+    return f'<p class="soft">{safe(" · ".join(words))}</p><p class="soft hint">{hint}</p>'
 
 
 def _overviews(curves: Mapping[str, xarray.Dataset]) -> list[str]:
@@ -163,12 +180,12 @@ def _overviews(curves: Mapping[str, xarray.Dataset]) -> list[str]:
         groups.setdefault(key, {})[name] = data
     several = [(key[0], group) for key, group in groups.items() if len(group) > 1]
     parts = [
-        f"<section><h2>All curves over {_safe(_spelt(free))}</h2>{_figure(group, free, list(group))}</section>"
+        f"<section><h2>All curves over {safe(spelt(free))}</h2>{_figure(group, free, list(group))}</section>"
         for free, group in several
     ]
     for members, what in boundary_overviews(curves):
         shown = (boundary_figure if what == "plane" else space_figure)(members, _file_name(members))
-        parts.append(f"<section><h2>{_safe(shown.heading)}</h2>{_framed(shown)}</section>")
+        parts.append(f"<section><h2>{safe(shown.heading)}</h2>{_framed(shown)}</section>")
     return parts
 
 
@@ -189,12 +206,12 @@ def _curve(name: str, dataset: xarray.Dataset) -> str:
     if period > 1:
         said += f"; motions of {period} periods of the force"
     ended = f"; {dataset.attrs['ended']}" if dataset.attrs.get("ended") else ""
-    notes = "".join(f'<p class="note">{_safe(note)}</p>' for note in _notes(dataset))
-    table = _table(head, rows) if rows else "<p>none</p>"
+    notes = "".join(f'<p class="note">{safe(note)}</p>' for note in _notes(dataset))
+    table = html_table(head, rows) if rows else "<p>none</p>"
     widths = [max(len(text) for text in column) for column in zip([name for name, _ in head], *rows, strict=True)]
     wide = " wide" if sum(widths) > _BESIDE else ""
     return (
-        f'<p class="soft">{_safe(said + ended)}.</p>'
+        f'<p class="soft">{safe(said + ended)}.</p>'
         f'<div class="pair{wide}"><div>{figure({name: dataset}, str(dataset.attrs["free"]))}</div>'
         f"<div><h3>{over}, in the order met</h3>{table}</div></div>{notes}{_provenance(dataset)}"
     )
@@ -211,7 +228,7 @@ def _file_name(curves: Mapping[str, xarray.Dataset]) -> str:
 
 def _figure(curves: Mapping[str, xarray.Dataset], free: str, labels: Sequence[str] | None = None) -> str:
     still = plot_response(list(curves.values()), x=free, labels=labels, size=(6.4, 4.2))
-    words = f"Amplitude over {_spelt(free)}: {', '.join(curves)}"
+    words = f"Amplitude over {spelt(free)}: {', '.join(curves)}"
     return _framed(Shown("", figure_data(curves, free, _file_name(curves)), still, words))
 
 
@@ -226,7 +243,7 @@ def _framed(shown: Shown) -> str:
         told = told.replace(bad, f"\\u{ord(bad):04x}")
     packed = base64.b64encode(svg_text(shown.still).encode("utf-8")).decode("ascii")
     return (
-        f'<div class="figure"><div class="plot"></div><div class="still"><img alt="{_safe(shown.words)}" '
+        f'<div class="figure"><div class="plot"></div><div class="still"><img alt="{safe(shown.words)}" '
         f'src="data:image/svg+xml;base64,{packed}"></div><script type="application/json">{told}</script></div>'
     )
 
@@ -235,7 +252,7 @@ def _bifurcations(dataset: xarray.Dataset) -> tuple[list[tuple[str, str]], list[
     """Headings with their class, and the rows of the table."""
     free = _free(dataset)
     values = [coordinate(dataset, name)[1] for name in free]
-    varied = _spelt(str(dataset.attrs["free"]))
+    varied = spelt(str(dataset.attrs["free"]))
     extreme = dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else None
     column = {name: dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier")}
     residual, doubt = dataset["event_residual"].to_numpy(), dataset["event_uncertainty"].to_numpy()
@@ -257,7 +274,7 @@ def _bifurcations(dataset: xarray.Dataset) -> tuple[list[tuple[str, str]], list[
         name = style.kind_style(kind).name
         row = [f"{kind} ({name})" if kind.isupper() and name != kind else name, f"{column['omega'][i]:.9g}"]
         row += [f"{value[i]:.9g}" for value in values]
-        row += [f"{column['amplitude'][i]:.7g}", _complex(complex(column["multiplier"][i])), _small(residual[i])]
+        row += [f"{column['amplitude'][i]:.7g}", number(complex(column["multiplier"][i])), small(residual[i])]
         rows.append(row + ([remarks[i]] if any(remarks) else []))
     return head, rows
 
@@ -294,7 +311,7 @@ def _provenance(dataset: xarray.Dataset) -> str:
         ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {attrs.get('observed_dof', 0)}"),
         (
             "free parameter",
-            " and ".join(map(_spelt, plane_of(dataset))) if is_boundary(dataset) else _spelt(str(attrs["free"])),
+            " and ".join(map(spelt, plane_of(dataset))) if is_boundary(dataset) else spelt(str(attrs["free"])),
         ),
         ("fixed parameters", _fixed(dataset) or "none"),
     ]
@@ -303,13 +320,13 @@ def _provenance(dataset: xarray.Dataset) -> str:
         pairs.append(("harmonics used", f"{used.min()} to {used.max()}" if np.ptp(used) else f"{used[0]}"))
     for name, words in (("error", "largest neglected part of the motion"), ("residual", "largest residual")):
         if name in dataset:
-            pairs.append((words, _small(float(np.nanmax(dataset[name].to_numpy())))))
+            pairs.append((words, small(float(np.nanmax(dataset[name].to_numpy())))))
     if "stability_method" in dataset:
         methods = dict.fromkeys(str(method) for method in dataset["stability_method"].to_numpy())
         pairs.append(("stability from", "; ".join(methods)))
     longer = []
     for name, value in attrs.items():
-        untold = name == "seconds" and not _finite(value)
+        untold = name == "seconds" and not finite(value)
         if name in _TOLD or name in _RECORDS or str(value) == "" or untold:
             continue
         shown = f"{float(value):.3g} s" if name == "seconds" else str(value)
@@ -317,9 +334,9 @@ def _provenance(dataset: xarray.Dataset) -> str:
             longer.append((str(name), shown))
         else:
             pairs.append(("time taken" if name == "seconds" else str(name), shown))
-    listed = "".join(f"<dt>{_safe(name)}</dt><dd>{_safe(value)}</dd>" for name, value in pairs)
+    listed = "".join(f"<dt>{safe(name)}</dt><dd>{safe(value)}</dd>" for name, value in pairs)
     more = "".join(
-        f"<details><summary>{_safe(name)}</summary><pre>{_safe(value)}</pre></details>" for name, value in longer
+        f"<details><summary>{safe(name)}</summary><pre>{safe(value)}</pre></details>" for name, value in longer
     )
     return f"<h3>Where these numbers come from</h3><dl>{listed}</dl>{more}"
 
@@ -339,50 +356,6 @@ def _table_of(dataset: xarray.Dataset) -> str:
         return "<p>a curve without points</p>"
     columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
     kinds = [_TEXT if column.dtype.kind in "OU" else "" for column in columns.values()]
-    rows = [[_cell(column[i]) for column in columns.values()] for i in range(dataset.sizes["row"])]
-    heading = f"<p>{_safe(str(dataset.attrs['title']))}</p>" if dataset.attrs.get("title") else ""
-    return heading + _table(list(zip(columns, kinds, strict=True)), rows)
-
-
-def _table(head: Sequence[tuple[str, str]], rows: Sequence[Sequence[str]]) -> str:
-    def cell(tag: str, kind: str, text: str) -> str:
-        named = f' class="{kind}"' if kind else ""
-        return f"<{tag}{named}>{_safe(text)}</{tag}>"
-
-    top = "".join(cell("th", "text" if kind == "long" else kind, name) for name, kind in head)
-    body = "".join(
-        "<tr>" + "".join(cell("td", kind, text) for (_, kind), text in zip(head, row, strict=True)) + "</tr>"
-        for row in rows
-    )
-    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, complex | np.complexfloating):
-        return _complex(complex(value))
-    return f"{float(value):.9g}" if isinstance(value, float | np.floating) else str(value)
-
-
-def _complex(value: complex) -> str:
-    if not np.isfinite(value):
-        return "–"
-    return f"{value.real:.6f}" + (f" {value.imag:+.6f}i" if abs(value.imag) > 1e-7 else "")
-
-
-def _small(value: float) -> str:
-    return f"{value:.1e}" if math.isfinite(value) else "–"
-
-
-def _finite(value: Any) -> bool:
-    try:
-        return math.isfinite(float(value))
-    except (TypeError, ValueError):
-        return False
-
-
-def _spelt(name: str) -> str:
-    return "ω" if name == "omega" else name
-
-
-def _safe(text: str) -> str:
-    return html.escape(str(text), quote=True)
+    rows = [[cell(column[i]) for column in columns.values()] for i in range(dataset.sizes["row"])]
+    heading = f"<p>{safe(str(dataset.attrs['title']))}</p>" if dataset.attrs.get("title") else ""
+    return heading + html_table(list(zip(columns, kinds, strict=True)), rows)

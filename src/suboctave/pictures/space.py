@@ -7,7 +7,6 @@ their projection on the floor, which is the picture of `boundary`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -15,63 +14,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError
 from suboctave.pictures import style
-from suboctave.pictures.boundary import BORDER, SMALL, WITHIN, event_drawing, event_words, mark_events
-from suboctave.pictures.boundary_lines import boundary_names, boundary_styles, is_boundary, kind_of, plane_of
+from suboctave.pictures.boundary import BORDER, PALE, WITHIN
+from suboctave.pictures.boundary_lines import boundary_names, boundary_styles, is_boundary, kind_of
+from suboctave.pictures.boundary_marks import SMALL, event_drawing, event_words, mark_events
 from suboctave.pictures.legend import TIGHT
 from suboctave.pictures.periods import period_colour, period_name, period_of, tinted
+from suboctave.pictures.regions import regions, split, with_ends
 from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import strokes
+from suboctave.pictures.space_view import Space, space_axes, strokes_in_space, surfaces_in_space
 from suboctave.pictures.view import View
-from suboctave.store.layout import check_layout, coordinate
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["SHADE", "Space", "plot_space", "space_axes", "strokes_in_space"]
+__all__ = ["CLEAR", "SHADE", "plot_space"]
 
-_DEPTH = "_depth"
 _ASPECT = (1.5, 1.15, 0.95)
 _THIN = 0.7  # of a response curve, beside a curve of bifurcations
 #: share of white in the projection on the floor
 SHADE = 0.55
-
-
-@dataclass(frozen=True)
-class Space:
-    """The three axes: `across`, a parameter or omega, `depth`, another one, and the quantity of the view."""
-
-    across: str
-    depth: str
-    view: View = field(default_factory=View)
-
-    def values(self, dataset: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (3, points) and (3, events)."""
-        factors = self.factors()
-        points, events = [], []
-        for name, factor in zip((self.across, self.depth), factors, strict=False):
-            at, there = coordinate(dataset, name)
-            points.append(at * factor)
-            events.append(there * factor)
-        points.append(dataset[self.view.variable].to_numpy() * factors[2])
-        events.append(dataset[f"event_{self.view.variable}"].to_numpy() * factors[2])
-        return np.array(points), np.array(events)
-
-    def factors(self) -> tuple[float, float, float]:
-        """What values along the three axes are multiplied by."""
-        first, up = self.view.factors(self.across)
-        return first, self.view.factors(self.depth)[0], up
-
-    def labels(self, dataset: xarray.Dataset) -> tuple[str, str, str]:
-        """What the three axes say; `xlabel` and `ylabel` of the view are those across and into the depth."""
-        view = self.view
-        plain = View(view.quantity, view.harmonic, view.element, view.dof, view.frequency, view.omega_reference)
-        across, depth = (plain.labels(dataset, name)[0] for name in (self.across, self.depth))
-        up = View(view.quantity, view.harmonic, view.element, view.dof, scale=view.scale, unit=view.unit)
-        return view.xlabel or across, view.ylabel or depth, up.labels(dataset, self.across)[1]
+#: opacity of the surface of an isola
+CLEAR = 0.16
 
 
 def plot_space(
@@ -101,7 +68,8 @@ def plot_space(
     Parameters
     ----------
     curves
-        Branches, tracked ones among them, or their datasets, or what has `branches`, as `suboctave.plot` takes them.
+        Branches, tracked ones among them, or their datasets, isolas, or what has `branches`, as `suboctave.plot` takes
+        them. The closed branches of an isola that are known are drawn, and the surface that they lie on.
     x, y
         The axes to the right and into the depth: "omega" or parameters; default those in which bifurcations were
         tracked, or omega and the parameter that differs between the response curves.
@@ -128,7 +96,8 @@ def plot_space(
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):
             raise InputError(f"{name} is an angle in degrees, not {angle!r}")
-    group = datasets_of(curves, view)
+    given = datasets_of(curves, view)
+    group, heads = split(given)
     across, depth = space_axes(group, x, y)
     for dataset in group:
         view.check(dataset)
@@ -140,7 +109,8 @@ def plot_space(
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     every = np.concatenate([part for dataset in group for part in space.values(dataset)], axis=1)
     floor = _limit(axes, every)
-    entries = _draw(axes, group, space, floor, look)
+    entries = _shade(axes, given, space, floor)
+    entries |= _draw(axes, [with_ends(d, heads) if is_boundary(d) else d for d in group], space, floor, look)
     _dress(axes, space.labels(group[0]), zlabel, look)
     axes.view_init(float(elevation), float(azimuth))
     _place(figure, axes, entries, title, look, grow=isinstance(size, str))
@@ -156,53 +126,6 @@ def _inches(size: str | tuple[float, float]) -> tuple[float, float]:
     return (width, 0.8 * width if width < 5.0 else 0.62 * width) if isinstance(size, str) else (width, height)
 
 
-def space_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:
-    """What is drawn to the right and into the depth; InputError where that has to be told, or is not there."""
-    if not group:
-        raise InputError("no curve to draw")
-    for dataset in group:
-        check_layout(dataset)
-        if dataset.sizes.get("point", 0) == 0:
-            raise InputError("a curve without points cannot be drawn")
-        for name in (x, y):
-            if name is not None:
-                coordinate(dataset, name)
-    if x is not None and x == y:
-        raise InputError(f"x and y are the same parameter {x!r}")
-    if x is not None and y is not None:
-        return x, y
-    pairs = {plane_of(dataset) for dataset in group if is_boundary(dataset)}
-    if not pairs:
-        free = {str(dataset.attrs["free"]) for dataset in group}
-        names = _differing(group)
-        if len(free) == 1 and len(names) == 1:
-            pairs = {(next(iter(free)), names[0])}
-        elif len(free) == 1 and y is None:
-            raise InputError(
-                f"name the parameter into the depth with y=; the curves differ in {', '.join(names) or 'none'}"
-            )
-    if len(pairs) != 1:
-        if x is None and y is not None and not pairs:
-            return str(group[0].attrs["free"]), y
-        raise InputError("the curves were followed in different parameters: choose axes with x= and y=")
-    pair = next(iter(pairs))
-    given = x if x is not None else y
-    if given is None:
-        return pair
-    if given not in pair:
-        raise InputError(f"{given!r} is neither of {pair[0]}, {pair[1]}{suggest(given, pair)}: give x= and y=")
-    other = pair[1] if given == pair[0] else pair[0]
-    return (given, other) if x is not None else (other, given)
-
-
-def _differing(group: Sequence[xarray.Dataset]) -> list[str]:
-    """Parameters that are constant on each curve, or vary, and are not the same on all."""
-    names = [str(name) for name in group[0]["parameter"].to_numpy()]
-    free = {str(dataset.attrs["free"]) for dataset in group}
-    values = {name: np.concatenate([coordinate(data, name)[0] for data in group]) for name in names if name not in free}
-    return [name for name, value in values.items() if np.ptp(value) > 0.0]
-
-
 def _limit(axes: Any, every: np.ndarray) -> float:
     """Sets the limits; returns the height of the floor."""
     for index, limits in enumerate((axes.set_xlim, axes.set_ylim, axes.set_zlim)):
@@ -212,6 +135,29 @@ def _limit(axes: Any, every: np.ndarray) -> float:
         floor = 0.0 if index == 2 and low >= 0.0 else low - margin
         limits(floor if index == 2 else low - margin, high + margin)
     return floor
+
+
+def _shade(axes: Any, given: Sequence[xarray.Dataset], space: Space, floor: float) -> dict[str, Any]:
+    """The surfaces of isolas, and their regions on the floor; their entries in the legend."""
+    from matplotlib.patches import Patch
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    entries: dict[str, Any] = {}
+    for region in regions(split(given)[1]):
+        if sorted((space.across, space.depth)) == sorted(("omega", region.parameter)):
+            parts = dict(zip(("omega", region.parameter), region.outline, strict=True))
+            x, y = (parts[n] * f for n, f in zip((space.across, space.depth), space.factors(), strict=False))
+            corners = [np.column_stack([x, y, np.full(x.size, floor)])]
+            shade = Poly3DCollection(corners, facecolor=tinted(region.colour, PALE), linewidth=0.0, gid="isola-floor")
+            shade.set_zorder(0.9)
+            axes.add_collection3d(shade)
+    for nu, grid in surfaces_in_space(given, space):
+        colour = period_colour(nu)
+        axes.plot_surface(
+            *grid, color=colour, alpha=CLEAR, shade=False, linewidth=0.0, rcount=200, ccount=200, zorder=2, gid="isola"
+        )
+        entries[f"{period_name(nu)} isola"] = Patch(facecolor=colour, alpha=2.0 * CLEAR, linewidth=0.0)
+    return entries
 
 
 def _draw(
@@ -274,18 +220,6 @@ def _draw(
         words = style.kind_style(kind).name if kind in dict(tracked) else event_words(kind)
         entries[words] = Line2D([], [], **event_drawing(kinds[kind], look))
     return entries
-
-
-def strokes_in_space(dataset: xarray.Dataset, space: Space) -> list[tuple[np.ndarray, bool | None]]:
-    """Stretches (3, vertices) of one stability each, cut where bifurcations were located."""
-    depth, at_events = coordinate(dataset, space.depth)
-    prepared = dataset.assign({_DEPTH: ("point", depth), f"event_{_DEPTH}": ("event", at_events)})
-    factors = space.factors()
-    found = []
-    variables = (space.view.variable, _DEPTH)
-    for up, into in zip(*(strokes(prepared, space.across, name) for name in variables), strict=True):
-        found.append((np.array([up.x * factors[0], into.y * factors[1], up.y * factors[2]]), up.stable))
-    return found
 
 
 def _dress(axes: Any, labels: tuple[str, str, str], zlabel: str | None, look: style.Look) -> None:

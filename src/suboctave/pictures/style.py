@@ -144,7 +144,7 @@ class KindStyle:
     """How one kind of bifurcation is marked, and what it is called in a legend."""
 
     name: str
-    marker: str
+    marker: str | tuple[int, int, int]
     colour: str
     size: float = MARKER_SIZE
 
@@ -163,9 +163,11 @@ KINDS = {
     "R3": KindStyle("1:3 resonance", "p", "#56B4E9", MARKER_SIZE * 1.1),
     "R4": KindStyle("1:4 resonance", "8", "#56B4E9"),
     "LPPD": KindStyle("fold-flip", "X", "#CC79A7", MARKER_SIZE * 1.05),
-    "LPNS": KindStyle("fold–Neimark–Sacker", "X", "#009E73", MARKER_SIZE * 1.05),
-    "PDNS": KindStyle("flip–Neimark–Sacker", "X", "#D55E00", MARKER_SIZE * 1.05),
-    "NSNS": KindStyle("double Neimark–Sacker", "X", "#0072B2", MARKER_SIZE * 1.05),
+    "LPNS": KindStyle("fold–Neimark–Sacker", (3, 1, 0), "#009E73", MARKER_SIZE * 1.05),
+    "PDNS": KindStyle("flip–Neimark–Sacker", (3, 1, 180), "#D55E00", MARKER_SIZE * 1.05),
+    "NSNS": KindStyle("double Neimark–Sacker", (4, 1, 45), "#0072B2", MARKER_SIZE * 1.05),
+    "isola_centre": KindStyle("isola is born", (4, 1, 0), "#F0E442", MARKER_SIZE * 1.6),
+    "isola_merging": KindStyle("isola merges", "^", "#F0E442", MARKER_SIZE * 1.15),
 }
 
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.analysis import BifurcationDiagram, Results, Table, load
+from suboctave.analysis import BifurcationDiagram, Isola, Isolas, Results, Table, load
+from suboctave.analysis.isola_tables import isola_row
 from suboctave.analysis.results import Result
 from suboctave.errors import InputError, suggest
 from suboctave.store import files
@@ -178,6 +179,8 @@ def _csv(results: Results, folder: Path, overwrite: bool) -> list[Path]:
     jobs: list[tuple[Path, Any]] = []
     for name, item in results.items():
         jobs.append((folder / f"{name}.csv", item.to_csv))
+        if isinstance(item, Isolas):
+            jobs.append((folder / f"{name}_points.csv", partial(item.to_csv, what="points")))
         if not isinstance(item, Table):
             jobs.append((folder / f"{name}_bifurcations.csv", partial(item.to_csv, what="bifurcations")))
     for path, _ in jobs:
@@ -249,6 +252,11 @@ def _result(item: Result) -> dict[str, Any]:
             place["not_followed"] = [{"kind": b.kind, "omega": b.omega, "reason": why} for b, why in node.failures]
             branches.append(place | _result(node.branch))
         return {"stopped": item.stopped, "branches": branches}
+    if isinstance(item, Isolas):
+        found = [{k: _plain(v) for k, v in isola_row(isola).items()} | _closed(isola) for isola in item]
+        told: dict[str, Any] = {"parameter": item.parameter, "said": item.said, "isolas": found}
+        told |= {"limit_points": len(item.limit_points), "doublings": len(item.doublings)}
+        return told | {"notes": list(item.notes), "interrupted": item.interrupted}
     if isinstance(item, Table):
         return {"title": item.title, "rows": len(item), "columns": {n: _listed(c) for n, c in item.columns.items()}}
     events = item.bifurcations_frame().to_dict("records")
@@ -264,6 +272,11 @@ def _result(item: Result) -> dict[str, Any]:
         "warnings": list(item.warnings),
         "bifurcations": [{str(k): _plain(v) for k, v in event.items()} for event in events],
     }
+
+
+def _closed(isola: Isola) -> dict[str, Any]:
+    """The closed branches of an isola that are known."""
+    return {"closed": [{"at": value} | _result(branch) for value, branch in isola.known.items()]}
 
 
 def _listed(column: np.ndarray) -> list[Any]:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.analysis import BifurcationDiagram, Branch
+from suboctave.analysis import BifurcationDiagram, Branch, Isolas
 from suboctave.analysis.contacts import check_element, gapped_elements
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.results import Result
@@ -20,10 +20,11 @@ from suboctave.pictures import View, plot_boundaries, plot_response, plot_space
 from suboctave.pictures.style import size_in_inches
 from suboctave.study.steps.base import Complaint
 
-__all__ = ["CURVE_FIGURES", "BoundaryFigure", "CurveFigure", "FigureSection", "SpaceFigure", "branches_of"]
+__all__ = ["CURVE_FIGURES", "BoundaryFigure", "CurveFigure", "FigureSection", "SpaceFigure", "drawable"]
 
 _VIEW = [field.name for field in fields(View)]
-#: the curves that a study gives, by name, with the two parameters in which bifurcations were tracked, else None
+#: the curves that a study gives, by name, with the two parameters in which bifurcations were tracked or isolas looked
+#: for, else None
 Drawable = Mapping[str, tuple[str, str] | None]
 
 
@@ -68,8 +69,10 @@ class CurveFigure(BaseModel):
         """The analyses that it shows."""
         return self.analyses or list(names)
 
-    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
-        """What is wrong with it, before any work."""
+    def check(
+        self, curves: Drawable, system: System | None, events: Sequence[str] = (), isolas: Sequence[str] = ()
+    ) -> Iterator[Complaint]:
+        """What is wrong with it, before any work; `isolas`: the analyses that look for these."""
         for i, name in enumerate(self.analyses):
             if name not in curves:
                 yield ("analyses", i), f"no analysis {name!r} gives a curve{suggest(name, curves)}"
@@ -100,8 +103,8 @@ class CurveFigure(BaseModel):
 
     def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where no analysis that it shows gave anything."""
-        curves = {name: found for name, item in results.items() if (found := branches_of(item))}
-        planes = {name: getattr(item, "names", None) for name, item in results.items() if _is_curve(item)}
+        curves = {name: item for name, item in results.items() if drawable(item)}
+        planes = {name: getattr(item, "plane", None) for name, item in results.items() if _is_curve(item)}
         every = self.drawn(planes)
         there = [name for name in every if name in curves]
         if not there:
@@ -113,56 +116,90 @@ class CurveFigure(BaseModel):
         given: list[str] | None = getattr(self, "labels", None)
         if given is not None:
             told = {name: given[every.index(name)] for name in there}
-            labels = [label for name in there for label in _labels(results[name], curves[name], told[name])]
+            labels = [label for name in there for label in self._labels(results[name], told[name])]
         elif isinstance(alone, BifurcationDiagram):
             labels = alone.legend
         if isinstance(alone, BifurcationDiagram) and view.marks is None:
             view = replace(view, marks=alone.marks)
-        datasets = [branch.to_xarray(readings=readings) for name in there for branch in curves[name]]
+        datasets = [dataset for name in there for dataset in self.datasets(results[name], readings)]
+        if not datasets:
+            return False
         self.drawing(datasets, path, labels, view)
         return True
+
+    def datasets(self, item: Result, readings: Sequence[str]) -> list[Any]:
+        """What of a result is drawn."""
+        if isinstance(item, Isolas):
+            return self.of_isolas(item.to_xarray(readings=readings))
+        return [branch.to_xarray(readings=readings) for branch in _branches_of(item)]
+
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """What of isolas is drawn: everything."""
+        return list(datasets.values())
+
+    def _labels(self, item: Result, label: str) -> list[str]:
+        """The label of a curve; those of a diagram's branches tell their periods, those of isolas what they are."""
+        if isinstance(item, BifurcationDiagram):
+            return [f"{label}, {period_name(branch.nu)}" for branch in _branches_of(item)]
+        if isinstance(item, Isolas):
+            names = item.to_xarray()
+            shown = [id(dataset) for dataset in self.of_isolas(names)]
+            told = [name.split(": ")[-1] for name, dataset in names.items() if id(dataset) in shown]
+            return [f"{label}, {name}" for name in told if name != "isolas"]
+        return [label]
 
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """Draw the datasets of its curves."""
         raise TypeError(f"{type(self).__name__} does not say how it is drawn")
 
 
-def branches_of(item: Result) -> list[Branch]:
-    """The branches of a result that can be drawn."""
+def drawable(item: Result) -> bool:
+    """Whether there is something of a result to draw."""
+    if isinstance(item, Isolas):
+        return bool(item.limit_points or item.doublings)
+    return bool(_branches_of(item))
+
+
+def _branches_of(item: Result) -> list[Branch]:
+    """The branches of a curve or a diagram that can be drawn."""
     if isinstance(item, BifurcationDiagram):
         return [branch for branch in item.branches if len(branch)]
     return [item] if isinstance(item, Branch) and len(item) else []
 
 
 def _is_curve(item: Result) -> bool:
-    return isinstance(item, Branch | BifurcationDiagram)
-
-
-def _labels(item: Result, branches: Sequence[Branch], label: str) -> list[str]:
-    """The label of a curve; those of a diagram's branches tell their periods, too."""
-    if isinstance(item, BifurcationDiagram):
-        return [f"{label}, {period_name(branch.nu)}" for branch in branches]
-    return [label]
+    return isinstance(item, Branch | BifurcationDiagram | Isolas)
 
 
 class FigureSection(CurveFigure):
-    """Response curves. Curves of bifurcations are drawn among them where `x` is given and they are named."""
+    """Response curves. Curves of bifurcations are drawn among them where `x` is given and they are named.
+
+    Of isolas that are named the closed branches known are drawn, or those at the values `at`.
+    """
 
     kind: str = "response"
     labels: list[str] | None = None
     xlim: list[float] | None = Field(default=None, min_length=2, max_length=2)
     ylim: list[float] | None = Field(default=None, min_length=2, max_length=2)
     marks: list[str] | None = None
+    at: list[float] | None = None
 
     def drawn(self, names: Drawable) -> list[str]:
         """The analyses that it shows: all that are no curves of bifurcations, unless told."""
         return self.analyses or [name for name, plane in names.items() if plane is None] or list(names)
 
-    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        closed = [dataset for dataset in datasets.values() if "isola" in dataset.attrs]
+        return _at(self.at, closed, datasets["isolas"].attrs["isolas"])
+
+    def check(
+        self, curves: Drawable, system: System | None, events: Sequence[str] = (), isolas: Sequence[str] = ()
+    ) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from super().check(curves, system, events)
+        yield from super().check(curves, system, events, isolas)
         for i, name in enumerate(self.analyses):
-            if curves.get(name) is not None and self.x is None:
+            if curves.get(name) is not None and self.x is None and name not in isolas:
                 yield ("analyses", i), f'{name!r} is a curve of bifurcations: kind = "boundary" draws it, or give x'
 
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
@@ -171,7 +208,7 @@ class FigureSection(CurveFigure):
 
 
 class BoundaryFigure(CurveFigure):
-    """Curves of bifurcations in the plane of their two parameters; with a `quantity`, this upwards."""
+    """Curves of bifurcations and regions of isolas in the plane of two parameters; with a `quantity`, this upwards."""
 
     kind: Literal["boundary"]
     y: str | None = None
@@ -189,12 +226,14 @@ class BoundaryFigure(CurveFigure):
         """The analyses that it shows: all curves of bifurcations, unless told."""
         return self.analyses or [name for name, plane in names.items() if plane is not None]
 
-    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
+    def check(
+        self, curves: Drawable, system: System | None, events: Sequence[str] = (), isolas: Sequence[str] = ()
+    ) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from super().check(curves, system, events)
+        yield from super().check(curves, system, events, isolas)
         tracked = [name for name, plane in curves.items() if plane is not None]
         if curves and not tracked:
-            yield (), "there is no analysis of the type 'track', whose curves it would show"
+            yield (), "there is no analysis of the type 'track' or 'find_isolas', whose curves it would show"
         for i, name in enumerate(self.analyses):
             if name in curves and curves[name] is None:
                 yield ("analyses", i), f"{name!r} is no curve of bifurcations{suggest(name, tracked)}"
@@ -210,6 +249,10 @@ class BoundaryFigure(CurveFigure):
             if plane is not None and given not in plane:
                 yield (key,), f"is not free on these curves{suggest(str(given), plane)}; else give x and y"
 
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        return [dataset for dataset in datasets.values() if "isola" not in dataset.attrs]
+
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
         """See `CurveFigure.drawing`."""
         axes: dict[str, Any] = {"x": self.x, "y": self.y, "projected": self.projected}
@@ -217,7 +260,10 @@ class BoundaryFigure(CurveFigure):
 
 
 class SpaceFigure(CurveFigure):
-    """Response curves at several values of a parameter, and curves of bifurcations through them, in space."""
+    """Response curves at several values of a parameter, and curves of bifurcations through them, in space.
+
+    Of isolas the closed branches known are drawn, or those at the values `at`.
+    """
 
     kind: Literal["space"]
     y: str | None = None
@@ -225,10 +271,19 @@ class SpaceFigure(CurveFigure):
     zlabel: str | None = None
     elevation: float = 24.0
     azimuth: float = -58.0
+    at: list[float] | None = None
 
-    def check(self, curves: Drawable, system: System | None, events: Sequence[str] = ()) -> Iterator[Complaint]:
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        closed = [dataset for dataset in datasets.values() if "isola" in dataset.attrs]
+        others = [dataset for dataset in datasets.values() if "isola" not in dataset.attrs]
+        return others + _at(self.at, closed, datasets["isolas"].attrs["isolas"])
+
+    def check(
+        self, curves: Drawable, system: System | None, events: Sequence[str] = (), isolas: Sequence[str] = ()
+    ) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from super().check(curves, system, events)
+        yield from super().check(curves, system, events, isolas)
         planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
         yield from _same(self.x, self.y)
         if self.x is not None and self.y is not None:
@@ -243,6 +298,20 @@ class SpaceFigure(CurveFigure):
         own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
         units: dict[str, Any] = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
         plot_space(datasets, path, **own, **units)
+
+
+def _at(values: Sequence[float] | None, closed: Sequence[Any], parameter: str) -> list[Any]:
+    """The closed branches at some values of the parameter; InputError where there is none."""
+    if values is None:
+        return list(closed)
+    known = [float(dataset.attrs["at"]) for dataset in closed]
+    for value in values:
+        if value not in known:
+            there = ", ".join(f"{other:.6g}" for other in sorted(set(known))) or "none"
+            raise InputError(
+                f"no closed branch at {parameter} = {value:g} is known (known: {there}): name it in at of the analysis"
+            )
+    return [dataset for dataset, value in zip(closed, known, strict=True) if value in values]
 
 
 def _same(x: str | None, y: str | None) -> Iterator[Complaint]:

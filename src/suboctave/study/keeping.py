@@ -2,7 +2,8 @@
 
 Records: "points" holds what is new on a curve that is being followed, "branch" a branch of a diagram that is under way,
 told by the number of its parent and the bifurcation that it leaves at, "analysis" a finished one. The branches of a
-finished diagram are those records; its own holds the tree.
+finished diagram are those records; its own holds the tree. Before the record of finished isolas stand those of their
+curves and closed branches, "part", told by name.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from suboctave.analysis import Branch
+from suboctave.analysis import Branch, Isolas
 from suboctave.analysis.results import Result, from_datasets, to_datasets
 from suboctave.store.journal import Journal, Record, read_journal
 from suboctave.study.steps import Step
@@ -29,7 +30,12 @@ _OFTEN = 1.0
 
 def keep(journal: Journal, name: str, key: str, result: Result, seconds: float) -> None:
     """A finished analysis, on the disk when this returns; the branches of a diagram are there already."""
-    journal.append("analysis", {"name": name, "key": key}, to_datasets(result, {"seconds": seconds})[""])
+    datasets = to_datasets(result, {"seconds": seconds})
+    if isinstance(result, Isolas):
+        for part, dataset in datasets.items():
+            if part:
+                journal.append("part", {"name": name, "key": key, "part": part}, dataset, sync=False)
+    journal.append("analysis", {"name": name, "key": key}, datasets[""])
 
 
 def finished(records: Sequence[Record], key: str, allow_code: bool) -> tuple[Result, dict[str, Any]] | None:
@@ -43,6 +49,9 @@ def finished(records: Sequence[Record], key: str, allow_code: bool) -> tuple[Res
         places = zip(groups[""]["parent"].values, groups[""]["origin"].values, strict=True)
         for number, (parent, event) in enumerate(places):
             groups[f"branch_{number}"] = branches[int(parent), int(event)].dataset
+    elif groups[""].attrs.get("contents") == "isolas":
+        parts = {r.said["part"]: r for r in records if r.kind == "part" and r.said["key"] == key}
+        groups |= {part: parts[part].dataset for part in str(groups[""].attrs["parts"]).splitlines()}
     return from_datasets(groups, allow_code)
 
 
@@ -111,7 +120,7 @@ class Recovered:
     """What a journal holds of one analysis; `events` are (kind, omega, amplitude) of one that had not finished.
 
     branches
-        Of a diagram how many branches; None for a single curve.
+        Of a diagram how many branches, of isolas how many curves; None for a single curve.
     """
 
     name: str
@@ -135,14 +144,14 @@ def recovered(path: str | Path) -> tuple[list[Recovered], bool]:
             item.points += len(record.said["omega"])
             item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.said["bifurcations"]]
             item.bifurcations = len(item.events)
-        elif record.kind == "branch":
+        elif record.kind in ("branch", "part"):
             item = found.setdefault(name, Recovered(name))
             sizes = record.dataset.sizes
             item.branches = (item.branches or 0) + 1
             item.points += int(sizes.get("point", 0))
             item.bifurcations += int(sizes.get("event", 0))
         elif record.kind == "analysis":
-            if record.dataset.attrs.get("contents") == "diagram":
+            if record.dataset.attrs.get("contents") in ("diagram", "isolas"):
                 found.setdefault(name, Recovered(name)).state = "finished"
                 continue
             sizes = record.dataset.sizes

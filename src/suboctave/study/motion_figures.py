@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from suboctave.analysis import BifurcationDiagram, Branch
+from suboctave.analysis import BifurcationDiagram, Branch, Isolas
 from suboctave.analysis.contacts import check_element
 from suboctave.analysis.results import Result
 from suboctave.errors import InputError, suggest
@@ -75,7 +75,7 @@ class MotionFigure(BaseModel):
 
     def check(self, steps: Mapping[str, type[Step]], system: System | None) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        curves = [name for name, step in steps.items() if step.gives_branch or step.gives_diagram]
+        curves = [name for name, step in steps.items() if step.drawn()]
         for i, motion in enumerate(self.chosen):
             key: tuple[str | int, ...] = ("motions", i)
             if motion.analysis not in curves:
@@ -135,9 +135,7 @@ class MotionFigure(BaseModel):
 
 
 def _interrupted(result: Result) -> bool:
-    if isinstance(result, BifurcationDiagram):
-        return result.interrupted
-    return isinstance(result, Branch) and result.interrupted
+    return isinstance(result, Branch | BifurcationDiagram | Isolas) and result.interrupted
 
 
 class PhaseFigure(MotionFigure):

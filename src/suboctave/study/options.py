@@ -1,4 +1,4 @@
-"""Options of the verbs as tables of a study file: [newton], [stepping], [harmonics], [stability], [formulation]."""
+"""Options of the verbs as tables of a study file: newton, stepping, harmonics, stability, formulation, seeds."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from suboctave.analysis import Seeds
 from suboctave.bifurcation import Alcorta2019, BorderedSystem, ExtendedSystem, Formulation, formulation_of
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.stability import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
 
-__all__ = ["as_formulation", "as_harmonics", "as_newton", "as_stability", "as_stepping"]
+__all__ = ["as_formulation", "as_harmonics", "as_newton", "as_seeds", "as_stability", "as_stepping"]
 
 _METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}
 _FORMULATIONS: dict[str, Any] = {one.name: one for one in (BorderedSystem, ExtendedSystem, Alcorta2019)}
@@ -26,6 +27,11 @@ def as_newton(table: Mapping[str, Any] | None) -> NewtonOptions | None:
 def as_stepping(table: Mapping[str, Any] | None) -> SteppingOptions | None:
     """The stepping options of a table, None where there is none."""
     return None if table is None else _options(SteppingOptions, table, "stepping")
+
+
+def as_seeds(table: Mapping[str, Any] | None) -> Seeds | None:
+    """How finely a search is done, of a table; None where there is none."""
+    return None if table is None else _options(Seeds, table, "seeds")
 
 
 def as_harmonics(given: Any, size: int = 1) -> Any:

@@ -10,14 +10,14 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.analysis import BifurcationDiagram, Branch, Results
+from suboctave.analysis import BifurcationDiagram, Branch, Isolas, Results
 from suboctave.analysis.results import Result
 from suboctave.errors import InputError
 from suboctave.model.system import System
 from suboctave.pictures.saving import SUFFIXES
 from suboctave.pictures.style import check_text
 from suboctave.store import files
-from suboctave.study.curve_figures import CurveFigure, FigureSection, branches_of
+from suboctave.study.curve_figures import CurveFigure, FigureSection, drawable
 from suboctave.study.motion_figures import MotionFigure
 from suboctave.study.steps import Step
 
@@ -45,7 +45,8 @@ def check_outputs(
     outputs: Outputs, steps: Sequence[Step], system: System | None
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """What is wrong with the outputs, before any work: key and message."""
-    drawable = {step.name: step.plane for step in steps if step.gives_branch or step.gives_diagram}
+    curves = {step.name: step.plane for step in steps if step.drawn()}
+    isolas = [step.name for step in steps if step.gives_isolas]
     events = [event.name for step in steps for event in getattr(step, "events", ())]
     kinds = {step.name: type(step) for step in steps}
     names: list[tuple[tuple[str | int, ...], str]] = [(("results",), outputs.results)]
@@ -63,7 +64,7 @@ def check_outputs(
         if isinstance(figure, MotionFigure):
             yield from (((*key, *where), text) for where, text in figure.check(kinds, system))
             continue
-        yield from (((*key, *where), text) for where, text in figure.check(drawable, system, events))
+        yield from (((*key, *where), text) for where, text in figure.check(curves, system, events, isolas))
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
@@ -107,7 +108,9 @@ def csv_names(steps: Sequence[Step]) -> list[str]:
     names = []
     for step in steps:
         names.append(f"{step.name}.csv")
-        if step.gives_branch or step.gives_diagram:
+        if step.gives_isolas:
+            names.append(f"{step.name}_points.csv")
+        if step.drawn():
             names.append(f"{step.name}_bifurcations.csv")
     return names
 
@@ -123,7 +126,7 @@ def places(outputs: Outputs, steps: Sequence[Step], folder: Path) -> list[Path]:
 def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) -> Iterator[Path]:
     """Write what was asked for of what there is, and yield each file; what stood there is replaced.
 
-    Raises InputError, after everything else is written, for figures of motions that the finished branches do not have.
+    Raises InputError, after everything else is written, for figures of motions or branches that finished analyses lack.
     """
     yield results.save(folder / outputs.results, overwrite=True)
     if outputs.csv:
@@ -137,10 +140,10 @@ def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) 
                 yield path
         except InputError as error:
             missing.append(f"outputs.figures[{index}] is not drawn: {error}")
-    if outputs.html is not None and any(branches_of(item) for item in results.values()):
+    if outputs.html is not None and any(drawable(item) for item in results.values()):
         path = folder / outputs.html
         report: Any = importlib.import_module(_REPORT)
-        shown = {name: _shown(item, results.details.get(name, {})) for name, item in results.items() if len(item)}
+        shown = {name: _shown(item, results.details.get(name, {})) for name, item in results.items() if _worth(item)}
         report.write_report(shown, path, title=title or "Study", overwrite=True)
         yield path
     if missing:
@@ -150,12 +153,19 @@ def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) 
 
 def _shown(item: Result, details: Mapping[str, Any]) -> Any:
     """What the report page is told of a result."""
-    if isinstance(item, BifurcationDiagram):
+    if isinstance(item, BifurcationDiagram | Isolas):
         return item
     return item.to_xarray().assign_attrs(seconds=details.get("seconds", float("nan")))
 
 
+def _worth(item: Result) -> bool:
+    """Whether there is anything to show; that no isola was found is said."""
+    return isinstance(item, Isolas) or bool(len(item))
+
+
 def _tables(name: str, item: Result, folder: Path) -> Iterator[Path]:
     yield item.to_csv(files.free_place(folder / f"{name}.csv", True), overwrite=True)
-    if isinstance(item, Branch | BifurcationDiagram):
+    if isinstance(item, Isolas):
+        yield item.to_csv(folder / f"{name}_points.csv", "points", overwrite=True)
+    if isinstance(item, Branch | BifurcationDiagram | Isolas):
         yield item.to_csv(folder / f"{name}_bifurcations.csv", "bifurcations", overwrite=True)

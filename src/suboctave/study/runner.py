@@ -14,7 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from suboctave.analysis import BifurcationDiagram, Branch, Results
+from suboctave.analysis import BifurcationDiagram, Branch, Isolas, Results
 from suboctave.analysis.results import Result
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.store.journal import Journal, read_journal
@@ -229,7 +229,7 @@ def _one(
     seconds = perf_counter() - begin
     if isinstance(outcome, Branch) and outcome.interrupted:
         interrupted = True
-    if isinstance(outcome, BifurcationDiagram) and outcome.interrupted:
+    if isinstance(outcome, BifurcationDiagram | Isolas) and outcome.interrupted:
         interrupted = True
     if outcome is not None and not interrupted:
         keep(journal, step.name, key, outcome, seconds)

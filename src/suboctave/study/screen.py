@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.analysis import BifurcationDiagram, Branch, Table
+from suboctave.analysis import BifurcationDiagram, Branch, Isolas, Table
+from suboctave.analysis.isola import stable_ranges
+from suboctave.analysis.isola_tables import isola_row
+from suboctave.analysis.junction import period_name
 from suboctave.analysis.results import Result
 from suboctave.analysis.tree_text import tree_text
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS
@@ -24,6 +27,7 @@ __all__ = [
     "print_branch",
     "print_diagram",
     "print_events",
+    "print_isolas",
     "print_result",
     "print_table",
     "print_texts",
@@ -98,11 +102,13 @@ def print_texts(out: Console, names: Sequence[str], lines: Sequence[Sequence[str
 
 
 def print_result(out: Console, name: str, result: Result, note: str = "") -> None:
-    """A branch, a diagram or a table, each in its way."""
+    """A branch, a diagram, isolas or a table, each in its way."""
     if isinstance(result, Branch):
         print_branch(out, name, result, note)
     elif isinstance(result, BifurcationDiagram):
         print_diagram(out, name, result, note)
+    elif isinstance(result, Isolas):
+        print_isolas(out, name, result, note)
     else:
         print_table(out, name, result, note)
 
@@ -149,6 +155,42 @@ def print_diagram(out: Console, name: str, diagram: BifurcationDiagram, note: st
     for node in diagram:
         for warning in node.branch.warnings:
             out.print(f"note on branch {node.number}: {warning}", markup=False)
+
+
+def print_isolas(out: Console, name: str, isolas: Isolas, note: str = "") -> None:
+    """Isolas: the table of their ranges and ends, what happens at these in words, and what could not be settled."""
+    out.print(f"\n{name}", style="bold", markup=False, end="")
+    out.print(f": over {isolas.parameter}{note}\n{isolas.said}", markup=False)
+    parameter = isolas.parameter
+    heads = ("", "period", f"{parameter} from", "to", "born at", "omega", "merges at", "omega")
+    keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
+    rows = [isola_row(isola) for isola in isolas]
+    lines = [
+        [str(i), period_name(row["period"]), *(f"{row[key]:.6g}" if row[key] == row[key] else "-" for key in keys)]
+        for i, row in enumerate(rows)
+    ]
+    if lines:
+        print_texts(out, heads, lines)
+    for i, isola in enumerate(isolas):
+        for end, reason in zip(("from", "to"), isola.reasons, strict=True):
+            value = isola.range[end == "to"]
+            out.print(f"isola {i}, {parameter} = {value:.7g}: {reason}", markup=False)
+        for value, branch in isola.known.items():
+            out.print(f"isola {i} at {parameter} = {value:.7g}: {_closed(branch)}", markup=False)
+        for text in isola.notes:
+            out.print(f"note on isola {i}: {text}", markup=False)
+    for text in isolas.notes:
+        out.print(f"note: {text}", markup=False)
+
+
+def _closed(branch: Branch) -> str:
+    """A closed branch in one line: where it is, and where it is stable."""
+    met = [*branch.omega, *(item.omega for item in branch.bifurcations)]
+    text = f"omega from {min(met):.7g} to {max(met):.7g}"
+    stable = stable_ranges(branch)
+    if not stable:
+        return f"{text}, nowhere stable"
+    return f"{text}, stable " + " and ".join(f"from {low:.7g} to {high:.7g}" for low, high in stable)
 
 
 def print_table(out: Console, name: str, table: Table, note: str = "") -> None:

@@ -44,6 +44,8 @@ _SHORTEST = 1e-13
 _MOST = 100000.0
 #: the share of its largest part that a degree of freedom counts for at least
 _SMALLEST_SHARE = 1e-3
+#: a corner is near if a step passes it within this share of the distance at its ends
+_NEAR = 0.1
 #: displacements above this share of the largest so far may be the largest
 _HIGH = 0.9
 
@@ -62,9 +64,10 @@ def _first_root(m0, d0, m1, d1):
             return -1.0
         root = math.sqrt(root)
         x = (-b + root) / (3.0 * a) if abs(a) > 1e-300 else -d0 / (2.0 * b)
-        if not 0.0 < x < 1.0 or ((a * x + b) * x + d0) * x + m0 >= 0.0:
-            return -1.0
-        return x
+        low = ((a * x + b) * x + d0) * x + m0
+        # the cubic is not the motion: where it comes near, the step is cut at its minimum, and the sign there decides
+        near = low < _NEAR * max(m0, m1) and 0.001 < x < 0.999
+        return x if 0.0 < x < 1.0 and (low < 0.0 or near) else -1.0
     if m0 <= 0.0:
         # begins at the corner: first away from it, or over it at once
         low = 0.5

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from suboctave.analysis import BifurcationDiagram, Branch
+from suboctave.analysis import BifurcationDiagram, Branch, Isola, Isolas
 from suboctave.analysis.diagram import Keeper
 from suboctave.analysis.results import Result
 from suboctave.bifurcation import KINDS
@@ -41,6 +41,9 @@ __all__ = [
 
 #: the kinds of steps, by name
 STEPS: dict[str, type[Step]] = {}
+
+#: bifurcations that the ends of isolas are
+_ENDS = ("isola_centre", "isola_merging")
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 #: what a check reports: the key inside the table, and what to change
@@ -90,14 +93,20 @@ class Step(BaseModel):
     kind: ClassVar[str] = ""
     gives_branch: ClassVar[bool] = False
     gives_diagram: ClassVar[bool] = False
+    gives_isolas: ClassVar[bool] = False
 
     name: str = Field(min_length=1)
     type: str
     parameters: dict[str, float] = Field(default_factory=dict)
 
+    @classmethod
+    def drawn(cls) -> bool:
+        """Whether it gives anything that is drawn as a curve."""
+        return cls.gives_branch or cls.gives_diagram or cls.gives_isolas
+
     @property
     def plane(self) -> tuple[str, str] | None:
-        """The two parameters of a curve of bifurcations; None for any other result."""
+        """The two parameters of a curve of bifurcations, or of isolas; None for any other result."""
         return None
 
     @classmethod
@@ -141,24 +150,35 @@ def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:
 
 # ------------------------------------------------------------------------------------------------- motions of a branch
 class Curve(BaseModel):
-    """A branch of an earlier analysis; of a diagram one of its branches, by number or by how its label begins."""
+    """A branch of an earlier analysis.
+
+    Of a diagram one of its branches, by number or by how its label begins; of isolas the curve of limit points of one
+    of them, or with `at`, a value of the parameter, its closed branch there.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     analysis: str
     branch: int | None = Field(default=None, ge=0)
     label: str | None = Field(default=None, min_length=1)
+    isola: int | None = Field(default=None, ge=0)
+    at: float | None = None
 
     @property
     def said(self) -> str:
         """How messages and titles name it."""
         if self.label is not None:
             return f"{self.analysis}, branch {self.label!r}"
+        if self.isola is not None:
+            return f"{self.analysis}, isola {self.isola}" + ("" if self.at is None else f" at {self.at:g}")
         return self.analysis if self.branch is None else f"{self.analysis}, branch {self.branch}"
 
 
 class Motion(Curve):
-    """One motion of an earlier branch: a point, a bifurcation of a kind, or the point nearest to given values."""
+    """One motion of an earlier branch: a point, a bifurcation of a kind, or the point nearest to given values.
+
+    Of isolas the bifurcations "isola_centre" and "isola_merging" are the ends of one.
+    """
 
     point: int | None = None
     bifurcation: str | None = None
@@ -209,6 +229,12 @@ def check_branch(curve: Curve, key: tuple[str | int, ...], around: Surroundings)
         yield key, f"there is no analysis {name!r} before this one{suggest(name, around.before)}"
         return
     step = around.before[name]
+    if step.gives_isolas:
+        yield from _check_isola(curve, key)
+        return
+    for given in ("isola", "at"):
+        if getattr(curve, given) is not None:
+            yield (*key[:-1], given), f"the analysis {name!r} looks for no isolas: leave {given} out"
     choice = curve.branch is not None, curve.label is not None
     if step.gives_diagram:
         if all(choice):
@@ -226,9 +252,36 @@ def check_branch(curve: Curve, key: tuple[str | int, ...], around: Surroundings)
         yield (*key[:-1], given), f"the analysis {name!r} gives one branch, not a diagram: leave {given} out"
 
 
+def _check_isola(curve: Curve, key: tuple[str | int, ...]) -> Iterator[Complaint]:
+    name = curve.analysis
+    for given in ("branch", "label"):
+        if getattr(curve, given) is not None:
+            yield (*key[:-1], given), f"the analysis {name!r} gives isolas, not a diagram: leave {given} out"
+    if curve.isola is None:
+        yield (
+            key,
+            f'the analysis {name!r} gives isolas: say which, and at which value, {{ analysis = "{name}", isola = 0, '
+            "at = 0.3 }; without at it is its curve of limit points",
+        )
+    elif curve.at is not None and getattr(curve, "bifurcation", None) in _ENDS:
+        yield (*key[:-1], "at"), "an end of an isola has a value of its own: leave at out"
+
+
+def _isola(curve: Curve, isolas: Isolas) -> Isola:
+    """The isola that is named; InputError where it was not found."""
+    number = curve.isola or 0
+    if number >= len(isolas):
+        count = "no isola" if not len(isolas) else f"only {len(isolas)} isola{'s' * (len(isolas) > 1)}"
+        raise InputError(f"{curve.analysis!r} found {count}, so that there is none with number {number}")
+    return isolas[number]
+
+
 def chosen_branch(curve: Curve, results: Mapping[str, Result]) -> Branch:
-    """The branch that an earlier analysis gave, or one of those of a diagram; InputError where there is none."""
+    """The branch that an earlier analysis gave, or one of a diagram or of an isola; InputError where there is none."""
     result = results.get(curve.analysis)
+    if isinstance(result, Isolas):
+        isola = _isola(curve, result)
+        return isola.limit_points if curve.at is None else isola.at(curve.at)
     if isinstance(result, BifurcationDiagram):
         try:
             return result[curve.branch if curve.label is None else curve.label].branch  # type: ignore[index]
@@ -241,6 +294,13 @@ def chosen_branch(curve: Curve, results: Mapping[str, Result]) -> Branch:
 
 def chosen(motion: Motion, results: Mapping[str, Result]) -> Any:
     """The point or bifurcation of an earlier branch; InputError where there is none."""
+    result = results.get(motion.analysis)
+    if isinstance(result, Isolas) and motion.bifurcation in _ENDS:
+        isola = _isola(motion, result)
+        end = isola.born if motion.bifurcation == "isola_centre" else isola.merges
+        if end is None:
+            raise InputError(f"{motion.said} has no {motion.bifurcation}: {'; '.join(isola.reasons)}")
+        return end
     branch = chosen_branch(motion, results)
     said = repr(motion.analysis) if motion.said == motion.analysis else motion.said
     if motion.bifurcation is not None:

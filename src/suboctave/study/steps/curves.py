@@ -25,7 +25,7 @@ from suboctave.study.steps.base import (
     tried,
 )
 
-__all__ = ["CurveStep"]
+__all__ = ["CurveStep", "FollowingStep"]
 
 
 class EventTable(BaseModel):
@@ -53,25 +53,65 @@ Start = Annotated[
 ]
 
 
-class CurveStep(Step):
+class FollowingStep(Step):
+    """The options of all verbs that follow curves."""
+
+    harmonics: Any = None
+    max_step: float | None = None
+    observe: int | None = None
+    newton: dict[str, Any] | None = None
+    stepping: dict[str, Any] | None = None
+    stability: Any = None
+
+    @field_validator("newton", "stepping", "harmonics", "stability")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        _READ[str(info.field_name)](given)
+        return given
+
+    def check(self, around: Surroundings) -> Iterator[Complaint]:
+        """The options of every verb."""
+        yield from _by_name(tried("", lambda: make_settings(around.system, **self._given(around.allow_code))))
+        if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * around.system.n > _MOST:
+            yield (
+                ("harmonics",),
+                f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics",
+            )
+
+    def _given(self, allow_code: bool) -> dict[str, Any]:
+        """The options as the verbs take them."""
+        return {
+            "max_step": self.max_step,
+            "observe": self.observe,
+            "events": (),
+            "newton": as_newton(self.newton),
+            "stepping": as_stepping(self.stepping),
+            "stability": as_stability(self.stability),
+        }
+
+    def options(self, context: Context) -> dict[str, Any]:
+        """The arguments of the verb that were given."""
+        given = {
+            "harmonics": as_harmonics(self.harmonics),
+            **self._given(context.allow_code),
+            "progress": context.progress,
+        }
+        return {name: value for name, value in given.items() if value is not None and value != ()}
+
+
+class CurveStep(FollowingStep):
     """The arguments that `frequency_response` and `continue_branch` share."""
 
     gives_branch: ClassVar[bool] = True
 
-    harmonics: Any = None
     start: Start | None = None
-    max_step: float | None = None
-    observe: int | None = None
     events: list[EventTable] = Field(default_factory=list)
-    newton: dict[str, Any] | None = None
-    stepping: dict[str, Any] | None = None
-    stability: Any = None
     formulation: Any = None
 
-    @field_validator("newton", "stepping", "harmonics", "stability", "formulation")
+    @field_validator("formulation")
     @classmethod
-    def _read(cls, given: Any, info: ValidationInfo) -> Any:
-        _READ[str(info.field_name)](given)
+    def _read_formulation(cls, given: Any) -> Any:
+        as_formulation(given)
         return given
 
     @property
@@ -90,51 +130,22 @@ class CurveStep(Step):
         return [(("start",) if isinstance(self.start, str) else ("start", "analysis"), self.motion.analysis)]
 
     def check(self, around: Surroundings) -> Iterator[Complaint]:
-        """The options of every verb."""
+        """The options of the verb, and where it starts."""
         wrong = list(tried("events", lambda: self._events(around.allow_code)))
         yield from wrong
         if not wrong:
-            yield from _by_name(self._settings(around))
-        if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * around.system.n > _MOST:
-            yield (
-                ("harmonics",),
-                f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics",
-            )
+            yield from super().check(around)
         if self.motion is not None:
             for key, _ in self.needs():
                 yield from check_branch(self.motion, key, around)
             yield from check_motion(self.motion, ("start",), around)
 
-    def _settings(self, around: Surroundings) -> Iterator[Complaint]:
-        """What the verbs themselves refuse."""
-        given: dict[str, Any] = {
-            "max_step": self.max_step,
-            "observe": self.observe,
-            "events": self._events(around.allow_code),
-            "newton": as_newton(self.newton),
-            "stepping": as_stepping(self.stepping),
-            "stability": as_stability(self.stability),
-            "formulation": as_formulation(self.formulation),
-        }
-        yield from tried("", lambda: make_settings(around.system, **given))
+    def _given(self, allow_code: bool) -> dict[str, Any]:
+        own = {"events": tuple(self._events(allow_code)), "formulation": as_formulation(self.formulation)}
+        return super()._given(allow_code) | own
 
     def _events(self, allow_code: bool) -> list[Event]:
         return [Event(e.name, from_plain({"callable": e.function}, {}, allow_code)) for e in self.events]
-
-    def options(self, context: Context) -> dict[str, Any]:
-        """The arguments of the verb that were given."""
-        given = {
-            "harmonics": as_harmonics(self.harmonics),
-            "max_step": self.max_step,
-            "observe": self.observe,
-            "newton": as_newton(self.newton),
-            "stepping": as_stepping(self.stepping),
-            "stability": as_stability(self.stability),
-            "formulation": as_formulation(self.formulation),
-            "events": self._events(context.allow_code) or None,
-            "progress": context.progress,
-        }
-        return {name: value for name, value in given.items() if value is not None}
 
     def started(self, context: Context) -> Any:
         """What the curve starts from: a motion of an earlier branch, numbers, or None."""
@@ -173,7 +184,6 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "stepping": as_stepping,
     "harmonics": as_harmonics,
     "stability": as_stability,
-    "formulation": as_formulation,
 }
 _MOST = 8000  # unknowns of a dense problem, as the verbs have it
 

@@ -15,6 +15,9 @@ from suboctave.errors import suggest
 from suboctave.study.steps.base import Complaint, Context, Known, Range, Surroundings, chosen, tried
 from suboctave.study.steps.curves import CurveStep
 
+#: what is tracked in a third parameter: extrema along curves, the ends of isolas
+_EXTREMA = ("extremum", "isola_centre", "isola_merging")
+
 
 class Track(CurveStep):
     """`so.track`: `start` names a bifurcation of an earlier branch."""
@@ -59,12 +62,12 @@ class Track(CurveStep):
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
-        elif kind not in (*TRACKED_KINDS, "extremum", *CURVES_THROUGH):
+        elif kind not in (*TRACKED_KINDS, *_EXTREMA, *CURVES_THROUGH):
             yield (
                 ("start", "bifurcation"),
                 f"{kind} cannot be tracked{suggest(kind, (*TRACKED_KINDS, *CURVES_THROUGH))}",
             )
-        elif kind == "extremum" and not isinstance(self.parameter, str):
+        elif kind in _EXTREMA and not isinstance(self.parameter, str):
             yield ("parameter",), "of an extremum is one name: the third parameter"
         if self.onto is None or kind is None:
             return

@@ -1,0 +1,344 @@
+"""A regime map held against time integration at random points of its plane.
+
+At every point trajectories begin at random states and beside the stable motions that the map knows. What each settles
+on is told by its stroboscopic points (`poincare_sections`), which know nothing of harmonic balance, and compared with
+the motions that the map has there: the same period, and the same amplitude within a hundredth.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.analysis.attractors import Attractor
+from suboctave.analysis.junction import period_name
+from suboctave.analysis.making import make_curve
+from suboctave.analysis.poincare import poincare_sections
+from suboctave.analysis.progress import reporting
+from suboctave.analysis.regime_arcs import Arc
+from suboctave.analysis.regime_motions import motion_at
+from suboctave.analysis.results import Table
+from suboctave.analysis.starts import linear_response
+from suboctave.analysis.subharmonics import periodic_orbit
+from suboctave.continuation.problem import Array
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.system import System
+
+if TYPE_CHECKING:
+    from suboctave.analysis.regime_map import RegimeMap
+
+__all__ = ["Landing", "RegimeCheck", "check_regimes"]
+
+#: amplitudes of one motion by both ways differ by less, relatively
+_SAME = 1e-2
+#: by how much a start beside a known motion is disturbed, relative to it
+_DISTURBED = 1e-4
+#: random states are drawn from up to so many times the size of the largest motion, which counts as at most so many
+#: times that of the largest on the map
+_WIDE, _CAP = 2.0, 20.0
+#: periods that are kept: three repetitions of 16T
+_KEPT = 48
+#: tolerance of the integration, and that of the recognition of periods
+_TOLERANCE, _REPEATS = 1e-9, 1e-5
+_LONGER = 10
+
+#: what may be said of a trajectory
+AGREES, BEYOND, UNKNOWN, LEFT, UNSETTLED, NOT_SOLVED = (
+    "agrees",
+    "not followed",
+    "unknown motion",
+    "left its motion",
+    "not settled",
+    "not solved",
+)
+
+
+@dataclass(frozen=True)
+class Landing:
+    """A trajectory: where, from what, what it settled on, what the map says there, and the verdict.
+
+    period
+        In periods of the load, 0 if nothing repeats.
+    start
+        "state", or the period of the known motion that it began beside.
+    verdict
+        "agrees" (also where neither has anything periodic); "not followed" (motions beyond the depth of the map, which
+        says so); "unknown motion" (the map has none like it there); "left its motion" (a motion said to be stable was
+        left); "not settled" (nothing periodic, not yet or never); "not solved" (the motion of the map was not found
+        again at that point).
+    state
+        (2n,) what it had reached, at phase 0 of the load.
+    """
+
+    omega: float
+    value: float
+    start: str
+    period: int
+    amplitude: float
+    expected: str
+    verdict: str
+    state: Array
+
+
+class RegimeCheck:
+    """What time integration says of a regime map.
+
+    Attributes
+    ----------
+    landings
+        All trajectories.
+    points
+        How many points of the plane.
+    """
+
+    def __init__(self, landings: Sequence[Landing], points: int, system: System, name: str) -> None:
+        self.landings = tuple(landings)
+        self.points = points
+        self.system = system
+        self.name = name
+
+    @property
+    def rate(self) -> float:
+        """Share of the settled trajectories that end on a motion of the map, or on one that it calls not followed."""
+        settled = [one for one in self.landings if one.verdict != UNSETTLED]
+        return sum(one.verdict in (AGREES, BEYOND) for one in settled) / max(len(settled), 1)
+
+    @property
+    def agreeing(self) -> float:
+        """Share of the points at which every trajectory does, and every known motion was confirmed."""
+        wrong = {(one.omega, one.value) for one in self.disagreements}
+        return 1.0 - len(wrong) / max(self.points, 1)
+
+    @property
+    def disagreements(self) -> list[Landing]:
+        """The trajectories that do not agree."""
+        return [one for one in self.landings if one.verdict not in (AGREES, BEYOND)]
+
+    def unknown(self) -> list[PeriodicOrbit]:
+        """The motions that the map does not have, solved by harmonic balance, one for each point and amplitude.
+
+        `regime_map(..., motions=check.unknown())` maps the branches that they lie on.
+        """
+        found: list[tuple[float, float, int, float]] = []
+        orbits = []
+        for one in self.landings:
+            here = (one.omega, one.value, one.period, one.amplitude)
+            told = any(k[:3] == here[:3] and abs(k[3] - here[3]) <= _SAME * abs(here[3]) for k in found)
+            if one.verdict != UNKNOWN or told:
+                continue
+            found.append(here)
+            system = self.system.with_parameters({self.name: one.value})
+            with suppress(ConvergenceError):
+                orbits.append(periodic_orbit(system, one.omega, one.state, one.period))
+        return orbits
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many trajectories got each verdict."""
+        return dict(Counter(one.verdict for one in self.landings))
+
+    def to_table(self) -> Table:
+        """One row for each trajectory."""
+        names = ("omega", self.name, "start", "period", "amplitude", "expected", "verdict")
+        rows = [(x.omega, x.value, x.start, x.period, x.amplitude, x.expected, x.verdict) for x in self.landings]
+        columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * len(names)
+        return Table(dict(zip(names, columns, strict=True)), "a regime map against time integration")
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{count} {verdict}" for verdict, count in sorted(self.counts.items()))
+        text = (
+            f"{self.points} points, {len(self.landings)} trajectories: {100.0 * self.rate:.2f} % of those that settled "
+            f"agree, {100.0 * self.agreeing:.2f} % of the points ({told})"
+        )
+        lines: Counter[str] = Counter()
+        for one in self.disagreements:
+            what = period_name(one.period) if one.period else "nothing periodic"
+            begun = "a random state" if one.start == "state" else f"the {one.start} motion"
+            lines[
+                f"omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
+                f"{one.amplitude:.4g}; the map has {one.expected}: {one.verdict}"
+            ] += 1
+        for line, times in lines.items():
+            text += f"\n  {line}" + (f" ({times} trajectories)" if times > 1 else "")
+        return text
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """A trajectory's beginning: at which point, from which of the known motions (None: a random state)."""
+
+    point: int
+    arc: Arc | None
+    state: Array
+
+
+def check_regimes(
+    regimes: RegimeMap, points: int, seed: int, states: int, transient: int, progress: Any
+) -> RegimeCheck:
+    """See `RegimeMap.check`."""
+    for name, number, least in (("points", points, 1), ("states", states, 0), ("transient", transient, 1)):
+        if isinstance(number, bool) or not isinstance(number, int) or number < least:
+            raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
+    draw = np.random.default_rng(seed)
+    (first, last), (low, high) = regimes.omega, regimes.bounds
+    places = np.column_stack([draw.uniform(first, last, points), draw.uniform(low, high, points)])
+    with reporting(progress, "integrating at points of the map") as report:
+        sizes = _sizes(regimes)
+        starts: list[_Start] = []
+        known: list[dict[int, tuple[Arc, float]]] = []
+        landings: list[Landing] = []
+        for number, (omega, value) in enumerate(places):
+            if report is not None:
+                report(0.3 * number / points, f"motions at point {number + 1} of {points}")
+            found = _begin(regimes, number, float(omega), float(value), states, sizes, draw, landings)
+            starts += found[0]
+            known.append(found[1])
+        if starts:
+            ended = _settled(regimes, places, starts, transient, None if report is None else _later(report))
+            landings += [_judged(regimes, places, s, a, known[s.point]) for s, a in zip(starts, ended, strict=True)]
+    landings.sort(key=lambda one: (one.omega, one.value))
+    return RegimeCheck(landings, points, regimes.system, regimes.parameter)
+
+
+def _later(report: Any) -> Any:
+    return lambda share, where: report(0.3 + 0.7 * share, where)
+
+
+def _begin(
+    regimes: RegimeMap,
+    number: int,
+    omega: float,
+    value: float,
+    states: int,
+    sizes: tuple[Array, Array],
+    draw: np.random.Generator,
+    landings: list[Landing],
+) -> tuple[list[_Start], dict[int, tuple[Arc, float]]]:
+    """Starts at a point, and its known motions with their amplitudes."""
+    starts: list[_Start] = []
+    known: dict[int, tuple[Arc, float]] = {}
+    strip = regimes.strip(value)
+    n = regimes.system.n
+    arcs = regimes.arcs(omega, value)
+    for arc in arcs:
+        if not arc.followed:
+            continue
+        try:
+            orbit = motion_at(arc, strip.value, regimes.system, regimes.parameter, regimes.omega, omega, value)
+        except ConvergenceError:
+            landings.append(
+                Landing(
+                    omega,
+                    value,
+                    period_name(arc.nu),
+                    0,
+                    float("nan"),
+                    str(regimes.label(omega, value)),
+                    NOT_SOLVED,
+                    np.zeros(2 * n),
+                )
+            )
+            continue
+        extent = np.array([orbit.amplitude(i) for i in range(n)] + [orbit.velocity_amplitude(i) for i in range(n)])
+        known[id(arc)] = (arc, orbit.amplitude(_observed(regimes)))
+        starts.append(_Start(number, arc, orbit.start() + _DISTURBED * extent * draw.uniform(-1.0, 1.0, 2 * n)))
+    for _ in range(states):
+        # of every order of magnitude between the smallest motion and the largest
+        scale = sizes[0] * (_WIDE * sizes[1] / sizes[0]) ** draw.uniform()
+        starts.append(_Start(number, None, scale * draw.uniform(-1.0, 1.0, 2 * n)))
+    return starts, known
+
+
+def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
+    """Sizes (2n,) of the smallest motion of the map, and of what may be reached: that of its largest, or in resonance.
+
+    The linear response in resonance is what no motion of the load's period exceeds by much.
+    """
+    system, n = regimes.system, regimes.system.n
+    sizes = [
+        np.array([point.orbit.amplitude(i) for i in range(n)] + [point.orbit.velocity_amplitude(i) for i in range(n)])
+        for strip in regimes.strips
+        for arc in strip.arcs
+        for point in (arc.points[0], arc.points[len(arc.points) // 2], arc.points[-1])
+    ]
+    known = np.array(sizes) if sizes else np.ones((1, 2 * n))
+    top = known.max(axis=0)
+    curve = make_curve(system, "omega", regimes.omega[0], regimes.omega[1], 1, 1, None)
+    first, last = regimes.omega
+    for omega in np.geomspace(first / 3.0, 3.0 * last, 97):
+        try:
+            rows = curve.balance.spread(linear_response(curve, float(omega))[:-1])
+        except (ConvergenceError, np.linalg.LinAlgError):
+            continue
+        size = np.hypot(rows[1], rows[2])
+        if np.isfinite(size).all():
+            top = np.maximum(top, np.concatenate((size, omega * size)))
+    return known.min(axis=0), np.minimum(top, _CAP * known.max(axis=0))
+
+
+def _observed(regimes: RegimeMap) -> int:
+    given = regimes.options.get("observe")
+    return regimes.system.observed_dof if given is None else int(given)
+
+
+def _settled(
+    regimes: RegimeMap, places: Array, starts: Sequence[_Start], transient: int, report: Any
+) -> list[Attractor]:
+    """What each trajectory settles on; those that do not are followed further."""
+
+    def run(which: Sequence[int], states: Array, periods: int, progress: Any) -> list[Attractor]:
+        at = [starts[i].point for i in which]
+        sections = poincare_sections(
+            regimes.system,
+            states,
+            omega=places[at, 0],
+            parameters={regimes.parameter: places[at, 1]},
+            transient=periods,
+            periods=_KEPT,
+            tolerance=_TOLERANCE,
+            period_tolerance=_REPEATS,
+            observe=_observed(regimes),
+            progress=progress,
+        )
+        return [sections.attractor(i) for i in range(len(sections))]
+
+    everyone = list(range(len(starts)))
+    found = run(everyone, np.array([s.state for s in starts]), transient, report)
+    open_ = [i for i in everyone if not found[i].period and np.isfinite(found[i].points).all()]
+    if open_:
+        again = run(open_, np.array([found[i].points[-1] for i in open_]), _LONGER * transient, None)
+        for i, attractor in zip(open_, again, strict=True):
+            found[i] = attractor
+    return found
+
+
+def _judged(
+    regimes: RegimeMap, places: Array, start: _Start, found: Attractor, known: dict[int, tuple[Arc, float]]
+) -> Landing:
+    """A trajectory with its verdict."""
+    omega, value = (float(v) for v in places[start.point])
+    label = regimes.label(omega, value)
+    alike = [
+        arc
+        for arc, amplitude in known.values()
+        if arc.nu == found.period and abs(amplitude - found.amplitude) <= _SAME * max(amplitude, found.amplitude)
+    ]
+    beyond = [nu for nu, _ in label.beyond]
+    if alike and (start.arc is None or start.arc in alike):
+        verdict = AGREES
+    elif start.arc is not None and found.period:
+        verdict = LEFT
+    elif beyond and (not found.period or found.period % min(beyond) == 0):
+        verdict = BEYOND
+    elif not found.period:
+        verdict = UNSETTLED if label.count else AGREES
+    else:
+        verdict = UNKNOWN
+    begun = "state" if start.arc is None else period_name(start.arc.nu)
+    return Landing(omega, value, begun, found.period, found.amplitude, str(label), verdict, found.state)

@@ -1,0 +1,115 @@
+"""The motion of a stable arc at a point of the plane: reached from the arc's own motions, step by step.
+
+On the way the motion keeps its place between the two ends of its arc, so that the path stays on the arc.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from suboctave.analysis.making import make_curve, own_linear_part
+from suboctave.analysis.regime_arcs import Arc
+from suboctave.analysis.starts import start_point
+from suboctave.compiled import computation_begins
+from suboctave.continuation import NewtonOptions
+from suboctave.continuation.linear import one_thread
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.selection import truncation
+from suboctave.model.system import System
+from suboctave.stability import floquet_multipliers
+
+__all__ = ["motion_at"]
+
+#: steps of the way, shares of it: the first, the smallest
+_FIRST, _SMALLEST = 0.5, 1e-3
+#: a step may change the harmonics of a motion by this share of them
+_MOST = 0.35
+#: and keeps this share of what a motion of a shorter period has not: else it fell back onto that
+_KEPT = 0.3
+
+
+def motion_at(
+    arc: Arc, seen: float, system: System, name: str, within: tuple[float, float], omega: float, value: float
+) -> PeriodicOrbit:
+    """The motion of an arc at (omega, value); `seen` is the value at which the arc was computed.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method loses it on the way.
+    """
+    low, high = _range(arc, value, within)
+    share = (omega - low) / ((high - low) or 1.0)
+
+    def place(way: float) -> tuple[float, float]:
+        there = seen + way * (value - seen)
+        first, last = _range(arc, there, within)
+        return first + share * (last - first), there
+
+    begin = place(0.0)[0]
+    orbit = min((p.orbit for p in arc.points), key=lambda o: abs(o.omega - begin))
+    way, step = 0.0, _FIRST
+    computation_begins()
+    with one_thread():
+        while way < 1.0:
+            target = min(1.0, way + step)
+            at = (omega, value) if target == 1.0 else place(target)
+            found = _solved(orbit, system, name, *at)
+            if found is None or not _follows(orbit, found):
+                step *= 0.5
+                if step < _SMALLEST:
+                    where = f"omega = {omega:.6g}, {name} = {value:.6g}"
+                    raise ConvergenceError(f"the motion of {arc.nu} load periods at {where} was not found again")
+                continue
+            orbit, way = found, target
+    return orbit
+
+
+def _range(arc: Arc, value: float, within: tuple[float, float]) -> tuple[float, float]:
+    low, high = arc.range(value)
+    return max(float(low), within[0]), min(float(high), within[1])
+
+
+def _follows(orbit: PeriodicOrbit, found: PeriodicOrbit) -> bool:
+    """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
+    lasting = _own(found) >= _KEPT * _own(orbit)
+    return lasting and _changed(orbit, found) <= _MOST and bool(floquet_multipliers(found.state()).stable)
+
+
+def _changed(one: PeriodicOrbit, other: PeriodicOrbit) -> float:
+    a, b = np.abs(one.amplitudes), np.abs(other.amplitudes)
+    top = min(len(a), len(b))
+    return float(np.linalg.norm(a[:top] - b[:top]) / np.linalg.norm(b))
+
+
+def _own(orbit: PeriodicOrbit) -> float:
+    """Size of the harmonics that motions of half the period, or of the load's, do not have; of the latter all."""
+    sizes = np.linalg.norm(orbit.amplitudes, axis=1)
+    orders, nu = np.arange(len(sizes)), orbit.basis.nu
+    if nu == 1:
+        return float(np.linalg.norm(sizes))
+    return float(np.linalg.norm(sizes[orders % 2 == 1] if nu % 2 == 0 else sizes[orders % nu != 0]))
+
+
+def _solved(orbit: PeriodicOrbit, system: System, name: str, omega: float, value: float) -> PeriodicOrbit | None:
+    """The motion near another one at other values; None if Newton's method finds none there."""
+    moved = system.with_parameters({name: value})
+    linear = own_linear_part(orbit)
+    if linear is not None:
+        linear = linear.rebuilt(dict(moved.parameters))
+    nu = orbit.basis.nu
+    wanted: Any = orbit.adaptive or max(1, orbit.basis.harmonics // nu)
+    curve = make_curve(moved, "omega", omega, omega, wanted, nu, linear)
+    try:
+        point = start_point(curve, omega, orbit, NewtonOptions())
+    except ConvergenceError:
+        return None
+    x, reached, values = point.curve.split(point.u)  # type: ignore[attr-defined]
+    if abs(reached - omega) > 1e-9 * omega:
+        return None  # next to a limit point the nearest motion lies elsewhere
+    balance = point.curve.balance  # type: ignore[attr-defined]
+    error = truncation(balance.at(x, reached, values))
+    return PeriodicOrbit(balance, x.copy(), reached, dict(values), float(point.evaluation.error), error, curve.adaptive)
