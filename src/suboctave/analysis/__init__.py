@@ -4,6 +4,7 @@ from suboctave.analysis.attractors import Attractor
 from suboctave.analysis.basin_attractors import BasinAttractor
 from suboctave.analysis.basins import Basins, basins
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.branch_verification import BranchVerification, VerifiedBifurcation, VerifiedPoint
 from suboctave.analysis.brute_force import BruteForceDiagram, brute_force_diagram
 from suboctave.analysis.diagram import BifurcationDiagram, bifurcation_diagram
 from suboctave.analysis.extremum import locate_extremum
@@ -15,10 +16,13 @@ from suboctave.analysis.isolas import find_isolas
 from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.lyapunov import LyapunovExponents, lyapunov_exponents
 from suboctave.analysis.lyapunov_map import LyapunovMap, lyapunov_map
+from suboctave.analysis.measured import Measured, read_measured
 from suboctave.analysis.poincare import PoincareSections, poincare_sections
 from suboctave.analysis.regime_map import RegimeMap
 from suboctave.analysis.regimes import regime_map
 from suboctave.analysis.results import Results, Table, load
+from suboctave.analysis.stepped_result import SteppedSine
+from suboctave.analysis.stepped_sine import stepped_sine
 from suboctave.analysis.subharmonics import Seeds, find_subharmonics, periodic_orbit
 from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
@@ -34,22 +38,27 @@ __all__ = [
     "BifurcationDiagram",
     "Branch",
     "BranchPoint",
+    "BranchVerification",
     "BruteForceDiagram",
     "Isola",
     "IsolaMap",
     "Isolas",
     "LyapunovExponents",
     "LyapunovMap",
+    "Measured",
     "PoincareSections",
     "RegimeMap",
     "Results",
     "Seeds",
     "Separation",
+    "SteppedSine",
     "Table",
     "TrackedBranch",
     "Trajectory",
     "TwoTrajectories",
     "Verification",
+    "VerifiedBifurcation",
+    "VerifiedPoint",
     "basins",
     "bifurcation_diagram",
     "brute_force_diagram",
@@ -65,8 +74,10 @@ __all__ = [
     "lyapunov_map",
     "periodic_orbit",
     "poincare_sections",
+    "read_measured",
     "regime_map",
     "stability",
+    "stepped_sine",
     "switch_branch",
     "track",
     "verify",

@@ -1,14 +1,16 @@
-"""Calls on single motions: their stability, and what the time domain says of them."""
+"""Calls on motions: their stability, and what the time domain says of them, or of all of a branch."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
-from suboctave.analysis.branch import BranchPoint
+from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.branch_verification import BranchVerification, verify_branch
 from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.linear import one_thread
@@ -78,25 +80,60 @@ class Verification:
         return f"Verification: {verdict}; {errors}. {self.reason}"
 
 
-def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3) -> Verification:
-    """Contradict a motion, or a located bifurcation, by shooting from its state at t = 0.
+@overload
+def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3) -> Verification: ...
+@overload
+def verify(
+    what: Branch,
+    tolerance: float = 1e-3,
+    *,
+    points: int | Iterable[int] | None = None,
+    every: int = 1,
+    bifurcations: bool = True,
+    workers: int | None = None,
+    progress: Any = None,
+) -> BranchVerification: ...
+def verify(
+    what: PeriodicOrbit | BranchPoint | Bifurcation | Branch,
+    tolerance: float = 1e-3,
+    *,
+    points: int | Iterable[int] | None = None,
+    every: int = 1,
+    bifurcations: bool = True,
+    workers: int | None = None,
+    progress: Any = None,
+) -> Verification | BranchVerification:
+    """Contradict a motion, a located bifurcation, or all of a branch, by shooting from the states at t = 0.
 
     Parameters
     ----------
     what
         A motion; a `Bifurcation` is located again by shooting, with free omega; at a grazing the motion found at the
-        same omega must just reach the gap.
+        same omega must just reach the gap. Of a `Branch` every point and every bifurcation is held against the curve of
+        true motions, found by multiple shooting; the answer is a `BranchVerification`.
     tolerance
-        Relative distance up to which two motions, and two frequencies, count as the same.
+        Relative distance up to which two motions, and two frequencies, count as the same. Verdicts that differ where
+        the true multiplier lies so near to the unit circle are not compared.
+    points, every
+        Of a branch: how many points, spread over it, or their indices; or every so many-th. Default all.
+    bifurcations
+        Of a branch: whether its bifurcations are confirmed too.
+    workers, progress
+        Of a branch: threads (default: one for each processor); True for a bar, or a callable (share, text). Ctrl-C
+        keeps what is done.
 
     Raises
     ------
     InputError
         If the orbit's unknowns are not all DOFs of its system (a condensed model has no state to shoot from).
     """
-    motion = _orbit(what)
     if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
         raise InputError(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
+    if isinstance(what, Branch):
+        return verify_branch(what, tolerance, points, every, bifurcations, workers, progress, verify)
+    if points is not None or every != 1:
+        raise InputError("points= and every= choose among the points of a branch; this is a single motion")
+    motion = _orbit(what)
     system = motion.system
     if motion.coefficients.shape[1] != system.n:
         raise InputError("only motions with all DOFs of the system can be verified by shooting")

@@ -79,6 +79,11 @@ class AdaptiveGroup:
         self._rows("left", 1)[:, :alive] = count
         self._rows("h", 1)[:, alive:] = 0.0
 
+    def begin_at(self, first: Array) -> None:
+        """Let every lane begin at a sample of the period, (lanes,), instead of at phase 0."""
+        self._rows("sample", 1)[0] = first
+        self._rows("t", 1)[0] = first / self.kernel.samples * self._rows("period", 1)[0]
+
     def _rows(self, name: str, count: int) -> Array:
         begin, lanes = self.kernel.rows.begin[name], self.kernel.lanes
         return self.z[begin * lanes : (begin + count) * lanes].reshape(count, lanes)

@@ -178,6 +178,28 @@ class Flow:
         numbers = self.structure.numbers(w, varied)
         return _Run(self, numbers, x, which, total, skip, measure).go(workers, report)
 
+    def onward(
+        self,
+        states: ArrayLike,
+        omega: ArrayLike,
+        first: NDArray[np.int_],
+        parameters: Mapping[str, ArrayLike] | None = None,
+        workers: int | None = None,
+    ) -> Motions:
+        """Follow each trajectory from an instant of its own to the next: from sample `first` (B,) of the period.
+
+        For methods that cut a period in pieces, such as multiple shooting; with the accurate method only. The rest is
+        as in `over`.
+        """
+        if self.method != "accurate":
+            raise InputError('pieces of a period are followed with method="accurate"')
+        x, w, varied = self._broadcast(states, omega, parameters or {})
+        which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
+        numbers = self.structure.numbers(w, varied)
+        run = _Run(self, numbers, x, which, 1, 0, False)
+        run.first = np.broadcast_to(np.asarray(first) % self.samples, (len(x),)).astype(float)
+        return run.go(workers, None)
+
     def _broadcast(
         self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
     ) -> tuple[Array, Array, dict[str, Array]]:
@@ -222,6 +244,7 @@ class _Run:
     ) -> None:
         self.flow, self.numbers, self.states, self.which = flow, numbers, states, which
         self.total, self.skip, self.measure = total, skip, measure
+        self.first: Array | None = None
         self.rows = flow.kernel.numbers(numbers)
         self.answers = Answers(flow.structure.asked)
         n, count = flow.structure.n, len(states)
@@ -293,9 +316,11 @@ class _Run:
         if isinstance(kernel, NewmarkKernel):
             return NewmarkGroup(kernel, self.rows, states, which, self.answers.address)
         sizes = self.flow.structure.sizes(self.numbers, states, which)
-        if isinstance(kernel, TangentKernel):
-            return TangentGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address, alive)
-        return AdaptiveGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address, alive)
+        asked = (self.rows, states, which, sizes, self.total, self.answers.address, alive)
+        group = TangentGroup(kernel, *asked) if isinstance(kernel, TangentKernel) else AdaptiveGroup(kernel, *asked)
+        if self.first is not None:
+            group.begin_at(self.first[members])
+        return group
 
     def _follow(self, g: int, report: Report | None) -> None:
         members = self.groups[g]

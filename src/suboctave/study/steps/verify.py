@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from suboctave.analysis import Table, verify
+from suboctave.analysis import Branch, Table, TrackedBranch, verify
 from suboctave.study.steps.base import (
     Complaint,
     Context,
@@ -46,20 +46,50 @@ class Verify(Step):
         """See `Step.run`."""
         curve = as_curve(self.branch)
         branch = chosen_branch(curve, context.results)
-        things: list[tuple[str, Any]] = []
-        if self.what != "bifurcations":
-            things += [(f"point {i}", branch.points[i]) for i in range(0, len(branch), self.every)]
-        if self.what != "points":
-            things += [(item.kind, item) for item in branch.bifurcations.met]
-        rows = []
-        for done, (name, thing) in enumerate(things):
-            if context.progress is not None:
-                context.progress(done / len(things), name)
-            found = verify(thing, self.tolerance)
-            stable = "" if found.stable is None else "yes" if found.stable else "no"
-            rows.append(
-                (name, thing.orbit.omega, found.distance, found.multiplier_error, stable, found.agrees, found.reason)
-            )
-        names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "reason")
-        kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str)
+        rows = (
+            _one_by_one(self, branch, context) if isinstance(branch, TrackedBranch) else _whole(self, branch, context)
+        )
+        names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "outcome", "reason")
+        kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str, str)
         return Table(as_table(names, kinds, rows), f"{curve.said}, held against shooting")
+
+
+def _whole(step: Verify, branch: Branch, context: Context) -> list[tuple[Any, ...]]:
+    """Rows of a branch of motions, all at once."""
+    points = [] if step.what == "bifurcations" else range(0, len(branch), step.every)
+    found = verify(branch, step.tolerance, points=points, bifurcations=step.what != "points", progress=context.progress)
+    rows: list[tuple[Any, ...]] = [
+        (f"point {p.index}", p.omega, p.distance, p.multiplier_error, _said(p.stable), p.agrees, p.outcome, p.reason)
+        for p in found.points
+    ]
+    return rows + [
+        (b.kind, b.omega, b.distance, float("nan"), "", b.agrees, _outcome(b.agrees), b.reason)
+        for b in found.bifurcations
+    ]
+
+
+def _one_by_one(step: Verify, branch: Branch, context: Context) -> list[tuple[Any, ...]]:
+    """Rows of a curve of bifurcations: its points as motions, its special points."""
+    things: list[tuple[str, Any]] = []
+    if step.what != "bifurcations":
+        things += [(f"point {i}", branch.points[i]) for i in range(0, len(branch), step.every)]
+    if step.what != "points":
+        things += [(item.kind, item) for item in branch.bifurcations.met]
+    rows = []
+    for done, (name, thing) in enumerate(things):
+        if context.progress is not None:
+            context.progress(done / len(things), name)
+        one = verify(thing, step.tolerance)
+        said, outcome = _said(one.stable), _outcome(one.agrees)
+        rows.append(
+            (name, thing.orbit.omega, one.distance, one.multiplier_error, said, one.agrees, outcome, one.reason)
+        )
+    return rows
+
+
+def _said(stable: bool | None) -> str:
+    return "" if stable is None else "yes" if stable else "no"
+
+
+def _outcome(agrees: bool) -> str:
+    return "agrees" if agrees else "disagrees"
