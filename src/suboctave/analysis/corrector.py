@@ -33,7 +33,9 @@ def bordered_by_frequency(table, moving, rate, starts, dofs, shape, matrices, mu
     """`ResponseEvaluation.bordered_transposed` along omega, of a structure's own matrices."""
     n = x.shape[0] * x.shape[1]
     extended = np.zeros((n, n + 1))
-    jacobian(extended, table, moving, rate, True, starts, dofs, shape, matrices, multiples, omega, x)
+    # not a literal, for which the Jacobian would be compiled once more
+    mean = n > 0
+    jacobian(extended, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x)
     return bordered_transposed(extended, row, weights)
 
 

@@ -71,7 +71,9 @@ def _half_sign(table, moving, rate, starts, dofs, shape, matrices, multiples, om
     """`half_sign` of a structure's own matrices, 0 if J_half is singular."""
     n = x.shape[1] * (x.shape[0] + 1)
     matrix = np.zeros((n, n))
-    jacobian(matrix, table, moving, rate, False, starts, dofs, shape, matrices, multiples, omega, x)
+    # not a literal, for which the Jacobian would be compiled once more
+    mean = n < 0
+    jacobian(matrix, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x)
     pivots = np.empty(n, dtype=np.int32)
     if factorise(matrix, pivots):
         return 0.0
