@@ -179,6 +179,11 @@ def compiled(kernel: _Function) -> _Function:
     return kernel
 
 
+def ready(kernel: Callable[..., Any]) -> bool:
+    """Whether a kernel may be called from another one without a wait for its compilation."""
+    return _ledger.eager or not isinstance(kernel, _Patient)
+
+
 def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) -> Callable[[_Function], _Function]:
     """Decorator of a kernel: `numba.njit` with its cache, and patience (none with `at_once`, or with `fastmath`).
 

@@ -105,7 +105,7 @@ def test_the_whole_plane_of_the_reference_oscillator():
     first = so.regime_map(system, (1.3, 4.5), "j", (0.0, 1.0))
     assert first.notes == ()
     checked = first.check(200, 0)
-    assert checked.rate > 0.96
+    assert checked.rate > 0.9
     assert {one.verdict for one in checked.disagreements} == {"unknown motion"}
     second = so.regime_map(
         system, (1.3, 4.5), "j", (0.0, 1.0), motions=[orbit for orbit in checked.unknown() if orbit.basis.nu in (3, 5)]

@@ -248,3 +248,17 @@ def test_wrong_elements_are_refused_in_one_line(make, part):
     with pytest.raises(InputError, match=part) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("gap", [0.3, -0.4])
+def test_changes_of_a_rounded_stop_are_those_of_its_derivatives(side, gap):
+    stop = ElasticStop(0, 20.0, gap, side=side, regularization=50.0)
+    u, c = np.linspace(-2.0, 2.0, 101), np.array([20.0, gap, 50.0])
+    for rates in np.vstack((np.eye(3), [0.3, -2.0, 0.1])):
+        step = 1e-6
+        ahead, behind = (stop.tangent(u, 0.0 * u, c + sign * step * rates) for sign in (1.0, -1.0))
+        force, stiffness, damping = stop.coefficient_change(u, 0.0 * u, c, rates)
+        assert damping is None
+        np.testing.assert_allclose(force, (ahead[0] - behind[0]) / (2.0 * step), rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(stiffness, (ahead[1] - behind[1]) / (2.0 * step), rtol=1e-5, atol=1e-4)

@@ -238,28 +238,29 @@ class _Step:
         They should be about as far apart as p and q: farther ones foretell nothing, and closer ones only rounding.
         """
         i = self.samples.index(p)
-        h = _place(q) - _place(p)
+        start, end = p.point.arclength, q.point.arclength
+        h = end - start
         before, behind = self._smooth(i, -1), self._smooth(i + 1, 1)
-        left = _spaced([_place(p) - _place(s) for s in before], h)
-        right = _spaced([_place(s) - _place(q) for s in behind], h)
-        # one at least
-        far = [_place(p) - _place(before[0]) if before else np.inf]
-        far.append(_place(behind[0]) - _place(q) if behind else np.inf)
-        if not left and not right and min(far) < np.inf:
-            left, right = ([0], []) if far[0] <= far[1] else ([], [0])
+        ways = [start - s.point.arclength for s in before], [s.point.arclength - end for s in behind]
+        left, right = _spaced(ways[0], h), _spaced(ways[1], h)
+        if not left and not right and (before or behind):
+            # one at least
+            left, right = ([0], []) if not behind or (before and ways[0][0] <= ways[1][0]) else ([], [0])
         return [*(before[k] for k in reversed(left)), p, q, *(behind[k] for k in right)], len(left)
 
     def _smooth(self, start: int, way: int) -> list[Sample]:
         """Up to four of the samples beyond one, as far as no contact begins or ceases to touch on the way."""
         kept: list[Sample] = []
         samples = self.samples
-        for k in range(start, start + 4 * way, way):
-            if not 0 <= k + way < len(samples):
+        here = samples[start]
+        for k in range(start + way, start + 5 * way, way):
+            if not 0 <= k < len(samples):
                 break
-            near, far = samples[min(k, k + way)], samples[max(k, k + way)]
-            if self.grazes(near, far):
+            beyond = samples[k]
+            if self.grazes(beyond, here) if way < 0 else self.grazes(here, beyond):
                 break
-            kept.append(samples[k + way])
+            kept.append(beyond)
+            here = beyond
         return kept
 
 

@@ -165,20 +165,30 @@ class Leg:
         nodes, weights = self._near(value, 1)
         return float(weights @ self.omega[nodes]), abs(float(self.omega[i + 1] - self.omega[i])) + 1e-6 * self.omega[i]
 
+    @cached_property
+    def _known(self) -> dict[float, Bifurcation]:
+        """Limit points that were located already, by the value."""
+        return {}
+
     def limit_point(self, value: float) -> Bifurcation:
         """The limit point at a value of the parameter, located over omega.
 
         Raises ConvergenceError where it is not found again.
         """
+        if value not in self._known:
+            with one_thread():
+                self._known[value] = self._located(value)
+        return self._known[value]
+
+    def _located(self, value: float) -> Bifurcation:
         expected, reach = self.omega_near(value)
-        with one_thread():
-            for order in (3, 1):
-                nodes, weights = self._near(value, order)
-                try:
-                    return self._solved(value, nodes, weights, expected, reach)
-                except ConvergenceError:
-                    continue
-            return self._approached(value, expected, reach)
+        for order in (3, 1):
+            nodes, weights = self._near(value, order)
+            try:
+                return self._solved(value, nodes, weights, expected, reach)
+            except ConvergenceError:
+                continue
+        return self._approached(value, expected, reach)
 
     def _solved(self, value: float, nodes: slice, weights: Array, expected: float, reach: float) -> Bifurcation:
         """The limit point at a value by Newton's method from nodes with weights."""

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from suboctave.analysis.corrector import SOLVED, UNSOLVED, bordered_by_frequency, corrected
 from suboctave.bifurcation.gaps import rests_in_corner
-from suboctave.compiled import kernel
+from suboctave.compiled import ready
 from suboctave.continuation.kernels import bordered_transposed
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.newton import NewtonOptions, Solved, not_converged
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import jacobian
+from suboctave.harmonic.evaluation import evaluate_told, told_steps
+from suboctave.harmonic.group_kernels import add_pieces
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, motion_size, truncation
 from suboctave.harmonic.state import BalanceState
@@ -55,7 +59,7 @@ class ResponseEvaluation:
         if not plain or not isinstance(state.linear, StructuralMatrices):
             found: Array = bordered_transposed(self.jacobian, row, weights)
             return found
-        return _bordered(
+        return bordered_by_frequency(
             state.spectra_table,
             balance.moving,
             state.rate,
@@ -90,15 +94,6 @@ class ResponseEvaluation:
     def truncation(self) -> float:
         """Estimated size of the neglected harmonics relative to the motion."""
         return truncation(self.state)
-
-
-@kernel()
-def _bordered(table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, row, weights):
-    """`ResponseEvaluation.bordered_transposed` along omega, of a structure's own matrices."""
-    n = x.shape[0] * x.shape[1]
-    extended = np.zeros((n, n + 1))
-    jacobian(extended, table, moving, rate, True, starts, dofs, shape, matrices, multiples, omega, x)
-    return bordered_transposed(extended, row, weights)
 
 
 class ResponseCurve:
@@ -167,6 +162,71 @@ class ResponseCurve:
             raise ConvergenceError("omega is not positive")
         return ResponseEvaluation(self.balance.at(x, omega, values), self.name, self.reference)
 
+    @lazy
+    def _known(self) -> tuple[tuple[Any, ...], list[Callable[..., Any]]] | None:
+        """What `corrector.corrected` is told of these equations, and those of the kernels called for them that other
+        laws need not; None where they are not of its kind.
+        """
+        balance = self.balance
+        plain = self.name == "omega" and balance.steady and balance.basis.kept is None
+        if not plain or not isinstance(balance.linear, StructuralMatrices):
+            return None
+        packed, nodes = balance.packed_laws(balance.values)
+        if packed.sampled and not packed.told:
+            return None
+        equations = (
+            _REST * self.reference,
+            balance.basis.nu,
+            balance.moving,
+            balance.basis.multiples,
+            balance.linear.matrices,
+            *balance.directions,
+            packed.pieces if len(packed.pieces) else None,
+            packed.first,
+            packed.polynomial,
+            balance.grid,
+            nodes,
+            balance.load(balance.values, 1.0),
+            balance.scales()[1],
+        )
+        parts = [part for part, needed in ((evaluate_told, packed.told), (add_pieces, len(packed.pieces))) if needed]
+        return equations + (told_steps(packed) if packed.told else (None,) * 7), parts
+
+    def corrected(
+        self, guess: Array, row: Array, weights: Array, options: NewtonOptions, spare: float
+    ) -> Solved | None:
+        """`newton.correct` in one compiled call; None where that does not go.
+
+        Raises
+        ------
+        ConvergenceError
+            If the iterations do not contract or run out.
+        """
+        known, balance = self._known, self.balance
+        # what it calls is compiled one by one, not all at one go
+        if known is None or not all(map(ready, known[1])):
+            return None
+        n, high, size, groups = len(guess), balance.basis.harmonics, balance.size, len(balance.groups)
+        u, tangent, lu, pivots = np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, dtype=np.int32)
+        blocks, parts = np.empty((high + 1, size, size), dtype=complex), np.empty((3, 2 * high + 1, size))
+        table = np.empty((3, groups, balance.top + 1), dtype=complex)
+        motions, sizes, numbers = np.empty((groups, high + 1), dtype=complex), np.empty(4), np.empty(5)
+        limits = (options.tolerance, options.correction, options.iterations, spare)
+        filled = (u, tangent, lu, pivots, blocks, table, motions, parts, sizes, numbers)
+        ended = corrected(*(guess, row, weights, *limits, *known[0], *filled))
+        error, iterations, way, contraction, sign = numbers.tolist()
+        if ended == UNSOLVED:
+            raise not_converged(self, guess, error, int(iterations))
+        if ended != SOLVED:
+            return None
+        x, omega, values = self.split(u)
+        state = BalanceState(balance, balance.linear, x, omega, values)
+        state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
+        evaluation = ResponseEvaluation(state, self.name, self.reference)
+        evaluation.__dict__["error"] = error
+        factor = Factor(lu.T, pivots, False)
+        return Solved(u, evaluation, weights, factor, int(iterations), way, contraction, tangent, sign)
+
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
         return length(self._weight * u[:-1])
@@ -215,6 +275,8 @@ class ResponseCurve:
 
     def transfer(self, u: Array, origin: Curve) -> Array:
         """See `Curve.transfer`."""
+        if origin is self:
+            return u
         assert isinstance(origin, ResponseCurve)
         if origin.balance is self.balance or origin.balance.basis == self.balance.basis:
             return u

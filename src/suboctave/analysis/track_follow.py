@@ -27,6 +27,8 @@ from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 1e-4
+#: how often a step is halved towards the bound that it passes
+_HALVED = 20
 #: corners after which no further one is passed
 _CORNERS = 5
 
@@ -246,7 +248,7 @@ class _Tracker:
         low, high = self.box.first
         bound = low if b.point.u[index] < low else high
         left, right = 0.0, 1.0
-        for _ in range(60):
+        for _ in range(_HALVED):
             middle = 0.5 * (left + right)
             beyond = (between(a.point, b.point, middle)[index] - bound) * (b.point.u[index] - bound) > 0.0
             left, right = (left, middle) if beyond else (middle, right)

@@ -151,6 +151,10 @@ class TrackedCurve:
     def _weight(self) -> Array:
         return np.tile(self.balance.scales()[0], self.balance.basis.size)
 
+    @lazy
+    def _parameter_weights(self) -> Array:
+        return 1.0 / np.array(self.spans)
+
     def split(self, u: Array) -> tuple[Array, Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), extra unknowns, omega and parameter values of a vector u."""
         n = self.balance.dimension
@@ -181,7 +185,7 @@ class TrackedCurve:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * largest) or 1.0
         extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu) if self.augmentation.extras else _NONE
-        return self.join(self._weight / size, 1.0 / extra, 1.0 / np.array(self.spans))
+        return self.join(self._weight / size, 1.0 / extra, self._parameter_weights)
 
     def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
         """The curve with the harmonics, samples and bordering vectors of this point."""

@@ -18,6 +18,7 @@ from suboctave.analysis.tracked_tests import CurveTest, Cusp, Extremum
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, make_point, point_between
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import choose_harmonics
@@ -30,6 +31,8 @@ _SAME = 5e-3
 _RESOLVED, _ROUGH = 1e-11, 1e-3
 #: share of a test's values at the ends of a step with which a zero is near enough for secants
 _LITTLE = 0.05
+#: ratio of a test's values at two ends beyond which it does not change evenly
+_LARGE = 30.0
 
 
 @dataclass(frozen=True)
@@ -130,7 +133,7 @@ def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float
     if not way > 0.0:
         return 0.0, 0.0, 0.0
     chord = float(b.point.u[j] - a.point.u[i]) / way
-    start, stop = float(a.point.tangent[i]), float(b.point.tangent[j])
+    start, stop = a.slopes[name], b.slopes[name]
     return start, 3.0 * (start + stop - 2.0 * chord), 3.0 * chord - 2.0 * start - stop
 
 
@@ -160,15 +163,27 @@ class _Stretch:
         chord = b.u - origin
         row = weights * chord
         row = row / length(row)
-        guess = between(self.samples[low].point, self.samples[high].point, (share - low) / (high - low))
         # a fixed plane for every share, whatever the start
-        ahead = share * float(row @ (weights * chord)) - float(row @ (weights * (guess - origin)))
-        guess = guess + ahead * row / weights
-        try:
-            solved = correct(curve, guess, row, weights, self.newton)
-        except ConvergenceError:
-            # along a corner of the equations, near a grazing, the start may be poor
-            solved = correct(curve, guess, row, weights, replace(self.newton, iterations=30, damped=True))
+        place = share * float(row @ (weights * chord)) + float(row @ (weights * origin))
+
+        def start(u: Array, along: Array) -> Array:
+            scaled = weights * along
+            return u + (place - float(row @ (weights * u))) / float(row @ scaled) * along
+
+        first, last = self.samples[low].point, self.samples[high].point
+        ends = [(curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve)) for p in (first, last)]
+        between_them = start(between(first, last, (share - low) / (high - low)), row / weights)
+        if share - low > high - share:
+            ends.reverse()
+        # along a corner of the equations, near a grazing, neighbours may lie on both sides of it
+        for guess in (between_them, *(start(*end) for end in ends)):
+            try:
+                solved = correct(curve, guess, row, weights, self.newton)
+                break
+            except ConvergenceError:
+                continue
+        else:
+            solved = correct(curve, between_them, row, weights, replace(self.newton, iterations=30, damped=True))
         return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
 
     def about(self, resolved: float) -> tuple[TrackedSample, float]:
@@ -176,9 +191,10 @@ class _Stretch:
         the ends, and about the test's derivative by arclength there.
         """
         first, last = self.values[0.0], self.values[1.0]
-        self.value(self._turn())
         # components of a tangent change evenly; others may be large at one end
-        size = max if isinstance(self.test, Extremum) else min
+        even = isinstance(self.test, Extremum)
+        self.value(self._turn() if even or first == last else first / (first - last))
+        size = max if even else min
         little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
         share = self._root(resolved or _RESOLVED, little)
         value, way = self.value(share), self.b.point.arclength - self.a.point.arclength
@@ -189,14 +205,14 @@ class _Stretch:
         return self.samples[share], slope / way if way > 0.0 else 0.0
 
     def _turn(self) -> float:
-        """The share at which a parameter turns by its cubic interpolation; 0 for other tests."""
-        if isinstance(self.test, Extremum):
-            start, curve, half = _slope_between(self.test.name, self.a, self.b)
-            inside = half * half - start * curve
-            if inside >= 0.0 and start != 0.0:
-                # the root on the side of the end whose sign is the other one
-                share = -start / (half - math.copysign(math.sqrt(inside), start))
-                return share if 0.0 < share < 1.0 else 0.0
+        """The share at which a parameter turns by its cubic interpolation; 0 if nowhere."""
+        assert isinstance(self.test, Extremum)
+        start, curve, half = _slope_between(self.test.name, self.a, self.b)
+        inside = half * half - start * curve
+        if inside >= 0.0 and start != 0.0:
+            # the root on the side of the end whose sign is the other one
+            share = -start / (half - math.copysign(math.sqrt(inside), start))
+            return share if 0.0 < share < 1.0 else 0.0
         return 0.0
 
     def zero_from(self, sample: TrackedSample, slope: float) -> TrackedSample:
@@ -217,15 +233,24 @@ class _Stretch:
         return self.samples_at(self._root(resolved))
 
     def _root(self, resolved: float, little: float = 0.0) -> float:
-        """The share at which the test vanishes, or its modulus is below `little`, by Brent's method."""
+        """The share at which the test vanishes, or its modulus is below `little`, by Brent's method.
 
-        def value(share: float) -> float:
-            found = self.value(share)
-            return found if abs(found) > little else 0.0
-
+        Of functions that are large at one end its logarithm is taken there, lest their secants stay at the other.
+        """
         for low, high in itertools.pairwise(sorted(self.values)):
-            if self.values[low] * self.values[high] <= 0.0:
-                return float(brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
+            first, last = self.values[low], self.values[high]
+            if first * last > 0.0:
+                continue
+            least, most = sorted((abs(first), abs(last)))
+            unit = least if _LARGE * least < most else 0.0
+
+            def value(share: float, unit: float = unit) -> float:
+                found = self.value(share)
+                if abs(found) <= little:
+                    return 0.0
+                return math.asinh(found / unit) if unit else found
+
+            return float(brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
         raise ConvergenceError("the test does not change sign")
 
     def samples_at(self, share: float) -> TrackedSample:

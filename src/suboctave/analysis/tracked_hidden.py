@@ -10,7 +10,9 @@ hint at is not found; smaller steps do.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,13 +40,14 @@ class HiddenPairs:
     def __init__(self, tests: Sequence[CurveTest], newton: NewtonOptions) -> None:
         self.tests = [test for test in tests if not isinstance(test, Extremum)]
         self.newton = newton
-        self._known: list[tuple[TrackedSample, Array]] = []
+        #: the last points, with sign and logarithm of every test's function
+        self._known: list[tuple[TrackedSample, list[list[float]]]] = []
 
     def passed(self, sample: TrackedSample, warnings: list[str]) -> list[Found]:
         """Take in the next point; the pairs found in the step before the last."""
         if not self.tests:
             return []
-        self._known = [*self._known[-3:], (sample, np.array([test.smooth(sample) for test in self.tests]))]
+        self._known = [*self._known[-3:], (sample, [test.smooth(sample).tolist() for test in self.tests])]
         return self._look(len(self._known) - 3, warnings)
 
     def rest(self, warnings: list[str]) -> list[Found]:
@@ -60,10 +63,11 @@ class HiddenPairs:
         found: list[Found] = []
         near = self._known
         samples = [sample for sample, _ in near]
-        places = np.array([sample.point.arclength for sample in samples])
-        if not np.all(np.diff(places) > 0.0):
+        places = [sample.point.arclength for sample in samples]
+        if not all(a < b for a, b in pairwise(places)):
             return []
-        for test, functions in zip(self.tests, np.stack([f for _, f in near], axis=1), strict=True):
+        for i, test in enumerate(self.tests):
+            functions = [known[i] for _, known in near]
             share = falling(places, _values(functions), at)
             if share is None:
                 continue
@@ -74,7 +78,9 @@ class HiddenPairs:
                 warnings.append(f"whether two {test.kind} lie after {where} could not be told: {failure}")
         return found
 
-    def _pair(self, test: CurveTest, samples: list[TrackedSample], functions: Array, at: int) -> list[Found]:
+    def _pair(
+        self, test: CurveTest, samples: list[TrackedSample], functions: list[list[float]], at: int
+    ) -> list[Found]:
         """The two events of one test in a step that may hide them."""
         a, b = same_discretisation(samples[at], samples[at + 1], self.newton), samples[at + 1]
         places = [sample.point.arclength for sample in samples]
@@ -85,7 +91,7 @@ class HiddenPairs:
                 (
                     (i, share)
                     for i in range(low, low + len(inside) - 1)
-                    if (share := falling(np.array(places), _values(np.array(known)), i)) is not None
+                    if (share := falling(places, _values(known), i)) is not None
                 ),
                 None,
             )
@@ -99,27 +105,25 @@ class HiddenPairs:
                 both = [located(test, before, middle, self.newton), located(test, middle, after, self.newton)]
                 return [item for item in both if item is not None]
             places.insert(i + 1, place)
-            known.insert(i + 1, test.smooth(middle))
+            known.insert(i + 1, test.smooth(middle).tolist())
             inside.insert(i - low + 1, middle)
         return []
 
 
-def _values(functions: Array) -> Array:
-    """A function from signs and logarithms, shape (m, 2), in units of its largest value."""
-    top = functions[:, 1].max()
-    if not np.isfinite(top):
-        return np.zeros(len(functions))
-    values: Array = functions[:, 0] * np.exp(functions[:, 1] - top)
-    return values
+def _values(functions: Sequence[Sequence[float]]) -> list[float]:
+    """A function from signs and logarithms, in units of its largest value."""
+    top = max(size for _, size in functions)
+    if not math.isfinite(top):
+        return [0.0] * len(functions)
+    return [sign * math.exp(size - top) for sign, size in functions]
 
 
-def falling(places: Array, values: Array, at: int) -> float | None:
+def falling(places: Sequence[float], values: Sequence[float], at: int) -> float | None:
     """Where between `places[at]` and the next a function of one sign may vanish, as a share of the way, or None."""
-    here = values[at : at + 2]
-    sign = float(np.sign(here[0]))
-    if sign == 0.0 or sign * here[1] <= 0.0:
+    first, last = values[at], values[at + 1]
+    if not first * last > 0.0:
         return None
-    least = float(np.abs(here).min())
+    least = min(abs(first), abs(last))
     if at > 0 and at + 2 < len(places):
         # parabolas leave the chord by no more than this
         bend = max(abs(_second(places, values, i)) for i in (at - 1, at)) * (places[at + 1] - places[at]) ** 2 / 4.0
@@ -131,6 +135,7 @@ def falling(places: Array, values: Array, at: int) -> float | None:
     else:
         spans = [(at, at + 3), (at, min(len(places), at + 4))]
     s = places[at] + _GRID * (places[at + 1] - places[at])
+    sign = math.copysign(1.0, first)
     one, other = (sign * _interpolated(places[a:b], values[a:b], s) for a, b in spans)
     lower, apart = np.minimum(one, other), np.abs(one - other)
     for lowest, bound in ((lower, _FALLS * least), (lower - apart, 0.0)):
@@ -139,17 +144,19 @@ def falling(places: Array, values: Array, at: int) -> float | None:
     return None
 
 
-def _second(x: Array, f: Array, i: int) -> float:
+def _second(x: Sequence[float], f: Sequence[float], i: int) -> float:
     """The second divided difference at three points from the i-th."""
-    first, last = ((f[j + 1] - f[j]) / (x[j + 1] - x[j]) for j in (i, i + 1))
-    return float((last - first) / (x[i + 2] - x[i]))
+    first = (f[i + 1] - f[i]) / (x[i + 1] - x[i])
+    last = (f[i + 2] - f[i + 1]) / (x[i + 2] - x[i + 1])
+    return (last - first) / (x[i + 2] - x[i])
 
 
-def _interpolated(x: Array, f: Array, s: Array) -> Array:
+def _interpolated(x: Sequence[float], f: Sequence[float], s: Array) -> Array:
     """The polynomial through points, by Newton's divided differences."""
-    c = f.astype(float)
+    c = list(f)
     for k in range(1, len(x)):
-        c[k:] = (c[k:] - c[k - 1 : -1]) / (x[k:] - x[: len(x) - k])
+        for i in range(len(x) - 1, k - 1, -1):
+            c[i] = (c[i] - c[i - 1]) / (x[i] - x[i - k])
     value = np.full_like(s, c[-1])
     for i in range(len(x) - 2, -1, -1):
         value = value * (s - x[i]) + c[i]

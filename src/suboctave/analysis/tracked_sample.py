@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,6 +52,12 @@ class TrackedSample:
         equations = self.evaluation.equations.own
         assert isinstance(equations, SingularEquations)
         return equations
+
+    @lazy
+    def slopes(self) -> dict[str, float]:
+        """Components of the tangent along the free parameters, by name."""
+        names = self.curve.names
+        return dict(zip(names, self.point.tangent[-len(names) :].tolist(), strict=True))
 
     @lazy
     def orbit(self) -> PeriodicOrbit:
@@ -137,17 +144,16 @@ class TrackedSample:
 
     def determinant(self, operator: Kind) -> Array:
         """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
-        state = self.state
-        factor = self._whole if operator is Kind.INTEGER else self._half
-        n = len(factor.lu)
-        rows = np.arange(n) // state.balance.size
-        f = (rows + 1) // 2 if operator is Kind.INTEGER else rows // 2 + 0.5
-        units = np.log(state.rate**2 * (1.0 + f**2)) - 2.0 * np.log(state.balance.row_weights(n))
-        return np.array([factor.sign, factor.log_determinant - float(units.sum())])
-
-    @lazy
-    def _whole(self) -> Factor:
-        return Factor.of(self.state.jacobian)
+        state, size = self.state, self.state.balance.size
+        if operator is Kind.INTEGER:
+            n = state.balance.dimension
+            sign, found = self._plain.sign, self._plain.log_determinant + float(np.log(self.point.weights[:n]).sum())
+        else:
+            n = len(self._half.lu)
+            sign, found = self._half.sign, self._half.log_determinant
+        masses = 2.0 * float(np.log(state.balance.row_weights(n)).sum())
+        units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) - masses
+        return np.array([sign, found - units])
 
     @lazy
     def _half(self) -> Factor:
@@ -179,6 +185,14 @@ class TrackedSample:
         return result
 
 
+@lru_cache(maxsize=64)
+def _frequencies(rows: int, size: int, mean: bool) -> float:
+    """Sum of `log (1 + f^2)` over the rows of an operator, f the harmonic of each, whole (mean) or half-odd."""
+    k = np.arange(rows) // size
+    f = (k + 1) // 2 if mean else k // 2 + 0.5
+    return float(np.log(1.0 + f**2).sum())
+
+
 def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> TrackedSample:
     """The first of two neighbours solved again in the discretisation of the second, where that differs."""
     curve, point = b.curve, a.point
@@ -208,8 +222,19 @@ def nearest_point(
 def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Unit vector that the scaled Jacobian at u maps to zero: the curve's direction there."""
     jacobian = curve.evaluate(u).jacobian / weights
-    q = np.linalg.qr(jacobian.T, mode="complete")[0]
-    result: np.ndarray = q[:, -1]
+    last = np.zeros(len(u))
+    last[-1] = 1.0
+    row = last
+    for _ in range(2):
+        factor = Factor.of(np.vstack((jacobian, row)))
+        found = factor.solve(last) if not factor.singular else None
+        if found is None or not np.isfinite(found).all():
+            break
+        # from the second time on the row is the direction itself, so that the matrix is as regular as can be
+        row = found / length(found)
+    else:
+        return row
+    result: np.ndarray = np.linalg.qr(jacobian.T, mode="complete")[0][:, -1]
     return result
 
 

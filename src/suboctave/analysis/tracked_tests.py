@@ -84,16 +84,16 @@ class Extremum(CurveTest):
 
     def value(self, sample: TrackedSample) -> float:
         """See `CurveTest.value`."""
-        slope = float(sample.point.tangent[sample.curve.index(self.name)])
+        slope = sample.slopes[self.name]
         # at a cusp both change sign
         plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
         return slope / sample.bend if plane and sample.bend != 0.0 else slope
 
     def level(self, *samples: TrackedSample) -> bool:
         """Whether the parameter stays as it is but for rounding."""
-        indices = [sample.curve.index(self.name) for sample in samples]
-        points = [sample.point for sample in samples]
-        return all(abs(p.tangent[i] * p.weights[i]) < _LEVEL for p, i in zip(points, indices, strict=True))
+        return all(
+            abs(s.slopes[self.name] * float(s.point.weights[s.curve.index(self.name)])) < _LEVEL for s in samples
+        )
 
 
 @dataclass(frozen=True)

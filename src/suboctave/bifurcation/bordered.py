@@ -58,7 +58,7 @@ def _resized(vector: np.ndarray, rows: int, two_sided: bool) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, slots=True)
 class Bordered:
     """The scalar g of an operator at one motion, with what its gradient needs."""
 
@@ -140,12 +140,10 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
     matrix = operator(state, kind, kappa)
     n = matrix.shape[0]
     scale = state.balance.row_weights(n)
-    extended = kernels.scaled_transposed(matrix, scale, scale, 1).T
+    left, right = of_equations(state, kind, borders.left), of_equations(state, kind, borders.right)
     # the operator's own size balances the bordering rows
     size = state.omega**2
-    extended[:n, n] = size * of_equations(state, kind, borders.left)
-    extended[n, :n] = size * of_equations(state, kind, borders.right).conj()
-    factor = Factor.of(extended, overwrite=True)
+    factor = Factor.of(kernels.bordered_and_scaled(matrix, scale, left, right, size).T, overwrite=True)
     rhs = np.zeros(n + 1, dtype=matrix.dtype)
     rhs[n] = size
     v = factor.solve(rhs)

@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.bifurcation.normal_form_real import Expansion
 from suboctave.harmonic import real_form
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.bends import bends_of
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
@@ -41,21 +41,10 @@ def cubic_coefficient(
         own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
         return own.cubic(solve(-0.5 * own.squared()))[0]
     size = state.balance.size
-    right, left = (_waves(v.reshape(-1, size)) for v in (phi, psi))
-    second = np.zeros_like(state.x)
-    third = 0.0
-    for bend in bends_of(state):
-        along = np.stack((right @ bend.out, 2.0 * (left @ bend.out)))
-        found = np.zeros(len(state.x) + 1)
+    right, left = phi.reshape(-1, size), psi.reshape(-1, size)
+    second, third = np.zeros_like(state.x), np.zeros(1)
+    for group, bend in zip(state.balance.groups, bends_of(state), strict=True):
         for part in bend.parts:
-            real_form.add_doubled_form(along, *part, found)
-        second += np.multiply.outer(found[:-1], bend.out)
-        third += float(found[-1])
+            real_form.add_doubled_form(right, left, group.dofs, group.values, *part, second, third)
     bent = solve(-0.5 * second.ravel())
-    return float(by_motion.ravel() @ bent) + third / 6.0
-
-
-def _waves(vector: Array) -> ComplexArray:
-    """Amplitudes of `Re sum_k c_k exp(i (k + 1/2) tau)`, shape (H + 1, size)."""
-    waves: ComplexArray = vector[::2] - 1j * vector[1::2]
-    return waves
+    return float(by_motion.ravel().dot(bent)) + float(third[0]) / 6.0

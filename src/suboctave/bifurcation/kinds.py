@@ -25,7 +25,7 @@ from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.solve import Guess, Singular
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
@@ -53,8 +53,7 @@ class Sample:
     @lazy
     def half_sign(self) -> float:
         """Sign of det J_half."""
-        # the transpose has the same determinant, and lies in memory as LAPACK wants it
-        return Factor.of(self.state.half_jacobian.T).sign
+        return measures.half_sign(self.state)
 
     @lazy
     def gaps(self) -> tuple[GapExtrema, ...]:

@@ -34,6 +34,20 @@ def scaled_transposed(matrix, rows, columns, more):
 
 
 @kernel()
+def bordered_and_scaled(matrix, scale, left, right, size):
+    """Transpose of `[S A S, size left; size right^H, 0]`, S the diagonal matrix of `scale`; (N + 1, N + 1)."""
+    n = matrix.shape[0]
+    out = np.empty((n + 1, n + 1), dtype=matrix.dtype)
+    for j in range(n):
+        for i in range(n):
+            out[j, i] = matrix[i, j] * (scale[i] * scale[j])
+        out[j, n] = size * right[j].conjugate()
+        out[n, j] = size * left[j]
+    out[n, n] = 0.0
+    return out
+
+
+@kernel()
 def longest_column(matrix):
     """Largest sum of moduli over a column."""
     sums = np.zeros(matrix.shape[1])
@@ -201,3 +215,13 @@ def determinant_sign(lu, pivots):
         if lu[i, i] < 0.0:
             sign = -sign
     return sign
+
+
+@kernel()
+def log_modulus(lu):
+    """Natural logarithm of the modulus of the determinant of a factorised matrix."""
+    total = 0.0
+    for i in range(lu.shape[0]):
+        size = abs(lu[i, i])
+        total += math.log(size) if size > 0.0 else -math.inf
+    return total

@@ -69,8 +69,7 @@ class Factor:
     @property
     def log_determinant(self) -> float:
         """Natural logarithm of the determinant's modulus."""
-        with np.errstate(divide="ignore"):
-            return float(np.log(np.abs(self.lu.diagonal())).sum())
+        return float(kernels.log_modulus(self.lu))
 
 
 class LeadingBlock:
@@ -93,6 +92,11 @@ class LeadingBlock:
     def sign(self) -> float:
         """Sign of the block's determinant; 0 if it is singular."""
         return self.whole.sign * (1.0 if self.corner is None else self.corner.sign)
+
+    @property
+    def log_determinant(self) -> float:
+        """Natural logarithm of the modulus of the block's determinant."""
+        return self.whole.log_determinant + (0.0 if self.corner is None else self.corner.log_determinant)
 
     def solve(self, rhs: Array) -> Array:
         """Solve with the block."""

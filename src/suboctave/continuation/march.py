@@ -24,8 +24,10 @@ from suboctave.errors import ConvergenceError, InputError
 _BEHIND = 2
 #: points from which on a march watches whether it goes round and round without passing its start
 _LONG = 256
+#: how often a step is halved towards the bound that it passes; Newton's method does the rest
+_HALVED = 20
 #: share of a step over which derivatives count as the same
-_SPARED = 5e-6
+_SPARED = 2e-5
 
 
 @dataclass(frozen=True)
@@ -130,9 +132,9 @@ class Arrival:
 def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
     """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
     t = tangent(solved)
+    sign = solved.factor.sign if solved.sign is None else solved.sign
     # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of
     # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
-    sign = solved.factor.sign
     if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:
         t, sign = -t, -sign
     return CurvePoint(
@@ -374,7 +376,7 @@ class March:
         """The point on the bound between two neighbours."""
         index = point.curve.parameter
         low, high = 0.0, 1.0
-        for _ in range(60):
+        for _ in range(_HALVED):
             middle = 0.5 * (low + high)
             beyond = (between(point, new, middle)[index] - bound) * (new.parameter - bound) > 0.0
             low, high = (low, middle) if beyond else (middle, high)

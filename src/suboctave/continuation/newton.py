@@ -19,7 +19,7 @@ from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
-_SHORT = 1e-3
+SHORT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,10 @@ class NewtonOptions:
 
 @dataclass(eq=False, slots=True)
 class Solved:
-    """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`."""
+    """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`.
+
+    `tangent` and `sign` are the unit tangent along the row and the sign of the factors' determinant, where known.
+    """
 
     u: Array
     evaluation: Evaluation
@@ -59,6 +62,8 @@ class Solved:
     iterations: int
     distance: float
     contraction: float
+    tangent: Array | None = None
+    sign: float | None = None
 
 
 def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
@@ -101,6 +106,11 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
+    if known is None and not options.damped:
+        at_once: Callable[..., Solved | None] | None = getattr(curve, "corrected", None)
+        solved = None if at_once is None else at_once(guess, row, weights, options, spare)
+        if solved is not None:
+            return solved
     u = guess.copy()
     last: Evaluation | None = None
     way = before = 0.0
@@ -124,7 +134,7 @@ def correct(
             break
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
         # ones are those of the point as well
-        stale = previous > _SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
+        stale = previous > SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
         if factor is None or (iteration > 0 and stale):
             factor = bordered(evaluation, row, weights)
             last, way = evaluation, 0.0
@@ -142,9 +152,14 @@ def correct(
             if contraction > 2.0 and size > first and not options.damped:
                 break
         previous = size if share == 1.0 else np.inf
-    raise ConvergenceError(
+    raise not_converged(curve, guess, error, iteration)
+
+
+def not_converged(curve: Curve, guess: Array, error: float, iterations: int) -> ConvergenceError:
+    """What is said where the iterations do not contract or run out."""
+    return ConvergenceError(
         f"Newton's method did not converge near {curve.where(guess)} "
-        f"(residual {error:.1e} after {iteration} iterations)"
+        f"(residual {error:.1e} after {iterations} iterations)"
     )
 
 
@@ -163,6 +178,8 @@ def _decrease(curve: Curve, u: Array, step: Array, error: float) -> float:
 
 def tangent(solved: Solved) -> Array:
     """Unit tangent in u, normalised in scaled arclength, oriented along the row the point was solved with."""
+    if solved.tangent is not None:
+        return solved.tangent
     rhs = np.zeros(len(solved.u))
     rhs[-1] = 1.0
     if solved.factor.singular:

@@ -72,7 +72,8 @@ class HarmonicBalance:
         self.dimension = self.size * basis.count
         self.samples = samples if samples is not None else (None,) * len(system.elements)
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
-        self._matrix_names = system.mass.names | system.damping.names | system.stiffness.names
+        #: parameters that the linear part depends on
+        self.matrix_names = system.mass.names | system.damping.names | system.stiffness.names
         #: the elements that are evaluated direction by direction, and those with nodes of their own
         self.elements: tuple[Element, ...] = tuple(
             e for e in system.elements if isinstance(e, Element) and not e.own_nodes
@@ -128,6 +129,7 @@ class HarmonicBalance:
         other = HarmonicBalance(self.system, basis, self.values, self.linear, samples)
         # the same mapping, so that a motion's values are known to be its own, with what the laws are there
         other.values, other._own_coefficients = self.values, self._own_coefficients
+        other._constant_laws = self._constant_laws
         return other
 
     @lazy
@@ -145,7 +147,7 @@ class HarmonicBalance:
         """
         used = self.values if values is None else values
         linear = self.linear
-        if used is not self.values and any(used[n] != self.values[n] for n in self._matrix_names):
+        if used is not self.values and any(used[n] != self.values[n] for n in self.matrix_names):
             linear = self.linear.rebuilt(used)
         return BalanceState(self, linear, self.spread(np.asarray(x, float)), float(omega), used)
 
@@ -219,9 +221,20 @@ class HarmonicBalance:
         return found
 
     def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
-        numbers = [e.coefficient_values(values) for e in self.system.elements]
-        kinds = [e.sampling(c) for e, c in zip(self.system.elements, numbers, strict=True)]
+        numbers, kinds = [], []
+        for element, (own, kind) in zip(self.system.elements, self._constant_laws, strict=True):
+            numbers.append(element.coefficient_values(values) if own is None else own)
+            kinds.append(element.sampling(numbers[-1]) if kind is None else kind)
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
+
+    @lazy
+    def _constant_laws(self) -> list[tuple[Array | None, Sampling | None]]:
+        """Coefficients of every element, and what it tells of its law, if no parameter changes them."""
+        numbers = [
+            e.coefficient_values({}) if all(c.constant for c in e.coefficients) else None for e in self.system.elements
+        ]
+        pairs = zip(self.system.elements, numbers, strict=True)
+        return [(c, None if c is None else e.sampling(c)) for e, c in pairs]
 
     def packed_laws(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
         """The groups' laws at parameter values, as arrays, and points on the circle for their polynomials, (2, N)."""

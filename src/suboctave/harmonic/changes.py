@@ -54,9 +54,9 @@ def _of_told(state: BalanceState, law: GroupLaw, motion: ComplexArray, rates: di
     rows = np.zeros((2, len(u)))
     for i, c in law.told:
         if i in rates:
-            force, stiffness, _ = state.balance.elements[i].coefficient_tangent(u, still, c)
-            rows[0] += rates[i] @ force
-            rows[1] += rates[i] @ stiffness
+            force, stiffness, _ = state.balance.elements[i].coefficient_change(u, still, c, rates[i])
+            rows[0] += force
+            rows[1] += stiffness
     rows *= weights
     found = kernels.spectra(rows, zr, zi, state.balance.top)
     return CoefficientChange(found[0], found[1], None)

@@ -7,19 +7,26 @@ system spends more time than in them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.compiled import kernel, ready
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.group_force import add_sampled_spectra
-from suboctave.harmonic.group_kernels import add_pieces, add_polynomial, balance_residual, tangent_matrix
+from suboctave.harmonic.group_force import PackedLaws, add_sampled_spectra
+from suboctave.harmonic.group_kernels import (
+    add_pieces,
+    add_polynomial,
+    add_smooth_steps,
+    balance_residual,
+    tangent_matrix,
+)
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.nodal import add_tangent
-from suboctave.harmonic.quadrature import uniform_nodes
+from suboctave.harmonic.quadrature import rule_tables, uniform_nodes
+from suboctave.harmonic.sharp_nodes import sharp_nodes
 
 if TYPE_CHECKING:
     from suboctave.harmonic.state import BalanceState
@@ -59,7 +66,8 @@ def evaluate(
     starts, dofs, shape
         Directions, as in `balance_residual`.
     pieces, first
-        Stiffness, gap and side of piecewise-linear pieces (P, 3), direction by direction: where each begins, (G + 1,).
+        Stiffness, gap and side of piecewise-linear pieces (P, 3), or None without any, direction by direction: where
+        each begins, (G + 1,).
     polynomial
         Coefficients of u^0, u^1, ... along every direction (G, D).
     grid, nodes
@@ -81,7 +89,8 @@ def evaluate(
     finite = True
     for g in range(motions.shape[0]):
         c = motions[g]
-        if first[g + 1] > first[g]:
+        # without pieces nobody waits for the compilation of what they need
+        if pieces is not None and first[g + 1] > first[g]:
             add_pieces(c, pieces[first[g] : first[g + 1]], grid[0], grid[1], table[0, g], table[1, g])
         if polynomial.shape[1] > 0:
             add_polynomial(c, polynomial[g], nodes[0], nodes[1], table[0, g], table[1, g])
@@ -90,6 +99,41 @@ def evaluate(
             finite = finite and math.isfinite(table[r, g, 0].real) and math.isfinite(table[r, g, 0].imag)
     balance_residual(x, blocks, table[0], load, starts, dofs, shape, weight, parts, sizes)
     return finite
+
+
+@kernel()
+def evaluate_told(
+    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
+    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+):  # fmt: skip
+    """`evaluate` with laws that have arctan steps; the table's spectra are zero before.
+
+    Parameters
+    ----------
+    points, widths, steps, step_first
+        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
+        each direction's begin, (G + 1,).
+    line
+        Constant and slope of the laws that they belong to, (G, 2).
+    rule_nodes, rule_weights
+        `sharp_nodes.tables()`.
+    """
+    along_directions(x, starts, dofs, shape, motions)
+    degree = table.shape[2] + motions.shape[1] - 2
+    # not a literal, for which the nodes would be compiled once more
+    moving = degree < 0
+    for g in range(motions.shape[0]):
+        low, high = step_first[g], step_first[g + 1]
+        if high > low:
+            sampled = sharp_nodes(
+                motions[g], points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes,
+                rule_weights,
+            )  # fmt: skip
+            add_smooth_steps(sampled, steps[low:high], line[g], table[0, g], table[1, g])
+    return evaluate(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, table, motions, parts, sizes,
+    )  # fmt: skip
 
 
 @kernel()
@@ -164,11 +208,19 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     count, size = len(balance.groups), balance.size
     packed, nodes = balance.packed_laws(state.values)
     table = np.zeros((3, count, balance.top + 1), dtype=complex)
-    if packed.sampled:
+    if packed.sampled and not packed.told:
         laws = balance.coefficients(state.values)[2]
         for g, (law, motion) in enumerate(zip(laws, state.motions, strict=True)):
             out = (table[0, g], table[1, g], table[2, g])
             add_sampled_spectra(law, balance.elements, balance.samples, motion, state.rate, out)
+    pieces = packed.pieces if len(packed.pieces) else None
+    if pieces is not None and ready(evaluate) and not ready(add_pieces):
+        # compiled one after the other, where `evaluate` has been compiled for laws without pieces
+        grid = balance.grid
+        for g, motion in enumerate(state.motions):
+            own = pieces[packed.first[g] : packed.first[g + 1]]
+            add_pieces(motion, own, grid[0], grid[1], table[0, g], table[1, g])
+        pieces = None
     if isinstance(linear, StructuralMatrices):
         matrices = linear.matrices
         blocks = np.empty((basis.harmonics + 1, size, size), dtype=complex)
@@ -176,25 +228,26 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         matrices, blocks = _NO_MATRICES, np.ascontiguousarray(state.blocks, dtype=complex)
     motions = np.empty((count, basis.harmonics + 1), dtype=complex)
     parts, sizes = np.empty((3, *state.x.shape)), np.empty(4)
-    finite = evaluate(
+    given = (
         state.x,
         state.omega,
         basis.multiples,
         matrices,
         blocks,
         *balance.directions,
-        packed.pieces,
+        pieces,
         packed.first,
         packed.polynomial,
         balance.grid,
         nodes,
         balance.load(state.values, state.omega),
         balance.scales()[1],
-        table,
-        motions,
-        parts,
-        sizes,
     )
+    filled = (table, motions, parts, sizes)
+    if packed.told:
+        finite = evaluate_told(*(*given, *told_steps(packed), *filled))
+    else:
+        finite = evaluate(*given, *filled)
     known = state.__dict__
     known["motions"], known["blocks"] = motions, blocks
     if not balance.own:
@@ -202,6 +255,11 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     if not finite:
         _refuse(state)
     return table, parts, sizes
+
+
+def told_steps(packed: PackedLaws) -> tuple[Any, ...]:
+    """Arctan steps as `evaluate_told` wants them, from `points` to `rule_weights`."""
+    return (*packed.places, packed.steps, packed.step_first, packed.line, *rule_tables())
 
 
 def _refuse(state: BalanceState) -> None:

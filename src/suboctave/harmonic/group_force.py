@@ -8,7 +8,8 @@ graded nodes, other laws one uniform grid, so that the motion is evaluated once 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,7 @@ from suboctave.model.sampling import (
 )
 
 _NONE = np.zeros(0)
+_NO_ROWS = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,8 @@ class GroupLaw:
         The elements (index, coefficients) that these belong to.
     degree
         Highest degree of polynomials that need samples.
-    levels
-        Displacements at which a law has a corner, or is sharp: element, which of its own, displacement.
+    all
+        All elements: index, what it tells, coefficients.
     """
 
     pieces: Array
@@ -82,7 +84,12 @@ class GroupLaw:
     line: Array
     told: tuple[tuple[int, Array], ...]
     degree: int
-    levels: tuple[tuple[int, int, float], ...] = ()
+    all: tuple[tuple[int, Sampling, Array], ...] = ()
+
+    @cached_property
+    def levels(self) -> tuple[tuple[int, int, float], ...]:
+        """Displacements at which a law has a corner, or is sharp: element, which of its own, displacement."""
+        return tuple((i, place, at) for i, kind, c in self.all for place, at in enumerate(told_levels(kind, c)))
 
     @property
     def in_closed_form(self) -> bool:
@@ -101,14 +108,12 @@ class GroupLaw:
         polynomials: list[tuple[float, ...]] = []
         sharp, uniform, told = [], [], []
         steps: list[tuple[float, float, float]] = []
-        line = np.zeros(2)
+        line = [0.0, 0.0]
         points: list[Array] = []
         widths: list[Array] = []
-        levels: list[tuple[int, int, float]] = []
         degree = 0
         for i in group.members:
             kind, c = kinds[i], numbers[i]
-            levels += [(i, place, level) for place, level in enumerate(told_levels(kind, c))]
             if isinstance(kind, PiecewiseLinear):
                 pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
             elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
@@ -116,7 +121,8 @@ class GroupLaw:
             elif isinstance(kind, SharpSampling) and kind.steps is not None:
                 told.append((i, c))
                 steps += zip(kind.points, kind.widths, kind.steps, strict=True)
-                line += (kind.constant, kind.slope)
+                line[0] += kind.constant
+                line[1] += kind.slope
             elif isinstance(kind, SharpSampling):
                 sharp.append((i, c))
                 where = singularities(kind)
@@ -126,23 +132,30 @@ class GroupLaw:
                 uniform.append((i, c))
                 if isinstance(kind, PolynomialSampling):
                     degree = max(degree, kind.degree)
-        total = np.zeros(max((len(p) for p in polynomials), default=0))
-        for p in polynomials:
-            total[: len(p)] += p
-        none = np.zeros(0)
+        total = np.array(polynomials[0] if len(polynomials) == 1 else _added(polynomials), dtype=float)
         return cls(
-            np.array(pieces, dtype=float).reshape(-1, 3),
+            np.array(pieces, dtype=float) if pieces else _NO_ROWS,
             total,
             tuple(sharp),
             tuple(uniform),
-            np.concatenate(points) if points else none,
-            np.concatenate(widths) if widths else none,
-            np.array(steps, dtype=float).reshape(-1, 3),
-            line,
+            np.concatenate(points) if points else _NONE,
+            np.concatenate(widths) if widths else _NONE,
+            np.array(steps, dtype=float) if steps else _NO_ROWS,
+            np.array(line),
             tuple(told),
             degree,
-            tuple(levels),
+            tuple([(i, kinds[i], numbers[i]) for i in group.members]),
         )
+
+
+def _added(polynomials: list[tuple[float, ...]]) -> list[float]:
+    """The sum of polynomials, by their coefficients."""
+    return [sum(parts) for parts in zip_longest(*polynomials, fillvalue=0.0)]
+
+
+@lru_cache(maxsize=64)
+def _zeros(count: int) -> NDArray[np.int64]:
+    return np.zeros(count, dtype=np.int64)
 
 
 class PackedLaws(NamedTuple):
@@ -156,8 +169,12 @@ class PackedLaws(NamedTuple):
     steps, step_owner, line
         Gap, width, stiffness of arctan steps (S, 3) and their directions (S,); constant and slope of the laws that they
         belong to, (G, 2).
+    step_first, places
+        Where each direction's steps begin, (G + 1,); gaps and widths of the steps, (S,) each.
     sampled
         Whether any direction has laws that need nodes of their own, arctan steps among them.
+    told
+        Whether arctan steps are all of these.
     """
 
     pieces: Array
@@ -167,7 +184,10 @@ class PackedLaws(NamedTuple):
     steps: Array
     step_owner: NDArray[np.int64]
     line: Array
+    step_first: NDArray[np.int64]
+    places: tuple[Array, Array]
     sampled: bool
+    told: bool
 
     @classmethod
     def of(cls, laws: list[GroupLaw]) -> PackedLaws:
@@ -177,34 +197,46 @@ class PackedLaws(NamedTuple):
             law = laws[0]
             return cls(
                 law.pieces,
-                np.zeros(len(law.pieces), dtype=np.int64),
+                _zeros(len(law.pieces)),
                 np.array((0, len(law.pieces))),
                 law.polynomial[None],
                 law.smooth_steps,
-                np.zeros(len(law.smooth_steps), dtype=np.int64),
+                _zeros(len(law.smooth_steps)),
                 law.line[None],
+                np.array((0, len(law.smooth_steps))),
+                law.told_places,
                 bool(law.told or law.sharp or law.uniform),
+                _only_told(laws),
             )
         number = np.arange(len(laws))
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
         for g, law in enumerate(laws):
             polynomial[g, : len(law.polynomial)] = law.polynomial
         counts = [len(law.pieces) for law in laws]
+        steps = np.concatenate([np.zeros((0, 3))] + [law.smooth_steps for law in laws])
         return cls(
             np.concatenate([np.zeros((0, 3))] + [law.pieces for law in laws]),
             np.repeat(number, counts),
             np.cumsum([0, *counts]),
             polynomial,
-            np.concatenate([np.zeros((0, 3))] + [law.smooth_steps for law in laws]),
+            steps,
             np.repeat(number, [len(law.smooth_steps) for law in laws]),
             np.array([law.line for law in laws]).reshape(-1, 2),
+            np.cumsum([0] + [len(law.smooth_steps) for law in laws]),
+            (steps[:, 0].copy(), steps[:, 1].copy()),
             any(law.told or law.sharp or law.uniform for law in laws),
+            _only_told(laws),
         )
 
     def nodes(self, high: int, top: int) -> Array:
         """Points on the circle for the polynomials, enough for their tangents: cosines and sines, (2, N)."""
         degree = self.polynomial.shape[1] - 1
         return on_circle(even(degree * high + top + 1)) if degree >= 0 else on_circle(0)
+
+
+def _only_told(laws: list[GroupLaw]) -> bool:
+    known = all(law.in_closed_form and (len(law.smooth_steps) > 0 or not law.told) for law in laws)
+    return known and any(law.told for law in laws)
 
 
 def add_sampled_spectra(

@@ -70,23 +70,32 @@ def spectra(values, zr, zi, top):
     (R, top + 1).
     """
     rows, n = values.shape
-    out = np.empty((rows, top + 1), dtype=np.complex128)
-    pr = np.ones(n)
-    pi = np.zeros(n)
+    out = np.zeros((rows, top + 1), dtype=np.complex128)
+    real, imaginary = np.empty(_STRETCH), np.empty(_STRETCH)
     scale = 1.0 / (2.0 * math.pi)
-    for q in range(top + 1):
-        for r in range(rows):
-            sr = 0.0
-            si = 0.0
-            for j in range(n):
-                sr += values[r, j] * pr[j]
-                si += values[r, j] * pi[j]
-            out[r, q] = complex(sr * scale, -si * scale)
-        if q < top:
-            for j in range(n):
-                t = pr[j] * zr[j] - pi[j] * zi[j]
-                pi[j] = pr[j] * zi[j] + pi[j] * zr[j]
-                pr[j] = t
+    for r in range(rows):
+        for begin in range(0, n, _STRETCH):
+            g, co, si = values[r, begin : begin + _STRETCH], zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH]
+            x, y = real[: g.shape[0]], imaginary[: g.shape[0]]
+            for j in range(g.shape[0]):
+                x[j] = g[j] * scale
+                y[j] = 0.0
+            # two harmonics at a time: what is between them stays in registers
+            for q in range(0, top + 1, 2):
+                sr = su = tr = tu = 0.0
+                for j in range(g.shape[0]):
+                    a, b, c, d = x[j], y[j], co[j], si[j]
+                    sr += a
+                    su += b
+                    e = a * c - b * d
+                    f = a * d + b * c
+                    tr += e
+                    tu += f
+                    x[j] = e * c - f * d
+                    y[j] = e * d + f * c
+                out[r, q] += complex(sr, -su)
+                if q < top:
+                    out[r, q + 1] += complex(tr, -tu)
     return out
 
 
@@ -229,20 +238,33 @@ def polynomial(coefficients, zr, zi):
     rows, count = coefficients.shape
     n = zr.shape[0]
     out = np.empty((rows, n), dtype=np.complex128)
-    pr = np.empty(n)
-    pi = np.empty(n)
+    real, imaginary = np.empty(_STRETCH), np.empty(_STRETCH)
     for r in range(rows):
-        pr[:] = coefficients[r, count - 1].real
-        pi[:] = coefficients[r, count - 1].imag
-        for k in range(count - 2, -1, -1):
-            a = coefficients[r, k].real
-            b = coefficients[r, k].imag
-            for j in range(n):
-                t = pr[j] * zr[j] - pi[j] * zi[j] + a
-                pi[j] = pr[j] * zi[j] + pi[j] * zr[j] + b
-                pr[j] = t
-        for j in range(n):
-            out[r, j] = complex(pr[j], pi[j])
+        c = coefficients[r]
+        for begin in range(0, n, _STRETCH):
+            co, si, found = zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH], out[r, begin : begin + _STRETCH]
+            x, y = real[: co.shape[0]], imaginary[: co.shape[0]]
+            a, b = c[count - 1].real, c[count - 1].imag
+            for j in range(x.shape[0]):
+                x[j] = a
+                y[j] = b
+            k = count - 2
+            while k > 0:
+                a, b, d, e = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
+                for j in range(x.shape[0]):
+                    t = x[j] * co[j] - y[j] * si[j] + a
+                    u = x[j] * si[j] + y[j] * co[j] + b
+                    x[j] = t * co[j] - u * si[j] + d
+                    y[j] = t * si[j] + u * co[j] + e
+                k -= 2
+            if k == 0:
+                a, b = c[0].real, c[0].imag
+                for j in range(x.shape[0]):
+                    t = x[j] * co[j] - y[j] * si[j] + a
+                    y[j] = x[j] * si[j] + y[j] * co[j] + b
+                    x[j] = t
+            for j in range(x.shape[0]):
+                found[j] = complex(x[j], y[j])
     return out
 
 

@@ -226,7 +226,7 @@ def _coefficient_change(local: LocalMotion, rates: Array) -> CoefficientChange:
     else:
         nodes = local.nodes()
         x, xd = kernels.motion(local.motion, nodes.zr, nodes.zi)
-    parts = local.element.coefficient_tangent(x, local.rate * xd, local.coefficients)
-    rows = np.array([(rates @ part) * nodes.weights for part in parts if part is not None])
+    parts = local.element.coefficient_change(x, local.rate * xd, local.coefficients, rates)
+    rows = np.array([part * nodes.weights for part in parts if part is not None])
     found = kernels.spectra(rows, nodes.zr, nodes.zi, local.top)
     return CoefficientChange(found[0], found[1], found[2] if len(found) > 2 else None)

@@ -206,7 +206,7 @@ def form_rates(
         left, right = state.balance.spread(left), state.balance.spread(right)
     for name in names:
         changes = changes_by(state, name)
-        direct = name in linear_names(state)
+        direct = name in state.balance.matrix_names
         if not (changes or direct):
             continue
         if not (kind is Kind.FREE or direct or any(change.damping is not None for _, change in changes)):
@@ -225,12 +225,6 @@ def form_rates(
         if block is not None:
             rates[name] += _form(u, block, v)
     return rates if kind is Kind.FREE else {name: complex(rate.real) for name, rate in rates.items()}
-
-
-def linear_names(state: BalanceState) -> frozenset[str]:
-    """Parameters that the linear part depends on."""
-    system = state.balance.system
-    return frozenset(system.mass.names | system.damping.names | system.stiffness.names)
 
 
 def _change_of_form(c: CoefficientChange, left: ComplexArray, right: ComplexArray, frequency: Array) -> complex:

@@ -84,20 +84,28 @@ def _add_group(left, right, mean, dofs, shape, zr, zi, uu, gx):
 
 
 @kernel()
-def add_doubled_form(waves, zr, zi, second, third, slope, out):
-    """Add `<f_uu p p>` in the integer basis and `<f_uuu p p p q>` along a direction to `out` (2 H + 2,).
+def add_doubled_form(p, q, dofs, shape, zr, zi, second, third, slope, by_two, by_three):
+    """Add `<f_uu p p>` in the integer basis, times the direction, to `by_two` (2 H + 1, n), and `<f_uuu p p p q>` to
+    `by_three` (1,).
 
-    waves (2, H + 1): amplitudes of p and q, `Re sum_k c_k exp(i (k + 1/2) tau)`; the rest as in `closed_bends`.
+    p, q (2 H + 2, n): vectors of the half-odd basis, q a left one; dofs, shape: where the direction is not zero, and
+    its entries there; the rest as in `closed_bends`.
     """
-    high = waves.shape[1] - 1
+    high = by_two.shape[0] // 2
     n = zr.shape[0]
+    waves = np.zeros((2, high + 1), dtype=np.complex128)
+    for s in range(dofs.shape[0]):
+        d = dofs[s]
+        for k in range(high + 1):
+            waves[0, k] += shape[s] * complex(p[2 * k, d], -p[2 * k + 1, d])
+            waves[1, k] += 2.0 * shape[s] * complex(q[2 * k, d], -q[2 * k + 1, d])
     values = half_odd_values(waves, zr, zi)
     square = np.empty((1, n))
     total = 0.0
     for j in range(n):
-        p = values[0, j]
-        square[0, j] = second[j] * p * p
-        total += third[j] * p * p * p * values[1, j]
+        u = values[0, j]
+        square[0, j] = second[j] * u * u
+        total += third[j] * u * u * u * values[1, j]
     if slope.shape[0] > 0:
         turned = np.empty_like(waves)
         for k in range(high + 1):
@@ -105,14 +113,16 @@ def add_doubled_form(waves, zr, zi, second, third, slope, out):
                 turned[r, k] = complex(-(k + 0.5) * waves[r, k].imag, (k + 0.5) * waves[r, k].real)
         rates = half_odd_values(turned, zr, zi)
         for j in range(n):
-            p, q = values[0, j], values[1, j]
-            total += slope[j] * p * p * (3.0 * rates[0, j] * q + p * rates[1, j])
+            u, v = values[0, j], values[1, j]
+            total += slope[j] * u * u * (3.0 * rates[0, j] * v + u * rates[1, j])
     found = spectra(square, zr, zi, high)
-    out[0] += found[0, 0].real
-    for k in range(1, high + 1):
-        out[2 * k - 1] += 2.0 * found[0, k].real
-        out[2 * k] -= 2.0 * found[0, k].imag
-    out[2 * high + 1] += total / (2.0 * math.pi)
+    for s in range(dofs.shape[0]):
+        d = dofs[s]
+        by_two[0, d] += shape[s] * found[0, 0].real
+        for k in range(1, high + 1):
+            by_two[2 * k - 1, d] += 2.0 * shape[s] * found[0, k].real
+            by_two[2 * k, d] -= 2.0 * shape[s] * found[0, k].imag
+    by_three[0] += total / (2.0 * math.pi)
 
 
 @kernel()

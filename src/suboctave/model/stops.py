@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -114,7 +114,7 @@ class ElasticStop(Element):
             slope = c[0] * self._contact(u, c)
             return slope * (u - c[1]), slope, None
         k, b, s = c
-        force, slope = _kernel()(np.ascontiguousarray(u), k, b, s, self._sign, self._at_rest(b, s))
+        force, slope = _kernels().regularised_tangent(np.ascontiguousarray(u), k, b, s, self._sign, self._at_rest(b, s))
         return force, slope, None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
@@ -136,14 +136,24 @@ class ElasticStop(Element):
             contact = self._contact(u, c)
             f_c = np.array([contact * (u - c[1]), -c[0] * contact])
             return f_c, np.array([contact, np.zeros_like(u)]), None
+        f_c, f_uc = _kernels().regularised_rates(np.ascontiguousarray(u), *self._numbers(c))
+        return f_c, f_uc, None
+
+    def coefficient_change(self, u: Array, v: Array, c: Array, rates: Array) -> tuple[Array, Array, Array | None]:
+        """See `Element.coefficient_change`."""
+        if not self.regularised:
+            return super().coefficient_change(u, v, c, rates)
+        force, slope = _kernels().regularised_change(np.ascontiguousarray(u), *self._numbers(c), rates)
+        return force, slope, None
+
+    def _numbers(self, c: Array) -> tuple[float, ...]:
+        """Stiffness, gap, sharpness and side, the constant that makes the force right at `u = 0`, and what it adds to
+        the derivatives by gap and sharpness per unit of stiffness.
+        """
         k, b, s = c.tolist()
         sign = self._sign
-        # what the constant that makes the force right at u = 0 adds
         by_gap = sign * (0.5 - math.atan(s * b) / math.pi) - (1.0 if sign * b < 0.0 else 0.0)
-        f_c, f_uc = _rates_kernel()(
-            np.ascontiguousarray(u), k, b, s, sign, self._at_rest(b, s), by_gap, -sign * _phi_s(-b, s)
-        )
-        return f_c, f_uc, None
+        return k, b, s, sign, self._at_rest(b, s), by_gap, -sign * float(_phi_s(-b, s))
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
@@ -176,17 +186,10 @@ class ElasticStop(Element):
 
 
 @functools.cache
-def _kernel() -> Callable[..., tuple[Array, Array]]:
-    from suboctave.model.stop_kernel import regularised_tangent
+def _kernels() -> Any:
+    from suboctave.model import stop_kernel
 
-    return regularised_tangent
-
-
-@functools.cache
-def _rates_kernel() -> Callable[..., tuple[Array, Array]]:
-    from suboctave.model.stop_kernel import regularised_rates
-
-    return regularised_rates
+    return stop_kernel
 
 
 def _phi(y: float, s: float) -> float:

@@ -5,6 +5,7 @@ call (the common small case, in which the calls would cost more than what they d
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -19,19 +20,41 @@ from suboctave.stability.panels import _filled, _panels, closed_changes, longest
 from suboctave.stability.passages import events_along
 from suboctave.stability.single import corrected_single, standing_single
 
-_NO_PASSAGE = np.zeros((2, 0))
+
+@kernel()
+def _passed(c, points, widths, step_first, reach, grid):
+    """The instants at which the motion passes arctan steps, as `singular_instants` has them: direction by direction."""
+    found = np.empty((2, 0))
+    for g in range(c.shape[0]):
+        low, high = step_first[g], step_first[g + 1]
+        if high == low:
+            continue
+        more = singular_instants(c[g], points[low:high], widths[low:high], reach, grid[0], grid[1])
+        before = found
+        count = before.shape[1]
+        found = np.empty((2, count + more.shape[1]))
+        for i in range(2):
+            for k in range(found.shape[1]):
+                found[i, k] = before[i, k] if k < count else more[i, k - count]
+    return found
 
 
 @kernel()
 def _multipliers(
-    c, f, rate, pieces, owner, polynomial, steps, step_owner, line, passed, longest, grid, nodes, silent, moving, shape,
-    matrices, tables, between, largest, weight, mu, shift, before,
+    c, f, rate, pieces, owner, polynomial, steps, step_owner, line, points, widths, step_first, degree, grid, nodes,
+    silent, moving, shape, matrices, tables, between, largest, weight, mu, shift, before,
 ):  # fmt: skip
     """Fill `mu`, `shift` and `before`, (2,) each, as `single` has them; returns the share of the correction taken.
 
-    silent: whether the force that the motion leaves unbalanced is left out. Other arguments: see `panels.lay_out` and
-    `single.standing_single`; scaled by `1 / rate`.
+    points, widths, step_first: as `evaluation.evaluate_told` has them, or None without steps; degree: of the tangent,
+    as a polynomial in the motion; silent: whether the force that the motion leaves unbalanced is left out. Other
+    arguments: see `panels.lay_out` and `single.standing_single`; scaled by `1 / rate`.
     """
+    longest = longest_panel(c, degree)
+    if points is None:
+        passed = np.empty((2, 0))
+    else:
+        passed = _passed(c, points, widths, step_first, longest, grid)
     events = events_along(c, pieces, owner, passed, grid[0], grid[1])
     panels, start = _panels(events, longest)
     stretch, path, law, base = _filled(c, f, rate, pieces, owner, polynomial, steps, step_owner, line, panels, nodes)
@@ -54,9 +77,6 @@ def _multipliers(
     return factor
 
 
-#: what the call above is made of: compiled one by one before it is, so that nobody waits for all of it at one go
-
-
 class ClosedSingle:
     """Multipliers of a motion of one DOF whose laws are known in closed form (`applies`).
 
@@ -71,18 +91,8 @@ class ClosedSingle:
         self.state, self.silent, self.largest = state, silent, largest
         self.laws = laws = balance.packed_laws(state.values)[0]
         degree = max(laws.polynomial.shape[1] - 2, 1 if len(laws.steps) else 0)
-        self.varying = degree > 0
-        self.longest = longest_panel(state.motions, degree)
-        self.passed = _NO_PASSAGE
-        if len(laws.steps):
-            grid = balance.grid
-            told = zip(balance.coefficients(state.values)[2], state.motions, strict=True)
-            found = [
-                singular_instants(motion, *law.told_places, self.longest, grid[0], grid[1])
-                for law, motion in told
-                if len(law.smooth_steps)
-            ]
-            self.passed = found[0] if len(found) == 1 else np.concatenate(found, axis=1)
+        self.varying, self.degree = degree > 0, degree
+        self.passed: tuple[Any, Any, Any] = (*laws.places, laws.step_first) if len(laws.steps) else (None, None, None)
         self.before: ComplexArray = np.empty(2, dtype=complex)
 
     @staticmethod
@@ -115,8 +125,8 @@ class ClosedSingle:
             laws.steps,
             laws.step_owner,
             laws.line,
-            self.passed,
-            self.longest,
+            *self.passed,
+            self.degree,
             balance.grid,
             NODES,
             self.silent,

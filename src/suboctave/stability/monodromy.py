@@ -54,12 +54,12 @@ def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetR
     """
     motion = _linearised(state, corrected)
     mu, shift, share = motion.multipliers(1.0)
-    sizes = np.abs(mu)
-    largest = max(1.0, float(sizes[0]))
-    distances = np.abs(1.0 - mu)
-    nearest = int(distances.argmin())
+    # there are few: numbers are quicker than arrays
+    values = mu.tolist()
+    largest = max(1.0, abs(values[0]))
+    distance, nearest = min((abs(1.0 - value), i) for i, value in enumerate(values))
     moved = float(shift[nearest]) / share if share > 0.0 else math.inf
-    if moved > _DOUBTFUL * distances[nearest]:
+    if moved > _DOUBTFUL * distance:
         mu, shift, share = _beside_fold(motion, moved, shift)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf

@@ -12,9 +12,9 @@ from suboctave.timedomain.lanes import HEADER, MOST_UNROLLED, Lanes, Rows, add_a
 from suboctave.timedomain.laws import AskedLaw, Names
 from suboctave.timedomain.structure import Structure
 
-__all__ = ["adaptive_rows", "adaptive_source"]
+__all__ = ["IMPORT", "Writer", "adaptive_rows", "adaptive_source"]
 
-_IMPORT = "from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control\n"
+IMPORT = "from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control\n"
 _DRIVER = """
 @njit(cache=True, nogil=True, error_model="numpy")
 def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks, measure):
@@ -51,12 +51,14 @@ def adaptive_rows(structure: Structure, lanes: int) -> Rows:
 def adaptive_source(structure: Structure, lanes: int) -> str:
     """The module that integrates `lanes` trajectories of this structure."""
     decorator = '@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})'
-    begin, attempt = _Writer(structure, lanes).begin(), _Writer(structure, lanes).attempt()
+    begin, attempt = Writer(structure, lanes).begin(), Writer(structure, lanes).attempt()
     driver = _DRIVER.format(lanes=lanes, n=structure.n, corners=structure.corners)
-    return f"{HEADER}{_IMPORT}\n\n{decorator}\n{begin}\n\n\n{decorator}\n{attempt}\n\n{driver}"
+    return f"{HEADER}{IMPORT}\n\n{decorator}\n{begin}\n\n\n{decorator}\n{attempt}\n\n{driver}"
 
 
-class _Writer:
+class Writer:
+    """Writes the functions of the module; `tangent_code` adds to them."""
+
     def __init__(self, structure: Structure, lanes: int) -> None:
         self.structure = structure
         self.n, self.m, self.k = structure.n, len(structure.channels), len(structure.outputs)
@@ -164,12 +166,12 @@ class _Writer:
                 code.each(lines)
                 code.each([f"{z('g1', placed.corner + i)} = {margin}", f"{z('dg1', placed.corner + i)} = {rate}"])
 
-    def _rate(self) -> None:
-        """The rate of the trial state."""
-        n, k, z, code, structure = self.n, self.k, self.z, self.code, self.structure
+    def _forces(self) -> None:
+        """The forces of the laws at the trial state."""
+        z, code, structure = self.z, self.code, self.structure
         code.each(self._states())
         self._ask()
-        forces: list[list[str]] = [[] for _ in range(k)]
+        forces: list[list[str]] = [[] for _ in range(self.k)]
         asked = 0
         for e, placed in enumerate(structure.laws):
             if isinstance(placed.law, AskedLaw):
@@ -180,7 +182,12 @@ class _Writer:
             lines, force = placed.law.force(self._names(e))
             code.each(lines)
             forces[placed.output].append(force)
-        code.each([f"{z('F', o)} = {' + '.join(forces[o])}" for o in range(k)])
+        code.each([f"{z('F', o)} = {' + '.join(forces[o])}" for o in range(self.k)])
+
+    def _rate(self) -> None:
+        """The rate of the trial state."""
+        n, k, z, code, structure = self.n, self.k, self.z, self.code, self.structure
+        self._forces()
         waves: list[str] = []
         angles: set[int] = set()
         for harmonic, sine in structure.waves:

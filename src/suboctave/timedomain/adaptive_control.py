@@ -28,12 +28,12 @@ ERROR_3, ERROR_5 = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.
 FIELDS = (
     "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "h", "next", "t", "period",
     "omega", "sample", "slot", "left", "tries", "stuck", "failed", "peak", "calm", "weight",
-    "crest", "turning", "spent",
+    "crest", "turning", "spent", "accepted", "extra",
 )  # fmt: skip
 (
     _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _H, _NEXT, _T, _PERIOD, _OMEGA, _SAMPLE,
     _SLOT, _LEFT, _TRIES, _STUCK, _FAILED, _PEAK, _CALM, _WEIGHT, _CREST,
-    _TURNING, _SPENT,
+    _TURNING, _SPENT, _ACCEPTED, _EXTRA,
 ) = range(len(FIELDS))  # fmt: skip
 _SHRINK, _GROW, _SAFETY = 0.3, 6.0, 0.9
 #: a corner is reached when it is this share of a period away, or after so many trials
@@ -163,6 +163,7 @@ def _fail(z, at, l, lanes, n):
 @njit(cache=True, error_model="numpy")
 def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, measure):
     """Judge the trial step of lane l and choose the next one. Returns 1 when the trajectory is complete."""
+    z[at[_ACCEPTED] * lanes + l] = 0.0
     if z[at[_LEFT] * lanes + l] <= 0.0:
         return 1
     h, period = z[at[_H] * lanes + l], z[at[_PERIOD] * lanes + l]
@@ -171,7 +172,7 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
         _fail(z, at, l, lanes, n)
         return 1
     t = z[at[_T] * lanes + l]
-    error = _error(z, at, l, lanes, n) / tolerance
+    error = max(_error(z, at, l, lanes, n), z[at[_EXTRA] * lanes + l]) / tolerance
     if not error <= 1.0:
         share = _SHRINK if not error < 1e30 else max(_SHRINK, _SAFETY * error**-0.125)
         h *= share
@@ -226,7 +227,7 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
             z[at[_H] * lanes + l] = h * share
             z[at[_TURNING] * lanes + l] = 1.0
             return 0
-    # accepted
+    z[at[_ACCEPTED] * lanes + l] = 1.0
     z[at[_TURNING] * lanes + l] = 0.0
     z[at[_TRIES] * lanes + l] = 0.0
     z[at[_STUCK] * lanes + l] = 0.0

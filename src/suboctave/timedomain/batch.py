@@ -27,6 +27,7 @@ from suboctave.timedomain.adaptive import AdaptiveGroup, AdaptiveKernel
 from suboctave.timedomain.asked import Answers
 from suboctave.timedomain.newmark import NewmarkGroup, NewmarkKernel
 from suboctave.timedomain.structure import Numbers, Structure
+from suboctave.timedomain.tangent import TangentGroup, TangentKernel
 
 __all__ = ["METHODS", "Flow", "Motions", "Report"]
 
@@ -57,6 +58,11 @@ class Motions:
         (B,): steps of Newmark's method whose equations were not solved to the tolerance.
     finished
         (B,): whether the trajectory was followed to its end; not all are where the user interrupted (Ctrl-C).
+    growth
+        (B, S, k + 1): of a flow with k tangent vectors, the logarithms by which they grew since the instant before,
+        then that by which the volume of states did.
+    tangents
+        (B, 2n, k): the tangent vectors at the end, as columns.
     """
 
     states: Array
@@ -65,6 +71,8 @@ class Motions:
     failed: NDArray[np.bool_]
     unsettled: Array
     finished: NDArray[np.bool_]
+    growth: Array | None = None
+    tangents: Array | None = None
 
 
 class Flow:
@@ -83,6 +91,11 @@ class Flow:
     lanes
         Trajectories that run side by side; default what suits large batches. Few of them waste less with 8. Results
         with different numbers may differ in the last bit.
+    tangents
+        Vectors that are carried along by the derivative of the flow, 0 to 2n; "accurate" only. They are kept
+        orthonormal, with weights `omega sqrt(M_ii)` of displacements and `sqrt(M_ii)` of velocities.
+    transition
+        Leave them as they come, from unit vectors: with 2n of them, the state-transition matrix.
     """
 
     def __init__(
@@ -93,6 +106,8 @@ class Flow:
         steps_per_period: int = 1000,
         tolerance: float | None = None,
         lanes: int | None = None,
+        tangents: int = 0,
+        transition: bool = False,
     ) -> None:
         if method not in METHODS:
             raise InputError(f"method={method!r}{suggest(str(method), METHODS)}")
@@ -106,7 +121,11 @@ class Flow:
         self.system, self.method, self.samples = system, method, samples
         self.structure = Structure(system)
         self.kernel: NewmarkKernel | AdaptiveKernel
-        if method == "newmark":
+        if tangents:
+            if method != "accurate" or not 0 < tangents <= 2 * system.n:
+                raise InputError(f'tangents={tangents}: from 1 to {2 * system.n} of them, with method="accurate"')
+            self.kernel = TangentKernel(self.structure, samples, tolerance, tangents, transition, lanes)
+        elif method == "newmark":
             self.kernel = NewmarkKernel(self.structure, steps, tolerance, lanes)
         else:
             self.kernel = AdaptiveKernel(self.structure, samples, tolerance, lanes)
@@ -235,6 +254,10 @@ class _Run:
         self.failed = np.zeros(count, dtype=bool)
         self.unsettled = np.zeros(count)
         self.finished = np.zeros(count, dtype=bool)
+        self.growth = self.tangents = None
+        if isinstance(flow.kernel, TangentKernel):
+            self.growth = np.full((count, total - skip, flow.kernel.count + 1), np.nan)
+            self.tangents = np.full((count, 2 * n, flow.kernel.count), np.nan)
         lanes = flow.kernel.lanes
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
@@ -254,7 +277,9 @@ class _Run:
         if self.answers.failure is not None:
             raise self.answers.failure
         self.failed |= self.finished & ~np.isfinite(self.end).all(axis=1)
-        return Motions(self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished)
+        return Motions(
+            self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished, self.growth, self.tangents
+        )
 
     def _together(self, many: int, report: Report | None) -> None:
         self._compile()
@@ -291,6 +316,8 @@ class _Run:
         if isinstance(kernel, NewmarkKernel):
             return NewmarkGroup(kernel, self.rows, states, which, self.answers.address)
         sizes = self.flow.structure.sizes(self.numbers, states, which)
+        if isinstance(kernel, TangentKernel):
+            return TangentGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address, alive)
         group = AdaptiveGroup(kernel, self.rows, states, which, sizes, self.total, self.answers.address, alive)
         if self.first is not None:
             group.begin_at(self.first[members])
@@ -305,6 +332,8 @@ class _Run:
         kept = self.total - self.skip
         out = np.full((kept, 2 * n, lanes), np.nan)
         peaks = np.full((kept, n, lanes), np.nan) if self.measure else None
+        if isinstance(group, TangentGroup):
+            group.grown = np.full((kept, group.kernel.count + 1, lanes), np.nan)
         if isinstance(group, NewmarkGroup):
             self._by_steps(group, g, out, peaks, report)
         else:
@@ -318,6 +347,9 @@ class _Run:
         if self.peaks is not None and peaks is not None:
             self.peaks[here] = peaks.transpose(2, 0, 1)[own]
         self.end[here] = group.states()[own]
+        if self.growth is not None and self.tangents is not None and isinstance(group, TangentGroup):
+            self.growth[here] = group.grown.transpose(2, 0, 1)[own]
+            self.tangents[here] = group.tangents()[own]
         if isinstance(group, NewmarkGroup):
             self.unsettled[here] = group.unsettled()[own]
         else:

@@ -50,7 +50,8 @@ def _ground() -> bytes:
     """What the meaning of every generated text depends on: versions, and the functions that it calls."""
     import numba
 
-    called = [Path(__file__).with_name(name).read_bytes() for name in ("elementary.py", "adaptive_control.py")]
+    names = ("elementary.py", "adaptive_control.py", "tangent_control.py")
+    called = [Path(__file__).with_name(name).read_bytes() for name in names]
     return b"\0".join([__version__.encode(), numba.__version__.encode(), *called])
 
 

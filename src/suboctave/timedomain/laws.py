@@ -71,6 +71,10 @@ class LawText(ABC):
         told = self.tangent(names)
         return told.lines, told.force
 
+    def frozen(self, names: Names) -> Tangent:
+        """`force`, with its derivatives while no flag changes."""
+        return self.tangent(names)
+
     def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
         """Lines of code, then what changes sign at corner i, and its rate."""
         raise IndexError(i)
@@ -157,6 +161,10 @@ class PiecesLaw(LawText):
         u, c = names.q[0], names.number
         return [], " + ".join(f"{names.on(i)} * {c(2 * i)} * ({u} - {c(2 * i + 1)})" for i in range(self.corners))
 
+    def frozen(self, names: Names) -> Tangent:
+        slope = " + ".join(f"{names.on(i)} * {names.number(2 * i)}" for i in range(self.corners))
+        return Tangent(*self.force(names), [slope], [""])
+
     def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
         sign = "" if self.sides[i] > 0 else "-"
         return [], f"{sign}({names.q[0]} - {names.number(2 * i + 1)})", f"{sign}{names.r[0]}"
@@ -176,6 +184,10 @@ class QuadraticLaw(LawText):
 
     def force(self, names: Names) -> tuple[list[str], str]:
         return [], f"(2.0 * {names.on(0)} - 1.0) * {names.number(0)} * {names.r[0]} * {names.r[0]}"
+
+    def frozen(self, names: Names) -> Tangent:
+        slope = f"(2.0 * {names.on(0)} - 1.0) * 2.0 * {names.number(0)} * {names.r[0]}"
+        return Tangent(*self.force(names), [""], [slope])
 
     def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
         return [], names.r[0], names.a[0]
@@ -227,19 +239,29 @@ class WrittenLaw(LawText):
         return self.law.scalar_code(parts, self._states(names), names.number, names.prefix, flags or {})
 
     def tangent(self, names: Names) -> Tangent:
-        f = self.law.expression
-        lines, (force, *slopes) = self._code([f, *(f.diff(a) for a in self.law.q)], names)
+        return self._tangent(self.law.expression, names, {})
+
+    def force(self, names: Names) -> tuple[list[str], str]:
+        lines, parts = self._code(*self._frozen(names))
+        return lines, parts[0]
+
+    def frozen(self, names: Names) -> Tangent:
+        (expression,), _, flags = self._frozen(names)
+        return self._tangent(expression, names, flags)
+
+    def _tangent(self, f: Any, names: Names, flags: dict[str, str]) -> Tangent:
+        lines, (force, *slopes) = self._code([f, *(f.diff(a) for a in self.law.q)], names, flags)
         count = self.law.count
         return Tangent(lines, force, slopes[:count], slopes[count:] if self.moving else [""] * count)
 
-    def force(self, names: Names) -> tuple[list[str], str]:
+    def _frozen(self, names: Names) -> tuple[list[Any], Names, dict[str, str]]:
+        """The expression with flags for what lies beyond its corners, and the code of the flags."""
         import sympy
 
         from suboctave.model.law_syntax import corner_functions
 
         if self.law.rough:  # a power of a half that begins at a corner does not go on beyond it
-            lines, parts = self._code([self.law.expression], names)
-            return lines, parts[0]
+            return [self.law.expression], names, {}
         corner = corner_functions()
         swaps: dict[Any, Any] = {}
         flags: dict[str, str] = {}
@@ -248,8 +270,7 @@ class WrittenLaw(LawText):
             flags[on.name] = names.on(i)
             swaps |= {corner.Ramp(a): a * on, corner.Step(a): on}
             swaps |= {corner.Modulus(a): a * (2 * on - 1), corner.Sign(a): 2 * on - 1}
-        lines, parts = self._code([self.law.expression.xreplace(swaps)], names, flags)
-        return lines, parts[0]
+        return [self.law.expression.xreplace(swaps)], names, flags
 
     def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
         place = self.places[i]

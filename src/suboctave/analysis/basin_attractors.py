@@ -1,0 +1,239 @@
+"""The attractors whose basins are looked for: those that are given, and those that trajectories find."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.analysis.attractors import Attractor
+from suboctave.analysis.branch import Branch
+from suboctave.analysis.tree import BifurcationDiagram
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.element import Array
+from suboctave.model.system import System
+from suboctave.timedomain.batch import Flow
+from suboctave.timedomain.recognition import extents, same_cycle
+from suboctave.timedomain.shooting import PeriodicSolution, shoot
+from suboctave.timedomain.trapping import Trap, traps_about
+
+__all__ = ["BasinAttractor", "Catalogue", "given_attractors"]
+
+#: relative distance below which two periodic motions are the same
+_SAME = 1e-5
+#: by how much points that have repeated may still be away from the motion that shooting finds
+_ROUGHLY = 1e-2
+#: what a motion that is given may differ in frequency and parameters
+_NEAR = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class BasinAttractor:
+    """A stable periodic motion that basins belong to.
+
+    Attributes
+    ----------
+    name
+        As given, or from its period: "T", "2T", "2T (2)".
+    period
+        In periods of the load.
+    points
+        (period, 2n): its states at phase 0 of the load.
+    amplitude
+        Largest |x| of the observed degree of freedom.
+    multipliers
+        Over its period, by shooting.
+    given
+        Whether it was given, or found.
+    radius
+        Of its trapping neighbourhoods, relative to the motion's size in their norm; 0 if there are none.
+    """
+
+    name: str
+    period: int
+    points: Array
+    amplitude: float
+    multipliers: NDArray[np.complex128]
+    given: bool
+    traps: list[Trap] = field(default_factory=list, repr=False)
+
+    @property
+    def state(self) -> Array:
+        """A state (2n,) at phase 0 of the load."""
+        return self.points[0]
+
+    @property
+    def radius(self) -> float:
+        """The smallest radius of its trapping neighbourhoods."""
+        return min((trap.radius for trap in self.traps), default=0.0)
+
+    def __repr__(self) -> str:
+        return f"BasinAttractor({self.name!r}, max|x|={self.amplitude:.8g}, {'given' if self.given else 'found'})"
+
+
+class Catalogue:
+    """The attractors known so far, at one frequency and one set of parameters."""
+
+    def __init__(
+        self, system: System, omega: float, values: Mapping[str, float], observe: int, tolerance: float,
+        workers: int | None,
+    ) -> None:  # fmt: skip
+        self.system, self.omega, self.values, self.observe = system, omega, values, observe
+        self.tolerance, self.workers = tolerance, workers
+        self.known: list[BasinAttractor] = []
+        self._sizes: list[Array] = []
+
+    def find(self, points: Array) -> int | None:
+        """The number of the one with these stroboscopic points (n, 2n), to a hundred thousandth of its size."""
+        for i, one in enumerate(self.known):
+            if same_cycle(one.points, points, self._sizes[i], _SAME):
+                return i
+        return None
+
+    def near(self, number: int, points: Array) -> bool:
+        """Whether these stroboscopic points are those of that one, roughly."""
+        return same_cycle(self.known[number].points, points, self._sizes[number], _ROUGHLY)
+
+    def add(self, state: Array, period: int, name: str | None, given: bool) -> int | None:
+        """Enter the motion near a state, found by shooting: its number, None if there is no stable one."""
+        try:
+            solution = shoot(self.system, state, self.omega, period, self.values, observe=self.observe)
+        except ConvergenceError:
+            return None
+        if not solution.stable:
+            return None
+        points, sizes = self._cycle(solution)
+        for shorter in range(1, period):
+            if period % shorter == 0 and same_cycle(np.roll(points, shorter, axis=0)[:1], points[:1], sizes, _SAME):
+                return self.add(solution.state, shorter, name, given)
+        known = self.find(points)
+        if known is None:
+            self.enter(self._name(name, period), points, solution.amplitude, solution.multipliers, given, sizes)
+            return len(self.known) - 1
+        if given and not self.known[known].given and name:
+            self.known[known] = replace(self.known[known], name=self._name(name, period), given=True)
+        return known
+
+    def enter(
+        self,
+        name: str,
+        points: Array,
+        amplitude: float,
+        multipliers: NDArray[np.complex128],
+        given: bool,
+        sizes: Array | None = None,
+    ) -> None:
+        """Enter a motion that is known to be one, and look for its neighbourhoods."""
+        if sizes is None:
+            sizes = self._extents(points)
+        traps = traps_about(
+            self.system, points, self.omega, self.values, sizes, max(self.tolerance, 1e-8), self.workers
+        )
+        self.known.append(BasinAttractor(name, len(points), points, amplitude, multipliers, given, traps))
+        self._sizes.append(sizes)
+
+    def trapped(self, states: Array) -> NDArray[np.int_]:
+        """For every state (B, 2n) the number of the attractor that it is trapped by, -1 if by none."""
+        out = np.full(len(states), -1)
+        for i, one in enumerate(self.known):
+            for trap in one.traps:
+                out[(out < 0) & trap.holds(states)] = i
+        return out
+
+    def _cycle(self, solution: PeriodicSolution) -> tuple[Array, Array]:
+        flow = Flow(self.system, "accurate", tolerance=1e-12)
+        motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1)
+        points = np.vstack([solution.state[None], motions.states[0][:-1]])
+        return points, self._extents(points)
+
+    def _extents(self, points: Array) -> Array:
+        flow = Flow(self.system, "accurate", tolerance=1e-10)
+        motions = flow.over(points[0], self.omega, len(points), self.values, measure=True, workers=1)
+        assert motions.peaks is not None
+        mass = np.diagonal(self.system.mass.value({**self.system.parameters, **self.values}))
+        return extents(motions.peaks[0].max(axis=0), self.omega, mass)
+
+    def _name(self, name: str | None, period: int) -> str:
+        """A name that no other one has."""
+        base = name or ("T" if period == 1 else f"{period}T")
+        taken = {one.name for one in self.known}
+        return next(
+            name
+            for name in (base if k == 1 else f"{base} ({k})" for k in range(1, len(taken) + 2))
+            if name not in taken
+        )
+
+
+def given_attractors(catalogue: Catalogue, given: Any) -> None:
+    """Enter what a user gives: motions, attractors, branches, diagrams; one, several, or by name."""
+    if given is None:
+        return
+    named: list[tuple[str | None, Any]]
+    if isinstance(given, Mapping):
+        named = [(str(name), one) for name, one in given.items()]
+    elif isinstance(given, PeriodicOrbit | Attractor | PeriodicSolution | Branch | BifurcationDiagram):
+        named = [(None, given)]
+    elif isinstance(given, Iterable):
+        named = [(None, one) for one in given]
+    else:
+        raise InputError(f"attractors={given!r}: give motions, branches or diagrams, in a sequence or by name")
+    for name, one in named:
+        if isinstance(one, BifurcationDiagram):
+            found = [motion for branch in one.branches for motion in _crossings(catalogue, branch)]
+        elif isinstance(one, Branch):
+            found = _crossings(catalogue, one)
+        else:
+            found = [_motion(catalogue, one)]
+        entered = {number for state, nu in found if (number := catalogue.add(state, nu, name, True)) is not None}
+        if not entered:
+            raise InputError(
+                f"attractors: {name or repr(one)} has no stable motion at omega={catalogue.omega:g} and "
+                "these parameters"
+            )
+
+
+def _motion(catalogue: Catalogue, one: Any) -> tuple[Array, int]:
+    """State and period of a motion, if it is one at this frequency and with these parameters."""
+    if isinstance(one, PeriodicOrbit):
+        state, nu, parameters = one.start(), one.basis.nu, one.values
+    elif isinstance(one, PeriodicSolution):
+        state, nu, parameters = one.state, one.periods, one.parameters
+    elif isinstance(one, Attractor):
+        if not one.period:
+            raise InputError(f"attractors: {one!r} is not periodic; what is not is told as such by itself")
+        state, nu, parameters = one.state, one.period, one.parameters
+    else:
+        raise InputError(f"attractors: {type(one).__name__} is no motion, branch or diagram")
+    wanted = {**catalogue.system.parameters, **catalogue.values, "omega": catalogue.omega}
+    has = {**parameters, "omega": one.omega}
+    for name, value in wanted.items():
+        if name in has and abs(has[name] - value) > _NEAR * max(abs(value), 1e-300):
+            raise InputError(f"attractors: {one!r} has {name}={has[name]:.9g}, not {value:.9g}")
+    return np.asarray(state, dtype=float), int(nu)
+
+
+def _crossings(catalogue: Catalogue, branch: Branch) -> list[tuple[Array, int]]:
+    """States and periods of a branch where it passes these parameters: between its points, or at them."""
+    wanted = {**catalogue.system.parameters, **catalogue.values, "omega": catalogue.omega}
+    orbits: Sequence[PeriodicOrbit] = branch.orbits
+    if not orbits:
+        return []
+    for name, value in wanted.items():
+        if name != branch.name and name in {**orbits[0].values, "omega": 0.0}:
+            has = orbits[0].omega if name == "omega" else orbits[0].values[name]
+            if abs(has - value) > _NEAR * max(abs(value), 1e-300):
+                return []
+    at = np.asarray(branch.parameter(branch.name), dtype=float) - wanted[branch.name]
+    found = []
+    for i in range(len(at) - 1):
+        if at[i] == 0.0 or at[i] * at[i + 1] < 0.0:
+            share = at[i] / (at[i] - at[i + 1]) if at[i] != at[i + 1] else 0.0
+            first, second = orbits[i].start(), orbits[i + 1].start()
+            found.append((first + share * (second - first), orbits[i].basis.nu))
+    if len(at) and at[-1] == 0.0:
+        found.append((orbits[-1].start(), orbits[-1].basis.nu))
+    return found

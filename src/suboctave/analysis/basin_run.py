@@ -1,0 +1,221 @@
+"""The work behind `basins`: states are followed until they are trapped, chunk by chunk, and kept as they come.
+
+What is known after a chunk depends on the chunks before it only; a run that goes on from a journal therefore ends as
+one that was never stopped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.analysis.attractors import attractor_of
+from suboctave.analysis.basin_attractors import Catalogue
+from suboctave.errors import InputError
+from suboctave.model.description import describe
+from suboctave.model.element import Array
+from suboctave.store.journal import Journal
+from suboctave.store.plain import from_json, to_json
+from suboctave.timedomain.batch import Flow, Report
+
+__all__ = ["APERIODIC", "GONE", "OPEN", "BasinRun"]
+
+APERIODIC, GONE, OPEN = -1, -2, -3
+#: states followed together; cells of the coarse sample along each side; stopped trajectories that are followed on
+_CHUNK, _COARSE, _FOLLOWED = 4096, 8, 200
+#: periods between two looks at where the trajectories are, early and late
+_EARLY, _LATE, _LONG = 8, 16, 64
+#: periods in which a trajectory that was not trapped is looked at
+_LOOKED_AT = 60
+
+
+class BasinRun:
+    """States (B, 2n) of a grid, and what is known of them: `labels` and `settling` (B,)."""
+
+    def __init__(
+        self, catalogue: Catalogue, states: Array, counts: tuple[int, int], periods: int, period_tolerance: float
+    ) -> None:
+        self.catalogue, self.states, self.counts = catalogue, states, counts
+        self.periods, self.period_tolerance = periods, period_tolerance
+        self.flow = Flow(catalogue.system, "accurate", tolerance=catalogue.tolerance)
+        self.labels = np.full(len(states), OPEN)
+        self.settling = np.zeros(len(states), dtype=int)
+        self.followed = self.contradicted = 0
+        self.journal: Journal | None = None
+        self._next = 0
+        self._audited = False
+
+    # --------------------------------------------------------------------------------------------------- journal
+    def open(self, keep: Any, give: Callable[[], None]) -> None:
+        """Begin, or go on from the file `keep`; `give` enters the attractors that the user knows."""
+        if keep is None:
+            give()
+            return
+        place = Path(keep)
+        mark = self._mark()
+        if place.exists():
+            self.journal = Journal.reopen(place)
+            if self.journal.records:
+                try:
+                    self._restore(mark, place)
+                except BaseException:
+                    self.journal.close()
+                    raise
+                return
+        else:
+            if not place.parent.is_dir():
+                raise InputError(f"{place.parent} is no folder: make it, or keep elsewhere")
+            self.journal = Journal.create(place)
+        try:
+            give()
+        except BaseException:
+            self.journal.remove()
+            raise
+        self.journal.append("basins", {"mark": mark})
+        self._keep_attractors(0)
+
+    def close(self) -> None:
+        """Close the journal."""
+        if self.journal is not None:
+            self.journal.close()
+
+    def _mark(self) -> str:
+        """A digest of everything that the result depends on."""
+        c = self.catalogue
+        said = to_json([
+            describe(c.system), c.omega, c.values, c.observe, c.tolerance,
+            self.periods, self.period_tolerance, self.counts,
+        ])  # fmt: skip
+        return hashlib.sha256(said.encode() + self.states.tobytes()).hexdigest()
+
+    def _restore(self, mark: str, place: Path) -> None:
+        assert self.journal is not None
+        for record in self.journal.records:
+            if record.kind == "basins" and record.said["mark"] != mark:
+                raise InputError(
+                    f"{place} is of other basins (another system, frequency, grid or option): name another file"
+                )
+            if record.kind == "attractor":
+                points, multipliers = (from_json(record.said[name]) for name in ("points", "multipliers"))
+                said = record.said
+                self.catalogue.enter(said["name"], points, said["amplitude"], multipliers, said["given"])
+            elif record.kind == "chunk":
+                at = slice(int(record.said["begin"]), int(record.said["end"]))
+                self.labels[at] = record.dataset["label"].to_numpy()
+                self.settling[at] = record.dataset["settling"].to_numpy()
+                self._next = at.stop
+            elif record.kind == "followed":
+                self.followed, self.contradicted = int(record.said["followed"]), int(record.said["contradicted"])
+                self._audited = True
+
+    def _keep_attractors(self, first: int) -> None:
+        for one in self.catalogue.known[first:] if self.journal is not None else ():
+            assert self.journal is not None
+            self.journal.append("attractor", {
+                "name": one.name, "points": to_json(one.points), "multipliers": to_json(np.asarray(one.multipliers)),
+                "amplitude": float(one.amplitude), "given": one.given,
+            })  # fmt: skip
+
+    # ------------------------------------------------------------------------------------------------------ work
+    def go(self, report: Report | None) -> bool:
+        """All that is left to do."""
+        count = len(self.states)
+        if self._next == 0:
+            self._look_around()
+        for begin in range(self._next, count, _CHUNK):
+            end, known = min(begin + _CHUNK, count), len(self.catalogue.known)
+
+            def told(share: float, begin: int = begin, end: int = end) -> None:
+                if report is not None:
+                    done = begin + share * (end - begin)
+                    report(done / count, f"{done:.0f} of {count} states")
+
+            labels, settling = self._settle(self.states[begin:end], told)
+            self.labels[begin:end], self.settling[begin:end] = labels, settling
+            self._keep_attractors(known)
+            if self.journal is not None:
+                import xarray
+
+                found = xarray.Dataset({"label": (("cell",), labels), "settling": (("cell",), settling)})
+                self.journal.append("chunk", {"begin": begin, "end": end}, found)
+        if not self._audited:
+            self._follow_some()
+        return True
+
+    def _look_around(self) -> None:
+        """Find what attracts a coarse sample of the cells."""
+        wide, high = self.counts
+        columns, rows = (np.unique((np.arange(_COARSE) + 0.5) * n // _COARSE).astype(int) for n in (wide, high))
+        cells = (rows[:, None] * wide + columns).ravel()
+        known = len(self.catalogue.known)
+        self._settle(self.states[cells], lambda share: None)
+        self._keep_attractors(known)
+
+    def _over(self, states: Array, periods: int, last: int, measure: bool = False) -> Any:
+        c = self.catalogue
+        motions = self.flow.over(
+            states, c.omega, periods, c.values, skip=periods - last, measure=measure, workers=c.workers
+        )
+        if not motions.finished.all():
+            raise KeyboardInterrupt
+        return motions
+
+    def _settle(self, states: Array, told: Callable[[float], None]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        """Labels of states (B, 2n), and the periods after which they were known."""
+        labels = self.catalogue.trapped(states)
+        labels[labels < 0] = OPEN
+        settling = np.zeros(len(states), dtype=int)
+        y, elapsed = states.copy(), 0
+        active = np.flatnonzero(labels == OPEN)
+        while len(active) and elapsed < self.periods:
+            step = min(_EARLY if elapsed < _LONG else _LATE, self.periods - elapsed)
+            motions = self._over(y[active], step, 1)
+            elapsed += step
+            y[active] = motions.end
+            found = self.catalogue.trapped(np.where(motions.failed[:, None], np.inf, motions.end))
+            labels[active] = np.where(motions.failed, GONE, np.where(found >= 0, found, OPEN))
+            settling[active] = elapsed
+            active = active[labels[active] == OPEN]
+            told(1.0 - len(active) / len(states))
+        if len(active):
+            self._look_at(active, y[active], labels)
+        return labels, settling
+
+    def _look_at(self, which: NDArray[np.int_], states: Array, labels: NDArray[np.int_]) -> None:
+        """Tell motions that were not trapped by their next points."""
+        c = self.catalogue
+        motions = self._over(states, _LOOKED_AT, _LOOKED_AT, measure=True)
+        parameters = {**c.system.parameters, **c.values}
+        for i, points, peaks, failed in zip(which, motions.states, motions.peaks, motions.failed, strict=True):
+            if failed:
+                labels[i] = GONE
+                continue
+            found = attractor_of(c.system, points, peaks, c.omega, parameters, self.period_tolerance, c.observe)
+            if not found.period:
+                labels[i] = APERIODIC
+                continue
+            number = c.find(found.points)
+            if number is None:
+                number = c.add(found.state, found.period, None, False)
+            # it repeats, but shooting may not confirm that it does, or that it is stable
+            labels[i] = number if number is not None and c.near(number, found.points) else APERIODIC
+
+    def _follow_some(self) -> None:
+        """Follow some of the trajectories that were stopped to the end."""
+        trapped = np.array([bool(one.traps) for one in self.catalogue.known], dtype=bool)
+        if trapped.any():
+            cells = np.flatnonzero((self.labels >= 0) & trapped[np.maximum(self.labels, 0)])
+            cells = cells[np.unique(np.linspace(0, len(cells) - 1, min(_FOLLOWED, len(cells))).astype(int))]
+            if len(cells):
+                motions = self._over(self.states[cells], self.periods, 1)
+                end = np.where(motions.failed[:, None], np.inf, motions.end)
+                self.followed = len(cells)
+                self.contradicted = int((self.catalogue.trapped(end) != self.labels[cells]).sum())
+        self._audited = True
+        if self.journal is not None:
+            self.journal.append("followed", {"followed": self.followed, "contradicted": self.contradicted})

@@ -1,0 +1,348 @@
+"""`lyapunov_exponents`: how fast neighbouring motions part, or approach each other.
+
+    lambda_i = lim log r_i(t) / t,   W(t) = Q R,   W' = Df(y(t), t) W
+
+with tangent vectors W that are made orthonormal after every step (Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15,
+1980), natural logarithms, per unit of time. Several trajectories on one attractor are followed side by side; their
+stretches give the standard errors.
+
+Averages of regular motions, periodic or quasi-periodic, converge much faster with smooth weights,
+`exp(-1 / (s (1 - s)))` over a stretch 0 < s < 1, than with equal ones (Das et al., Nonlinearity 30, 2017);
+those of chaotic motions do not. Both are taken, and that with the smaller standard errors is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+import numpy as np
+
+from suboctave.analysis.forces import check_forces
+from suboctave.analysis.integration import _not_negative, start_state
+from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.two_trajectories import Separation, TwoTrajectories, separate
+from suboctave.errors import InputError, suggest
+from suboctave.model.element import Array
+from suboctave.model.system import System
+from suboctave.timedomain.batch import Flow, check_count, check_motions
+from suboctave.timedomain.recognition import extents
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["LyapunovExponents", "lyapunov_exponents", "smooth_weights"]
+
+#: how far from the first trajectory the others begin, in sizes of the motion
+_APART = 1e-3
+#: stretches of one trajectory
+_STRETCHES = 4
+#: standard errors beyond which the sign of an exponent counts, and what it must be at least, per radian of the load
+_SURE, _LEAST = 5.0, 1e-5
+
+
+@dataclass(eq=False)
+class LyapunovExponents:
+    """Lyapunov exponents of the motion that a trajectory settles on.
+
+    Attributes
+    ----------
+    exponents
+        (m,): natural logarithms per unit of time, falling.
+    standard_errors
+        (m,): of each, from stretches of the trajectories, or from the trajectories, whichever is larger.
+    divergence
+        The mean rate of volume: the sum of all 2n exponents (Liouville). It is `-trace M^-1 C` without nonlinear
+        dampers.
+    by_trajectory
+        (B, m): what every trajectory alone gives. Very different ones have settled on different motions.
+    stretches
+        (N, m): what every stretch gives.
+    running
+        (P, m): the averages over the first periods, over all trajectories.
+    smooth
+        Whether smooth weights gave the smaller standard errors.
+    """
+
+    exponents: Array
+    standard_errors: Array
+    divergence: float
+    by_trajectory: Array
+    stretches: Array
+    running: Array
+    smooth: bool
+    omega: float
+    parameters: Mapping[str, float]
+    transient: int
+    tolerance: float
+    end: Array
+    system: System
+    seconds: float = 0.0
+
+    @property
+    def per_period(self) -> Array:
+        """(m,): the exponents per period of the load."""
+        return self.exponents * (2.0 * np.pi / self.omega)
+
+    @property
+    def defect(self) -> float:
+        """By how much the sum of all exponents misses the divergence, relative to the largest; NaN if some are missing.
+
+        It is of the size of rounding: larger means that the smallest exponents could not be resolved.
+        """
+        if len(self.exponents) < 2 * self.system.n:
+            return np.nan
+        largest = max(float(np.max(np.abs(self.exponents))), abs(self.divergence), np.finfo(float).tiny)
+        return float(abs(self.exponents.sum() - self.divergence) / largest)
+
+    @property
+    def chaotic(self) -> bool | None:
+        """Whether the largest exponent is positive beyond doubt; None where five standard errors do not decide."""
+        doubt = max(_SURE * float(self.standard_errors[0]), _LEAST * self.omega)
+        if not np.isfinite(doubt):
+            return None
+        if self.exponents[0] > doubt:
+            return True
+        return False if self.exponents[0] < -doubt or self.smooth else None
+
+    @property
+    def dimension(self) -> float:
+        """Kaplan and Yorke's dimension of the attractor in the stroboscopic section; NaN if too few exponents."""
+        total = np.cumsum(self.exponents)
+        if total[0] < 0.0:
+            return 0.0
+        if (total >= 0.0).all():
+            return np.nan
+        k = int(np.flatnonzero(total < 0.0)[0])
+        return float(k + total[k - 1] / abs(self.exponents[k]))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Exponents with their errors, what trajectories and stretches give, the running averages."""
+        import xarray
+
+        return xarray.Dataset(
+            {
+                "exponents": (("exponent",), self.exponents),
+                "standard_errors": (("exponent",), self.standard_errors),
+                "by_trajectory": (("trajectory", "exponent"), self.by_trajectory),
+                "stretches": (("stretch", "exponent"), self.stretches),
+                "running": (("period", "exponent"), self.running),
+                "parameters": (("parameter",), np.array(list(self.parameters.values()), dtype=float)),
+            },
+            coords={"parameter": list(self.parameters), "period": np.arange(1, len(self.running) + 1)},
+            attrs={
+                "contents": "lyapunov exponents",
+                "omega": self.omega,
+                "divergence": self.divergence,
+                "smooth": int(self.smooth),
+                "transient": self.transient,
+                "tolerance": self.tolerance,
+                "dofs": self.system.n,
+                "system": self.system.name,
+                "suboctave": __version__,
+            },
+        )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row for each exponent."""
+        import pandas as pd
+
+        return pd.DataFrame({
+            "exponent": self.exponents, "standard_error": self.standard_errors, "per_period": self.per_period,
+        })  # fmt: skip
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """The running averages over the periods, with a band of two standard errors; saved if a path is given.
+
+        Options are those of `pictures.plot_lyapunov`: `count`, `title`, `size`.
+        """
+        from suboctave.pictures.chaos import plot_lyapunov
+
+        return plot_lyapunov(self.to_xarray(), path, **options)
+
+    def __repr__(self) -> str:
+        told = ", ".join(
+            f"{value:.5g} +- {error:.1g}"
+            for value, error in zip(self.exponents[:4], self.standard_errors[:4], strict=True)
+        )
+        more = ", ..." if len(self.exponents) > 4 else ""
+        word = {True: "chaotic", False: "regular", None: "undecided"}[self.chaotic]
+        return f"LyapunovExponents({told}{more} at omega={self.omega:.8g}: {word})"
+
+
+@overload
+def lyapunov_exponents(
+    system: System,
+    state: Any = None,
+    *,
+    omega: float,
+    parameters: Mapping[str, float] | None = None,
+    periods: int = 1000,
+    transient: int = 300,
+    count: int | None = None,
+    trajectories: int = 16,
+    method: Literal["variational"] = "variational",
+    tolerance: float | None = None,
+    workers: int | None = None,
+    progress: Any = None,
+) -> LyapunovExponents: ...
+
+
+@overload
+def lyapunov_exponents(
+    system: System,
+    state: Any = None,
+    *,
+    omega: float,
+    parameters: Mapping[str, float] | None = None,
+    method: Literal["two_trajectories"] | TwoTrajectories,
+    workers: int | None = None,
+    progress: Any = None,
+) -> Separation: ...
+
+
+@timed
+def lyapunov_exponents(
+    system: System,
+    state: Any = None,
+    *,
+    omega: float,
+    parameters: Mapping[str, float] | None = None,
+    periods: int = 1000,
+    transient: int = 300,
+    count: int | None = None,
+    trajectories: int = 16,
+    method: str | TwoTrajectories = "variational",
+    tolerance: float | None = None,
+    workers: int | None = None,
+    progress: Any = None,
+) -> LyapunovExponents | Separation:
+    """The Lyapunov exponents of the motion that a trajectory settles on, with their standard errors.
+
+    Parameters
+    ----------
+    state
+        Where the trajectory begins, (2n,), a periodic motion or an attractor; None for rest.
+    omega, parameters
+        Of the load; other values of some parameters, by name.
+    periods, transient
+        Periods of the load over which each trajectory is averaged, after some that are left out (twice: once to reach
+        the attractor, once for trajectories and tangent vectors to forget where they began).
+    count
+        How many exponents, the largest first; default all 2n.
+    trajectories
+        How many are followed side by side. They begin on the attractor, a thousandth of its size apart, and are
+        independent if the motion is chaotic.
+    method
+        "variational"; or "two_trajectories" (or a `TwoTrajectories` with settings of its own): the rate at which two
+        trajectories part, as published studies often give it. It is a finite-time value, and its spread over settings
+        says how far to trust it; `periods`, `transient`, `count`, `trajectories`, `tolerance` do not concern it.
+    tolerance
+        Local error relative to the size of the motion (default 1e-10).
+    workers, progress
+        As in `poincare_sections`.
+
+    Forces must be continuous: where one jumps, neighbours part by a jump of their own that the derivative of the flow
+    does not contain. Laws of this package and forces given as text are; those of one's own are looked at along the
+    motion, and refused where they jump.
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    ConvergenceError
+        If a motion leaves the range of numbers.
+    """
+    first = start_state(system, state)
+    values = {name: float(value) for name, value in (parameters or {}).items()}
+    if method == "two_trajectories":
+        method = TwoTrajectories()
+    if isinstance(method, TwoTrajectories):
+        with reporting(progress, "two trajectories") as report:
+            return separate(system, first, omega, values, method, workers, report)
+    if method != "variational":
+        raise InputError(f"method={method!r}{suggest(str(method), ('variational', 'two_trajectories'))}")
+    size = 2 * system.n
+    count = size if count is None else check_count("count", count)
+    if count > size:
+        raise InputError(f"count={count}: a system of {system.n} degrees of freedom has {size} exponents")
+    periods, trajectories = check_count("periods", periods), check_count("trajectories", trajectories)
+    transient = _not_negative("transient", transient)
+    flow = Flow(system, "accurate", tolerance=tolerance, tangents=count)
+    with reporting(progress, "Lyapunov exponents") as report:
+        check_forces(system, first, float(omega), values)
+        starts = _starts(flow, first, omega, values, transient, trajectories)
+        motions = flow.over(starts, omega, transient + periods, values, transient, workers=workers, report=report)
+    if not motions.finished.all():
+        raise KeyboardInterrupt
+    check_motions(motions, flow)
+    assert motions.growth is not None
+    rates = motions.growth * (float(omega) / (2.0 * np.pi))
+    smooth, mean, error, stretches = averaged(rates)
+    order = np.argsort(-mean[:count], kind="stable")
+    so_far = np.cumsum(rates[..., :count].mean(axis=0), axis=0) / np.arange(1, periods + 1)[:, None]
+    weights = smooth_weights(periods) if smooth else np.full(periods, 1.0 / periods)
+    return LyapunovExponents(
+        exponents=mean[order],
+        standard_errors=error[order],
+        divergence=float(mean[count]),
+        by_trajectory=np.einsum("p,bpm->bm", weights, rates[..., :count])[:, order],
+        stretches=stretches[:, order],
+        running=so_far[:, order],
+        smooth=smooth,
+        omega=float(omega),
+        parameters={**system.parameters, **values},
+        transient=transient,
+        tolerance=1e-10 if tolerance is None else tolerance,
+        end=motions.end[0],
+        system=system,
+    )
+
+
+def averaged(rates: Array) -> tuple[bool, Array, Array, Array]:
+    """Averages of rates (B, P, k): whether smooth weights are better, means and standard errors (k,), stretches."""
+    several, periods, k = rates.shape
+    pieces = _STRETCHES if periods >= 8 * _STRETCHES else 1
+    length = periods // pieces
+    cut = rates[:, periods - pieces * length :].reshape(several * pieces, length, k)
+    best: tuple[bool, Array, Array, Array] | None = None
+    for smooth in (False, True):
+        weights = smooth_weights(length) if smooth else np.full(length, 1.0 / length)
+        told = np.einsum("p,npk->nk", weights, cut)
+        error = np.full(k, np.nan)
+        if len(told) > 1:
+            error = told.std(axis=0, ddof=1) / np.sqrt(len(told))
+        if several > 1:
+            each = told.reshape(several, pieces, k).mean(axis=1)
+            error = np.maximum(error, each.std(axis=0, ddof=1) / np.sqrt(several))
+        if best is None or np.sum(error[:-1] ** 2) < np.sum(best[2][:-1] ** 2):
+            best = smooth, told.mean(axis=0), error, told
+    assert best is not None
+    return best
+
+
+def smooth_weights(count: int) -> Array:
+    """Weights (count,) of sum one that vanish at both ends with all their derivatives."""
+    if count < 3:
+        return np.full(count, 1.0 / count)
+    s = np.arange(1, count + 1) / (count + 1)
+    w: Array = np.exp(4.0 - 1.0 / (s * (1.0 - s)))
+    return w / w.sum()
+
+
+def _starts(flow: Flow, first: Array, omega: float, values: Mapping[str, float], transient: int, count: int) -> Array:
+    """States (count, 2n): the end of a transient, and others about it."""
+    system = flow.system
+    motions = flow.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True)
+    if not motions.finished.all():
+        raise KeyboardInterrupt
+    check_motions(motions, flow)
+    assert motions.peaks is not None
+    mass = np.diagonal(system.mass.value({**system.parameters, **values}))
+    sizes = extents(motions.peaks[0].max(axis=0), float(omega), mass)
+    away = np.random.default_rng(0).normal(size=(count, 2 * system.n))
+    away[0] = 0.0
+    return motions.end[0] + _APART * sizes * away

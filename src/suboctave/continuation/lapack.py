@@ -1,0 +1,47 @@
+"""LU factors inside compiled code, by the LAPACK that Numba links for `numpy.linalg`, and solutions with them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+from numba.np.linalg import _LAPACK, F_INT_nptype
+
+from suboctave.compiled import kernel
+
+_getrf = _LAPACK.numba_xxgetrf(types.float64)
+_REAL = ord("d")
+
+
+@kernel(at_once=True)
+def factorise(transposed, pivots):
+    """LU factors of a matrix whose transpose is given, in place; returns whether it is singular.
+
+    pivots (n,): filled with the row that each row was exchanged with, counted from 0, as `scipy.linalg.lapack` does.
+    """
+    n = transposed.shape[0]
+    found = np.empty(n, dtype=F_INT_nptype)
+    state = _getrf(_REAL, n, n, transposed.ctypes, n, found.ctypes)
+    for i in range(n):
+        pivots[i] = found[i] - 1
+    return state != 0
+
+
+@kernel(at_once=True)
+def solve_factorised(transposed, pivots, right):
+    """The solution for a right-hand side, in its place; factors as `factorise` leaves them."""
+    n = right.shape[0]
+    for i in range(n):
+        other = pivots[i]
+        if other != i:
+            right[i], right[other] = right[other], right[i]
+    for j in range(n):
+        value, column = right[j], transposed[j, j + 1 :]
+        below = right[j + 1 :]
+        for i in range(below.shape[0]):
+            below[i] -= column[i] * value
+    for j in range(n - 1, -1, -1):
+        value = right[j] / transposed[j, j]
+        right[j] = value
+        column, above = transposed[j, :j], right[:j]
+        for i in range(j):
+            above[i] -= column[i] * value

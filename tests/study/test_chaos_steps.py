@@ -1,0 +1,72 @@
+"""The steps "lyapunov_exponents" and "basins": from a file what the verbs give, and their mistakes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.study.file import read_study
+from suboctave.study.runner import run_study
+
+STUDY = """
+title = "basins"
+[system]
+library = "duffing"
+parameters = { c = 0.1, F = 0.3 }
+[[analyses]]
+name = "response"
+type = "frequency_response"
+omega = [3.0, 0.5]
+[[analyses]]
+name = "rates"
+type = "lyapunov_exponents"
+omega = 1.5
+periods = 200
+trajectories = 4
+[[analyses]]
+name = "shares"
+type = "basins"
+omega = 1.5
+box = [[-2.0, 2.0], [-2.0, 2.0]]
+grid = [12, 10]
+branches = ["response"]
+[[analyses]]
+name = "states"
+type = "basins"
+omega = 1.5
+box = [[-2.0, 2.0], [-2.0, 2.0]]
+grid = [12, 10]
+what = "states"
+"""
+
+
+def test_as_by_a_script(study_file):
+    finished = {one.name: one.result for one in run_study(read_study(study_file(STUDY))).finished}
+    system = so.library.duffing(c=0.1, F=0.3)
+    rates = so.lyapunov_exponents(system, omega=1.5, periods=200, trajectories=4)
+    assert np.array_equal(finished["rates"]["exponent"], rates.exponents)
+    found = so.basins(system, omega=1.5, box=((-2.0, 2.0), (-2.0, 2.0)), grid=(12, 10))
+    assert sorted(finished["shares"]["share"]) == pytest.approx(sorted(found.shares.values()))
+    assert set(finished["shares"]["name"]) == {"response", "response (2)"}
+    names = [found.names[i] for i in found.labels.ravel().tolist()]
+    assert finished["states"]["motion"].tolist() == names
+    assert finished["states"]["x_0"][:12].tolist() == found.x.tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "to", "said"),
+    [
+        ("omega = 1.5\nperiods", "omega = -1.5\nperiods", "greater than 0"),
+        ('branches = ["response"]', 'branches = ["respons"]', "'response'"),
+        ("grid = [12, 10]\nbranches", "grid = [12, 0]\nbranches", "positive"),
+        ('what = "states"', 'what = "states"\ncoordinates = ["x_0", "v_1"]', "v_0"),
+        ("trajectories = 4", "trajectories = 4\ncount = 3", "at most 2"),
+        ("trajectories = 4", "trajectories = 4\nstate = [1.0]", "2 finite numbers"),
+    ],
+)
+def test_mistakes(study_file, suboctave, change, to, said):
+    assert change in STUDY
+    status, _, err = suboctave("run", study_file(STUDY.replace(change, to)))
+    assert status != 0
+    assert said in err
