@@ -77,6 +77,18 @@ def test_wrong_multipliers_are_found(duffing_curve, to):
     assert ("the opposite" if to > 1.0 else "other multipliers") in bad.reason
 
 
+def test_verdicts_too_near_to_the_circle_are_not_compared(duffing_curve):
+    """The wrong verdict again, with a tolerance within which the true multiplier lies."""
+    floquet = duffing_curve.points[30].floquet
+    scaled = floquet.multipliers * (1.2 / np.abs(floquet.multipliers).max())
+    wrong = planted(duffing_curve, 30, floquet=replace(floquet, multipliers=scaled))
+    distance = 1.0 - np.abs(floquet.multipliers).max()
+    check = so.verify(wrong, tolerance=1.1 * distance, points=[30], bifurcations=False)
+    assert check.points[0].outcome == "cannot tell"
+    assert "unit circle" in check.points[0].reason
+    assert check.agrees
+
+
 def test_a_misplaced_bifurcation_is_not_confirmed(duffing_curve):
     item = duffing_curve.bifurcations["LP"][0]
     orbit = duffing_curve.orbits[20]

@@ -19,7 +19,7 @@ from suboctave.analysis.branch import Branch
 from suboctave.analysis.progress import reporting
 from suboctave.analysis.shot_branch import LOCATED, Place, Shot, Shots
 from suboctave.analysis.tracked_branch import TrackedBranch
-from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
@@ -209,8 +209,12 @@ def verify_branch(
     workers: int | None,
     progress: Any,
     alone: Callable[[Bifurcation, float], Any],
+    missed: Callable[[Bifurcation, Array, float], float],
 ) -> BranchVerification:
-    """See `verification.verify`, which is `alone` for single bifurcations."""
+    """See `verification.verify`, which is `alone` for single bifurcations.
+
+    `missed` is the distance by which a true motion, of a state and a frequency, misses the gap that it should graze.
+    """
     if isinstance(branch, TrackedBranch):
         raise InputError(
             "this is a curve of bifurcations in two parameters: take its points or its .bifurcations one by one"
@@ -239,7 +243,7 @@ def verify_branch(
             for done, item in enumerate(items):
                 if report is not None:
                     report((len(which) + 4 * done) / whole, f"{item.kind} at omega = {item.omega:.6g}")
-                found.append(_confirmed(item, quick.get(id(item)), tolerance, branch.observe, alone))
+                found.append(_confirmed(item, quick.get(id(item)), tolerance, branch.observe, alone, missed))
         except KeyboardInterrupt:
             complete = False
     return BranchVerification(branch, tuple(looked), tuple(found), tolerance, complete)
@@ -310,9 +314,14 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
 
 
 def _quick(shots: Shots, items: Sequence[Bifurcation], tolerance: float) -> dict[int, Place]:
-    """The places of those bifurcations that have a test function along the curve."""
+    """The places of those bifurcations that have a test function along the curve; of contacts the true motions."""
     located = [item for item in items if item.kind in LOCATED]
     places: dict[int, Place] = {}
+    contacts = [item for item in items if item.kind in CONTACT_KINDS]
+    for begin in range(0, len(contacts), shots.at_once):
+        part = contacts[begin : begin + shots.at_once]
+        for item, shot in zip(part, shots.motions([item.orbit for item in part]), strict=True):
+            places[id(item)] = Place(shot, float("nan"), shot.omega)
     for begin in range(0, len(located), shots.at_once):
         part = located[begin : begin + shots.at_once]
         found = shots.places([item.orbit for item in part], [item.kind for item in part], tolerance)
@@ -321,15 +330,24 @@ def _quick(shots: Shots, items: Sequence[Bifurcation], tolerance: float) -> dict
 
 
 def _confirmed(
-    item: Bifurcation, place: Place | None, tolerance: float, observe: int, alone: Callable[[Bifurcation, float], Any]
+    item: Bifurcation,
+    place: Place | None,
+    tolerance: float,
+    observe: int,
+    alone: Callable[[Bifurcation, float], Any],
+    missed: Callable[[Bifurcation, Array, float], float],
 ) -> VerifiedBifurcation:
     amplitude = item.orbit.amplitude(observe)
-    if place is not None and place.shot.found and np.isfinite(place.along) and place.shot.distance <= tolerance:
-        distance = max(place.shot.distance, abs(place.along))
-        words = f"Shooting finds {KINDS[item.kind]} at omega = {place.omega:.9g}"
-        return VerifiedBifurcation(
-            item.kind, item.omega, item.parameters, amplitude, place.omega, distance, True, words
-        )
+    if place is not None and place.shot.found and place.shot.distance <= tolerance:
+        if item.kind in CONTACT_KINDS:
+            along, words = missed(item, place.shot.state, place.omega), "The same motion, and it just reaches the gap"
+        else:
+            along, words = abs(place.along), f"Shooting finds {KINDS[item.kind]} at omega = {place.omega:.9g}"
+        if along <= tolerance:
+            return VerifiedBifurcation(
+                item.kind, item.omega, item.parameters, amplitude, place.omega, max(place.shot.distance, along), True,
+                words,
+            )  # fmt: skip
     try:
         check = alone(item, tolerance)
     except ConvergenceError as failure:

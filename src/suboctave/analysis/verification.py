@@ -130,7 +130,7 @@ def verify(
     if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
         raise InputError(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
     if isinstance(what, Branch):
-        return verify_branch(what, tolerance, points, every, bifurcations, workers, progress, verify)
+        return verify_branch(what, tolerance, points, every, bifurcations, workers, progress, verify, _missed)
     if points is not None or every != 1:
         raise InputError("points= and every= choose among the points of a branch; this is a single motion")
     motion = _orbit(what)
@@ -154,7 +154,7 @@ def verify(
     distance = float(np.max(np.abs(solution.state - start) / np.maximum(sizes, np.finfo(float).tiny)))
     distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
     if isinstance(what, Bifurcation) and touches:
-        distance = max(distance, _missed(what, solution))
+        distance = max(distance, _missed(what, solution.state, solution.omega))
     error = _pairing(floquet.multipliers, solution.multipliers)
 
     def verdict(agrees: bool, reason: str) -> Verification:
@@ -177,21 +177,22 @@ def verify(
     return verdict(True, "The same motion" if isinstance(what, TrackedEvent) else "The same motion, the same verdict")
 
 
-def _missed(what: Bifurcation, solution: PeriodicSolution) -> float:
+def _missed(what: Bifurcation, state: Array, omega: float) -> float:
     """Distance of the motion's nearest extremum from the gap that it should graze, in units of the displacement."""
     assert what.contact is not None
     system, contact = what.orbit.system, what.contact
-    path = integrate(system, solution.state, (0.0, solution.period), solution.omega)
-    window = 0.5 * solution.period / (what.orbit.basis.harmonics + 1)
+    period = 2.0 * math.pi * what.orbit.basis.nu / omega
+    path = integrate(system, state, (0.0, period), omega)
+    window = 0.5 * period / (what.orbit.basis.harmonics + 1)
     direction = reads(system.elements[contact.element], system.n)
     grid, centre = np.linspace(-1.0, 1.0, 201), contact.time
     for _ in range(3):  # the window closes on the extremum
-        u = path.at(np.mod(centre + window * grid, solution.period))[0] @ direction
+        u = path.at(np.mod(centre + window * grid, period))[0] @ direction
         a, b, c = np.polyfit(grid, u, 2)
         at = float(np.clip(-0.5 * b / a, -1.0, 1.0)) if a != 0.0 else 0.0
         value = float(c + at * b + at**2 * a)
         centre, window = centre + at * window, 0.1 * window
-    size = float(np.abs(path.at(np.linspace(0.0, solution.period, 200))[0] @ direction).max())
+    size = float(np.abs(path.at(np.linspace(0.0, period, 200))[0] @ direction).max())
     return abs(value - contact.gap) / size
 
 
