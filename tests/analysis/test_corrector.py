@@ -7,7 +7,7 @@ import pytest
 
 import suboctave as so
 from suboctave.analysis.response import ResponseCurve
-from suboctave.continuation.lapack import factorise, solve_factorised
+from suboctave.continuation.lapack import factorise, factorise_plainly, solve_factorised
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -123,7 +123,8 @@ def test_left_to_the_general_way():
     assert curve.corrected(u, row, weights, OPTIONS, 0.0) is None
 
 
-def test_factors_in_compiled_code():
+@pytest.mark.parametrize("factorise", [factorise, factorise_plainly])
+def test_factors_in_compiled_code(factorise):
     rng = np.random.default_rng(3)
     matrix, right = rng.standard_normal((23, 23)), rng.standard_normal(23)
     matrix[0, 0] = 0.0

@@ -79,7 +79,10 @@ class _Follower:
             trace.closed, trace.ended = self.march.closed, self.march.ended
             trace.arrives = self._arrival()
         except KeyboardInterrupt:
-            where = self.previous.point.curve.where(self.previous.point.u) if self.previous else "the start"
+            if self.previous is None:
+                self.previous = start = self._sample(self.march.start)
+                trace.points.append(BranchPoint(orbit_of(start), start.floquet, 0.0, start.point.iterations))
+            where = self.previous.point.curve.where(self.previous.point.u)
             trace.interrupted = True
             trace.ended = f"interrupted at {where}; what was computed is kept"
         self._say_missed(everything=True)

@@ -4,12 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 from numba import types
-from numba.np.linalg import _LAPACK, F_INT_nptype
 
 from suboctave.compiled import kernel
 
-_getrf = _LAPACK.numba_xxgetrf(types.float64)
+try:
+    from numba.np.linalg import _LAPACK, F_INT_nptype
+
+    _getrf = _LAPACK.numba_xxgetrf(types.float64)
+except (ImportError, AttributeError):  # names that Numba may change
+    _getrf = None
 _REAL = ord("d")
+
+
+@kernel(at_once=True)
+def factorise_plainly(transposed, pivots):
+    """As `factorise`, without LAPACK: for a Numba that names it otherwise."""
+    n = transposed.shape[0]
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(transposed[k, i]) > abs(transposed[k, pivot]):
+                pivot = i
+        pivots[k] = pivot
+        if transposed[k, pivot] == 0.0:
+            return True
+        if pivot != k:
+            for j in range(n):
+                transposed[j, k], transposed[j, pivot] = transposed[j, pivot], transposed[j, k]
+        for i in range(k + 1, n):
+            transposed[k, i] /= transposed[k, k]
+        for j in range(k + 1, n):
+            value = transposed[j, k]
+            for i in range(k + 1, n):
+                transposed[j, i] -= transposed[k, i] * value
+    return False
 
 
 @kernel(at_once=True)
@@ -45,3 +73,7 @@ def solve_factorised(transposed, pivots, right):
         column, above = transposed[j, :j], right[:j]
         for i in range(j):
             above[i] -= column[i] * value
+
+
+if _getrf is None:
+    factorise = factorise_plainly
