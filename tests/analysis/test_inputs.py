@@ -118,7 +118,6 @@ ALONG = {
 
 SINGLE = {
     "verify number": (lambda s, b: so.verify(3), "expected a PeriodicOrbit, .*not int"),
-    "verify branch": (lambda s, b: so.verify(b), r"not Branch: take one of its \.orbits"),
     "tolerance": (lambda s, b: so.verify(b.orbits[0], tolerance=-1.0), "tolerance must be a number between 0 and 1"),
     "tolerance text": (lambda s, b: so.verify(b.orbits[0], tolerance="a"), "tolerance must be a number"),
     "stability text": (lambda s, b: so.stability("x"), "not str"),

@@ -43,7 +43,7 @@ name = "witness"
 type = "verify"
 branch = { analysis = "isolas", isola = 0, at = 4.0 }
 what = "points"
-every = 100
+every = 20
 [[analyses]]
 name = "births"
 type = "track"
@@ -102,7 +102,9 @@ def test_as_by_a_script(ran):
 
 def test_what_starts_from_it(ran):
     results = {item.step.name: item.result for item in ran[0].finished}
-    assert all(results["witness"]["agrees"])
+    # the first point is a limit point: there verdicts cannot be compared
+    assert len(results["witness"]) > 3
+    assert all(results["witness"]["agrees"][1:])
     births = results["births"]
     assert set(births.isola) == {"isola_centre"}
     # in units of x sqrt(alpha) one load alone counts
