@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import suboctave as so
 from suboctave.study.file import read_study
 
-STUDY = """
+ONE_MASS = (Path(__file__).parent / "one_mass.toml").read_text(encoding="utf-8")
+STUDY = f"""
 title = "regimes"
-[system]
-mass = 1.0
-damping = "c"
-stiffness = 1.0
-parameters = { c = 0.1, alpha = 1.0, F = 0.3 }
-[[system.elements]]
-type = "CubicSpring"
-dof = 0
-coefficient = "alpha"
-[[system.loads]]
-type = "HarmonicLoad"
-dof = 0
-amplitude = "F"
-[[analyses]]
+{ONE_MASS}[[analyses]]
 name = "regimes"
 type = "regime_map"
 omega = [2.0, 0.8]

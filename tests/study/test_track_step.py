@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,22 +11,10 @@ import suboctave as so
 from suboctave.study.file import read_study
 from suboctave.study.runner import run_study
 
-STUDY = """
+ONE_MASS = (Path(__file__).parent / "one_mass.toml").read_text(encoding="utf-8")
+STUDY = f"""
 title = "limit points over the load"
-[system]
-mass = 1.0
-damping = "c"
-stiffness = 1.0
-parameters = { c = 0.1, alpha = 1.0, F = 0.3 }
-[[system.elements]]
-type = "CubicSpring"
-dof = 0
-coefficient = "alpha"
-[[system.loads]]
-type = "HarmonicLoad"
-dof = 0
-amplitude = "F"
-[[analyses]]
+{ONE_MASS}[[analyses]]
 name = "response"
 type = "frequency_response"
 omega = [3.0, 0.5]
@@ -32,7 +22,7 @@ harmonics = 3
 [[analyses]]
 name = "limits"
 type = "track"
-start = { analysis = "response", bifurcation = "LP", index = 1 }
+start = {{ analysis = "response", bifurcation = "LP", index = 1 }}
 parameter = "F"
 bounds = [0.05, 0.5]
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -300,10 +300,10 @@ class RegimeMap:
             f"{len(self.regimes)} of stable motions up to {period_name(2**self.depth)}, from {len(self.curves)} curves "
             f"of bifurcations and branches at {looked} values of {self.parameter}."
         )
-        shares: Counter[Regime] = Counter()
+        shares: defaultdict[Regime, float] = defaultdict(float)
         for region in self.regions:
-            shares[region.regime] += region.share  # type: ignore[assignment]
-        for regime, share in shares.most_common():
+            shares[region.regime] += region.share
+        for regime, share in sorted(shares.items(), key=lambda item: -item[1]):
             text += f"\n  {100.0 * share:5.1f} %  {regime}"
         for note in self.notes:
             text += f"\nnote: {note}"

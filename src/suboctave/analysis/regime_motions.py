@@ -11,6 +11,7 @@ import numpy as np
 
 from suboctave.analysis.making import make_curve, own_linear_part
 from suboctave.analysis.regime_arcs import Arc
+from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import start_point
 from suboctave.compiled import computation_begins
 from suboctave.continuation import NewtonOptions
@@ -107,9 +108,10 @@ def _solved(orbit: PeriodicOrbit, system: System, name: str, omega: float, value
         point = start_point(curve, omega, orbit, NewtonOptions())
     except ConvergenceError:
         return None
-    x, reached, values = point.curve.split(point.u)  # type: ignore[attr-defined]
+    assert isinstance(point.curve, ResponseCurve)
+    x, reached, values = point.curve.split(point.u)
     if abs(reached - omega) > 1e-9 * omega:
         return None  # next to a limit point the nearest motion lies elsewhere
-    balance = point.curve.balance  # type: ignore[attr-defined]
+    balance = point.curve.balance
     error = truncation(balance.at(x, reached, values))
     return PeriodicOrbit(balance, x.copy(), reached, dict(values), float(point.evaluation.error), error, curve.adaptive)

@@ -65,11 +65,11 @@ def plot_isola_map(
     figure = Figure(figsize=inches, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    entries: dict[str, Line2D] = {}
+    entries: dict[str, Any] = {}
     for period, (values, low, high), borders in regions:
         colour = tinted(period_colour(1 if period == "T" else int(period[:-1])), _SHADE)
         axes.fill_between(values, low, high, color=colour, linewidth=0.0, zorder=1)
-        entries[f"{period} isola"] = Patch(facecolor=colour, edgecolor="none")  # type: ignore[assignment]
+        entries[f"{period} isola"] = Patch(facecolor=colour, edgecolor="none")
         for pieces in borders:
             for words, x, y in pieces:
                 ink, width, dash = _LINES[words]

@@ -283,8 +283,10 @@ def chosen_branch(curve: Curve, results: Mapping[str, Result]) -> Branch:
         isola = _isola(curve, result)
         return isola.limit_points if curve.at is None else isola.at(curve.at)
     if isinstance(result, BifurcationDiagram):
+        which = curve.branch if curve.label is None else curve.label
+        assert which is not None
         try:
-            return result[curve.branch if curve.label is None else curve.label].branch  # type: ignore[index]
+            return result[which].branch
         except InputError as error:
             raise InputError(f"{curve.analysis!r}: {error}") from None
     if not isinstance(result, Branch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -53,7 +54,7 @@ class Basins(Step):
         for i, branch in enumerate(self.branches):
             yield from check_branch(as_curve(branch), ("branches", i, *key_of_curve(branch, "")[1:]), around)
         for i, side in enumerate(self.box):
-            for _, text in tried("box", lambda side=side: check_range("box", tuple(side), False)):  # type: ignore[misc]
+            for _, text in tried("box", partial(check_range, "box", (side[0], side[1]), False)):
                 yield ("box", i), text
         if any(count < 1 for count in self.grid):
             yield ("grid",), "needs two positive numbers of states"

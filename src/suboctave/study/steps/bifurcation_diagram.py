@@ -22,7 +22,7 @@ class Diagram(FrequencyResponse):
     max_branches: int = Field(default=32, ge=1)
     seconds: float | None = Field(default=None, gt=0.0)
 
-    def run(self, context: Context) -> BifurcationDiagram:  # type: ignore[override]
+    def run(self, context: Context) -> BifurcationDiagram:
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         omega: Any = tuple(self.omega)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from suboctave.analysis import Branch, frequency_response
+from suboctave.analysis import BifurcationDiagram, Branch, frequency_response
 from suboctave.analysis.checks import check_range, check_system
 from suboctave.study.steps.base import Complaint, Context, Range, Surroundings, tried
 from suboctave.study.steps.curves import CurveStep
@@ -25,7 +25,7 @@ class FrequencyResponse(CurveStep):
         yield from wrong
         yield from tried("", lambda: check_system(around.system, () if wrong else tuple(self.omega)))
 
-    def run(self, context: Context) -> Branch:
+    def run(self, context: Context) -> Branch | BifurcationDiagram:
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         start = self.started(context)

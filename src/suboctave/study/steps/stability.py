@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -57,7 +58,7 @@ class Stability(Step):
                 yield ("bifurcations", i) if "bifurcation" in key else key, text
         yield from check_motion(self._motion(nearest=self.nearest), (), around)
         for method in self.methods or []:
-            yield from tried("methods", lambda method=method: as_stability(method))  # type: ignore[misc]
+            yield from tried("methods", partial(as_stability, method))
         if self.parameters:
             yield ("parameters",), "stability is that of motions as they were computed: leave them out"
 
