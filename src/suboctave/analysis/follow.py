@@ -111,7 +111,7 @@ class _Follower:
         if met is not None:
             return True
         self._candidate = new = self._sample(b)
-        if self.previous is None or _at_rest(self.previous) or _at_rest(new):
+        if self.previous is None or self.previous.at_rest or new.at_rest:
             return True
         return not self._guard.refuses(self._solved_again(self.previous, new), new)
 
@@ -162,7 +162,7 @@ class _Follower:
         sample = self._sample(point)
         passed, passage = [sample], None
         if self.previous is not None:
-            if _at_rest(self.previous) or _at_rest(sample):
+            if self.previous.at_rest or sample.at_rest:
                 self._guard.forget()
                 self._hidden.forget()
                 if self._watch is not None:
@@ -237,7 +237,7 @@ class _Follower:
         found: list[tuple[float, Bifurcation]] = []
         branch_point: Located | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
-        resting = _at_rest(a) or _at_rest(b)
+        resting = a.at_rest or b.at_rest
         for kind in () if resting else self._changes(a, b):
             located = self._located(kind, a, b)
             if kind is BRANCH_POINT:
@@ -261,10 +261,11 @@ class _Follower:
                 found.append((touched.fraction, self._bifurcation(touched, a, b)))
         if complaint is not None:
             self._guard.doubt(*complaint)
-        # with more harmonics a bifurcation that a hidden pair was counted for may lie ahead again
-        met = self.trace.bifurcations[-4:]
-        fresh = [pair for pair in found if not any(same_event(pair[1], other) for other in met)]
-        self.trace.bifurcations += behind_their_grazings(fresh)
+        if found:
+            # with more harmonics a bifurcation that a hidden pair was counted for may lie ahead again
+            met = self.trace.bifurcations[-4:]
+            fresh = [pair for pair in found if not any(same_event(pair[1], other) for other in met)]
+            self.trace.bifurcations += behind_their_grazings(fresh)
         if self._watch is not None and not resting:
             for located, p, q in self._watch.passed(a, b):
                 self._insert(self._bifurcation(located, p, q))
@@ -343,12 +344,6 @@ class _Follower:
             curve.name,
             arclength=point.arclength,
         )
-
-
-def _at_rest(sample: Sample) -> bool:
-    evaluation = sample.point.evaluation
-    assert isinstance(evaluation, ResponseEvaluation)
-    return evaluation.at_rest
 
 
 def same_event(a: Bifurcation, b: Bifurcation) -> bool:

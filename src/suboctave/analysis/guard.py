@@ -25,10 +25,9 @@ import numpy as np
 
 from suboctave.analysis.audit import Audit, Unsettled
 from suboctave.analysis.crossings import first_doubtful
-from suboctave.analysis.nearing import nearing_share
+from suboctave.analysis.nearing import CUT, GRAZES, contacts_between
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Sample
-from suboctave.bifurcation.grazing import touches
 from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
 from suboctave.compiled import kernel
 from suboctave.continuation import kernels
@@ -40,6 +39,8 @@ from suboctave.errors import ConvergenceError
 FINEST = 1e-5
 #: samples inside one step after which it is halved, or called unsettled
 MOST_PROBES = 60
+#: pairs of samples whose contacts are remembered, at least
+_REMEMBERED = 64
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
 #: intervals shorter than this are not cut because a contact grazes in them
@@ -88,7 +89,7 @@ class StepGuard:
         self._finest, self._longest = np.inf, 0.0
         self._unsettled: list[Unsettled] = []
         self._last: tuple[Sample, Sample, _Step] | None = None
-        self._touching: dict[tuple[Sample, Sample], bool] = {}
+        self._contacts: dict[tuple[Sample, Sample], int] = {}
 
     @property
     def audit(self) -> Audit:
@@ -110,9 +111,11 @@ class StepGuard:
         for interval in step.settled:
             self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
         self._behind = step.samples[-4:]
-        kept = set(self._behind)
-        self._touching = {pair: known for pair, known in self._touching.items() if kept.issuperset(pair)}
-        return Passage(_separating(step.inside), step.inside, step.unsettled)
+        if len(self._contacts) > _REMEMBERED:
+            kept = set(self._behind)
+            self._contacts = {pair: known for pair, known in self._contacts.items() if kept.issuperset(pair)}
+        inside = step.inside
+        return Passage(_separating(inside), inside, step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""
@@ -120,10 +123,13 @@ class StepGuard:
 
     def grazes(self, p: Sample, q: Sample) -> bool:
         """Whether a contact begins or ceases to touch between two samples."""
-        known = self._touching.get((p, q))
+        return self._between(p, q) == GRAZES
+
+    def _between(self, p: Sample, q: Sample) -> int:
+        """What contacts do between two samples."""
+        known = self._contacts.get((p, q))
         if known is None:
-            passing, clear = touches(p, q)
-            known = self._touching[p, q] = bool(passing) or not clear
+            known = self._contacts[p, q] = contacts_between(p, q)
         return known
 
     def forget(self) -> None:
@@ -133,8 +139,9 @@ class StepGuard:
     def _examined(self, old: Sample, new: Sample) -> _Step:
         if self._last is None or self._last[0] is not old or self._last[1] is not new:
             # the last one may have been solved again with other harmonics
-            behind = [*(s for s in self._behind if _place(s) < _place(old)), old]
-            self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point, self.grazes))
+            behind = [s for s in self._behind if s.place < old.place]
+            behind.append(old)
+            self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point, self._between))
         return self._last[2]
 
 
@@ -147,13 +154,13 @@ class _Step:
         new: Sample,
         solve: Callable[[Sample, Sample, float], Sample],
         is_branch_point: Callable[[Sample, Sample], bool],
-        grazes: Callable[[Sample, Sample], bool],
+        contacts: Callable[[Sample, Sample], int],
     ) -> None:
-        self.grazes = grazes
+        self.contacts = contacts
         self.samples = [*behind, new]
-        self.old, self.new = behind[-1], new
+        self.old, self.new, self.first = behind[-1], new, len(behind) - 1
         self.solve = solve
-        self.size = _place(new) - _place(self.old)
+        self.size = new.place - self.old.place
         self.probes = 0
         self.refused = False
         self.unsettled: list[Unsettled] = []
@@ -170,11 +177,11 @@ class _Step:
             p, q = pending.pop()
             doubt = self._doubt(p, q)
             if doubt is None:
-                self.settled.append(_place(q) - _place(p))
+                self.settled.append(q.place - p.place)
                 continue
             share, reason = doubt
-            if _place(q) - _place(p) <= least:
-                self.settled.append(_place(q) - _place(p))
+            if q.place - p.place <= least:
+                self.settled.append(q.place - p.place)
                 if not changes(p, q) and not (reason in _REASONS[1:] and _open(p, q)):
                     # no event, but too close to one to tell it from two; open verdicts are stated as such
                     self.unsettled.append(_unsettled(p, q, reason))
@@ -187,12 +194,12 @@ class _Step:
     @property
     def inside(self) -> list[Sample]:
         """The samples of the step, both ends included."""
-        return self.samples[self.samples.index(self.old) :]
+        return self.samples[self.first :]
 
     def _cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
         """The two parts of an interval, the second first; none if there is no motion where the curve should be."""
         a, b = self.old.point, self.new.point
-        place = _place(p) + share * (_place(q) - _place(p))
+        place = p.place + share * (q.place - p.place)
         fraction = (place - a.arclength) / self.size
         self.probes += 1
         try:
@@ -210,26 +217,26 @@ class _Step:
 
     def _doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
         """Where to look into an interval, as a fraction of it, and why; None if it is done."""
-        h = _place(q) - _place(p)
-        if not _explained(p, q):
+        h = q.place - p.place
+        eventful = p.unstable != q.unstable or bool(changes(p, q))
+        if eventful and not _explained(p, q):
             return 0.5, (
                 f"the number of unstable multipliers changes from {p.floquet.unstable} to {q.floquet.unstable}, which "
                 "no bifurcation there explains"
             )
-        if _mixed(p, q):
+        if eventful and _mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
-        if self.grazes(p, q):
+        contacts = self.contacts(p, q)
+        if contacts == GRAZES:
             return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
-        near = nearing_share(p, q) if h > _LAYER else None
-        if near is not None:
-            return near, "a contact that is about to begin or cease changes everything like a square root"
+        if contacts and h > _LAYER:
+            return CUT[contacts], "a contact that is about to begin or cease changes everything like a square root"
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
         if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
-        places = [_place(s) for s in stencil]
-        found = first_doubtful(places, [s.measures for s in stencil], at)
+        found = first_doubtful([s.place for s in stencil], [s.measures for s in stencil], at)
         return None if found is None else (found[1], _REASONS[found[0]])
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
@@ -238,43 +245,44 @@ class _Step:
         They should be about as far apart as p and q: farther ones foretell nothing, and closer ones only rounding.
         """
         i = self.samples.index(p)
-        start, end = p.point.arclength, q.point.arclength
-        h = end - start
-        before, behind = self._smooth(i, -1), self._smooth(i + 1, 1)
-        ways = [start - s.point.arclength for s in before], [s.point.arclength - end for s in behind]
-        left, right = _spaced(ways[0], h), _spaced(ways[1], h)
-        if not left and not right and (before or behind):
+        h = q.place - p.place
+        left, before = self._beside(i, -1, h)
+        right, behind = self._beside(i + 1, 1, h)
+        if not left and not right and (before is not None or behind is not None):
             # one at least
-            left, right = ([0], []) if not behind or (before and ways[0][0] <= ways[1][0]) else ([], [0])
-        return [*(before[k] for k in reversed(left)), p, q, *(behind[k] for k in right)], len(left)
+            if behind is None or (before is not None and p.place - before.place <= behind.place - q.place):
+                left = [before] if before is not None else []
+            else:
+                right = [behind]
+        left.reverse()
+        return [*left, p, q, *right], len(left)
 
-    def _smooth(self, start: int, way: int) -> list[Sample]:
-        """Up to four of the samples beyond one, as far as no contact begins or ceases to touch on the way."""
-        kept: list[Sample] = []
-        samples = self.samples
-        here = samples[start]
+    def _beside(self, start: int, way: int, h: float) -> tuple[list[Sample], Sample | None]:
+        """Up to two of the four samples beyond one, neither too close together nor too far for an interval of length
+        h, as far as no contact begins or ceases to touch on the way; and the first one beyond.
+        """
+        chosen: list[Sample] = []
+        first: Sample | None = None
+        samples, last = self.samples, 0.0
+        here, end = samples[start], samples[start].place
         for k in range(start + way, start + 5 * way, way):
             if not 0 <= k < len(samples):
                 break
             beyond = samples[k]
-            if self.grazes(beyond, here) if way < 0 else self.grazes(here, beyond):
+            if (self.contacts(beyond, here) if way < 0 else self.contacts(here, beyond)) == GRAZES:
                 break
-            kept.append(beyond)
+            if first is None:
+                first = beyond
+            distance = abs(beyond.place - end)
+            if distance - last > 4.0 * h:
+                break
+            if distance - last > 0.1 * h:
+                chosen.append(beyond)
+                last = distance
+                if len(chosen) == 2:
+                    break
             here = beyond
-        return kept
-
-
-def _spaced(distances: list[float], h: float) -> list[int]:
-    """Up to two of the ascending distances, neither too close together nor too far, for an interval of length h."""
-    chosen: list[int] = []
-    last = 0.0
-    for k, distance in enumerate(distances):
-        if distance - last > 4.0 * h or len(chosen) == 2:
-            break
-        if distance - last > 0.1 * h:
-            chosen.append(k)
-            last = distance
-    return chosen
+        return chosen, first
 
 
 _REASONS = (
@@ -288,10 +296,6 @@ _REASONS = (
 def _open(p: Sample, q: Sample) -> bool:
     """Whether a multiplier lies within its error of the unit circle at either of two samples."""
     return not (p.floquet.decided and q.floquet.decided)
-
-
-def _place(sample: Sample) -> float:
-    return sample.point.arclength
 
 
 def _unsettled(p: Sample, q: Sample, reason: str) -> Unsettled:
@@ -318,6 +322,8 @@ def _separating(samples: list[Sample]) -> list[Sample]:
 
     A pair of multipliers that crosses the circle is seen in their count: it wants an interval of its own.
     """
+    if len(samples) == 2:
+        return samples[1:]
     kept = [samples[0]]
     since: set[str] = set()
     for p, q in pairwise(samples):

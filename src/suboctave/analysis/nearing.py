@@ -1,4 +1,4 @@
-"""Whether a contact is about to begin or cease just beyond an interval of a curve.
+"""Whether a contact begins or ceases within an interval of a curve, or is about to just beyond it.
 
 On the side of a grazing on which the contact exists everything changes like a square root of the way to it, up to the
 grazing itself. No polynomial through places on that side foretells it, unless they lie the closer together the nearer
@@ -11,33 +11,39 @@ import math
 
 from suboctave.bifurcation import Sample
 from suboctave.compiled import kernel
+from suboctave.harmonic.grazing_instants import pass_by
 
 #: excursions across a gap, in units of the largest relative displacement, that may end soon
 YOUNG = 0.05
 #: share to which an excursion may shrink in an interval
 SHRINKS = 0.3
-#: where an interval is cut, from the end near the grazing
-_CUT = 0.35
+#: what an interval's contacts do: nothing, shrink towards its first or its last end, begin or cease within it
+NOTHING, FIRST, LAST, GRAZES = 0, 1, 2, 3
+#: where an interval is cut whose contacts shrink, as a fraction of it: closer to that end, towards which the intervals
+#: shorten like the excursion
+CUT = {FIRST: 0.35, LAST: 0.65}
 
 
-def nearing_share(p: Sample, q: Sample) -> float | None:
-    """Where to cut an interval in which an excursion across a gap shrinks so much that it may end just beyond an end.
+def contacts_between(p: Sample, q: Sample) -> int:
+    """What contacts do between two samples.
 
-    As a fraction of the interval, closer to that end: towards it the intervals shorten like the excursion. None if
-    there is no such excursion.
+    GRAZES if any begins or ceases to touch; else FIRST or LAST if an excursion across a gap shrinks so much that it may
+    end just beyond that end; else NOTHING.
     """
+    near = NOTHING
     for a, b in zip(p.gaps, q.gaps, strict=True):
-        end = _shrinking_end(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
-        if end:
-            return _CUT if end == 1 else 1.0 - _CUT
-    return None
+        here = _between(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        if here == GRAZES:
+            return GRAZES
+        near = near or here
+    return near
 
 
 @kernel()
-def _shrinking_end(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
-    """1 where an excursion of the first motion is a small part of the same excursion of the other, 2 where it is the
-    other way round, 0 where neither is.
-    """
+def _between(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
+    """`contacts_between` for one gap."""
+    if pass_by(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
+        return 3
     if _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
         return 1
     if _shrinks(other_tau, other_value, other_curve, other_level, tau, value, curve, level):
@@ -68,4 +74,4 @@ def _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, othe
     return False
 
 
-__all__ = ["nearing_share"]
+__all__ = ["CUT", "FIRST", "GRAZES", "LAST", "NOTHING", "contacts_between"]

@@ -12,8 +12,8 @@ import numpy as np
 from suboctave.analysis.corrector import SOLVED, UNSOLVED, bordered_by_frequency, corrected
 from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.compiled import ready
-from suboctave.continuation.kernels import bordered_transposed
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.kernels import bordered_transposed, weighted_length
+from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import NewtonOptions, Solved, not_converged
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
@@ -219,8 +219,9 @@ class ResponseCurve:
             raise not_converged(self, guess, error, int(iterations))
         if ended != SOLVED:
             return None
-        x, omega, values = self.split(u)
-        state = BalanceState(balance, balance.linear, x, omega, values)
+        # all harmonics are kept, and the frequency is free
+        x = u[:-1].reshape(2 * high + 1, size)
+        state = BalanceState(balance, balance.linear, x, float(u[-1]), balance.values)
         state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
         evaluation = ResponseEvaluation(state, self.name, self.reference)
         evaluation.__dict__["error"] = error
@@ -229,13 +230,13 @@ class ResponseCurve:
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
-        return length(self._weight * u[:-1])
+        return float(weighted_length(self._weight, u))
 
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
         weights = np.empty(len(u))
-        weights[:-1] = self._weight / size
+        np.divide(self._weight, size, out=weights[:-1])
         weights[-1] = 1.0 / self.span
         return weights
 

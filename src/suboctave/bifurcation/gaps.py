@@ -42,14 +42,18 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     found = []
     for law, motion in zip(state.balance.coefficients(state.values)[2], state.motions, strict=True):
         if law.levels:
-            turns = extrema(motion, grid[0], grid[1])
+            turns = _rows(extrema(motion, grid[0], grid[1]))
             found += [GapExtrema(element, place, level, *turns) for element, place, level in law.levels]
     for nodal in state.nodal:
         places = told_levels(nodal.kind, nodal.c)
         if places:
-            turns = extrema(nodal.motions[0], grid[0], grid[1])
+            turns = _rows(extrema(nodal.motions[0], grid[0], grid[1]))
             found += [GapExtrema(nodal.own.index, place, level, *turns) for place, level in enumerate(places)]
     return tuple(found)
+
+
+def _rows(turns: Array) -> tuple[Array, Array, Array]:
+    return turns[0], turns[1], turns[2]
 
 
 def levels(local: LocalMotion) -> tuple[float, ...]:

@@ -15,7 +15,6 @@ from __future__ import annotations
 import cmath
 import weakref
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,18 +36,34 @@ from suboctave.stability import FloquetResult, Monodromy, StabilityMethod
 _MONODROMY = Monodromy()
 
 
-@dataclass(frozen=True, eq=False)
 class Sample:
-    """A point of a response curve with what the tests ask of it."""
+    """A point of a response curve with what the tests ask of it; `place` is its arclength."""
 
-    point: CurvePoint
-    state: BalanceState
-    method: StabilityMethod = _MONODROMY
+    def __init__(self, point: CurvePoint, state: BalanceState, method: StabilityMethod = _MONODROMY) -> None:
+        self.point = point
+        self.state = state
+        self.method = method
+        self.place = point.arclength
 
     @lazy
     def floquet(self) -> FloquetResult:
         """Multipliers and their errors."""
         return self.method.along(self.state)
+
+    @lazy
+    def at_rest(self) -> bool:
+        """Whether the motion counts as rest, where its curve can tell."""
+        return bool(getattr(self.point.evaluation, "at_rest", False))
+
+    @lazy
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return self.floquet.unstable
+
+    @lazy
+    def signs(self) -> tuple[bool, bool, bool]:
+        """What the tests of BP, LP and PD look at."""
+        return self.point.orientation > 0.0, self.slope > 0.0, self.half_sign > 0.0
 
     @lazy
     def half_sign(self) -> float:
@@ -173,12 +188,12 @@ class NeimarkSacker(BifurcationKind):
 
     def beyond(self, a: Sample, b: Sample, accounted: int) -> bool:
         """Whether a pair crosses the circle, `accounted` changes of the count being explained by others."""
-        return abs(a.floquet.unstable - b.floquet.unstable) >= accounted + 2 and self._pair(a, b) is not None
+        return abs(a.unstable - b.unstable) >= accounted + 2 and self._pair(a, b) is not None
 
     @staticmethod
     def _pair(a: Sample, b: Sample) -> tuple[complex, complex] | None:
         """The complex pair of multipliers that crosses: its members at a and b."""
-        outside, inside = (a, b) if a.floquet.unstable > b.floquet.unstable else (b, a)
+        outside, inside = (a, b) if a.unstable > b.unstable else (b, a)
         candidates = [mu for mu in outside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) > 1.0]
         partners = [mu for mu in inside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) <= 1.0]
         if not (candidates and partners):
@@ -234,6 +249,8 @@ def solved_by(formulation: Formulation) -> dict[str, BifurcationKind]:
 
 def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     """The kinds whose tests have changed between two neighbours, in the order in which they are looked for."""
+    if a.signs == b.signs and abs(a.unstable - b.unstable) < 2:
+        return ()
     # several ask this of the same two
     known = b.__dict__.get("_changes")
     if known is not None and known[0]() is a:

@@ -109,6 +109,28 @@ def normalised(direction, weights):
 
 
 @kernel()
+def rescaled(direction, weights, out):
+    """A direction in u with unit length in scaled arclength, into `out`."""
+    total = 0.0
+    for i in range(direction.shape[0]):
+        d = weights[i] * direction[i]
+        total += d * d
+    total = 1.0 / math.sqrt(total)
+    for i in range(direction.shape[0]):
+        out[i] = direction[i] * total
+
+
+@kernel()
+def weighted_length(weights, u):
+    """`|weights u|` of as many entries of u as there are weights."""
+    total = 0.0
+    for i in range(weights.shape[0]):
+        d = weights[i] * u[i]
+        total += d * d
+    return math.sqrt(total)
+
+
+@kernel()
 def cosine(a, b, weights):
     """Cosine of the angle between two vectors in scaled variables."""
     ab = 0.0

@@ -229,7 +229,7 @@ class March:
                 return
             point = self._rescaled(point, largest)
             try:
-                new, step, deviation = self._advance(point, step, behind)
+                new, step, deviation, turn = self._advance(point, step, behind)
             except ConvergenceError as failure:
                 self.ended = (
                     f"step size fell below {options.min_step:.0e} at {point.curve.where(point.u)}: {failure}. "
@@ -269,7 +269,7 @@ class March:
             count += 1
             if count >= _LONG and count & (count - 1) == 0:
                 mark, marked = _Place(new), count
-            step = self._next_step(point, new, new.arclength - point.arclength, deviation)
+            step = self._next_step(new, new.arclength - point.arclength, deviation, turn)
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             adapted = new.curve.adapted(new.u, new.evaluation)
@@ -290,30 +290,35 @@ class March:
     @staticmethod
     def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
         """The same point with scaling and tangent length of the present amplitude."""
-        weights = point.curve.weights(point.u, largest)
-        t = kernels.normalised(weights * point.tangent, weights)
+        weights, t = point.curve.weights(point.u, largest), np.empty(len(point.u))
+        kernels.rescaled(point.tangent, weights, t)
         p = point
         return CurvePoint(p.curve, p.u, t, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
-    def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
-        """One accepted step: new point, step length used, distance between prediction and solution."""
+    def _advance(
+        self, point: CurvePoint, step: float, behind: list[CurvePoint]
+    ) -> tuple[CurvePoint, float, float, float]:
+        """One accepted step: new point, step length used, distance between prediction and solution, and the angle
+        between the tangents.
+        """
         known = [point, *behind]
-        points = np.array([point.curve.transfer(p.u, p.curve) for p in known])
-        tangents = np.array([point.curve.transfer(p.tangent, p.curve) for p in known])
+        curve = point.curve
+        points = np.array([p.u if p.curve is curve else curve.transfer(p.u, p.curve) for p in known])
+        tangents = np.array([p.tangent if p.curve is curve else curve.transfer(p.tangent, p.curve) for p in known])
         order = len(known)
         while True:
             try:
                 guess = np.empty(len(point.u))
                 kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
                 row = point.weights * point.tangent
-                solved = correct(point.curve, guess, row, point.weights, self.newton, spare=_SPARED * step)
+                solved = correct(curve, guess, row, point.weights, self.newton, spare=_SPARED * step)
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
                 fine = turn < 2.5 * self.stepping.angle and solved.distance < 0.4 * step
                 fine = fine and taken <= 1.000001 * self.stepping.max_step
                 if step <= self.stepping.min_step or (fine and (self.inspect is None or self.inspect(point, new))):
-                    return new, step, solved.distance
+                    return new, step, solved.distance, turn
                 failure = ConvergenceError("the curve turns too sharply")
             except ConvergenceError as error:
                 failure = error
@@ -323,7 +328,7 @@ class March:
             order = max(1, order - 1)
             step = max(0.5 * step, self.stepping.min_step)
 
-    def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float]:
+    def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float, float]:
         """A point beyond a corner of the equations, where no tangent leads on but the parameter does.
 
         A corner is met where a coefficient has one: a gap tracked through zero, whose force at rest begins to change.
@@ -343,18 +348,19 @@ class March:
                 continue
             taken = length(point.weights * (solved.u - point.u))
             if taken <= min(100.0 * share, self.stepping.max_step):
-                return replace(new, arclength=point.arclength + taken), self.stepping.initial_step, 0.0
+                beyond = replace(new, arclength=point.arclength + taken)
+                return beyond, self.stepping.initial_step, 0.0, self._angle(point, beyond)
         raise failure
 
     @staticmethod
     def _angle(a: CurvePoint, b: CurvePoint) -> float:
         return math.acos(min(1.0, max(-1.0, kernels.cosine(a.tangent, b.tangent, b.weights))))
 
-    def _next_step(self, point: CurvePoint, new: CurvePoint, step: float, deviation: float) -> float:
+    def _next_step(self, new: CurvePoint, step: float, deviation: float, turn: float) -> float:
         options = self.stepping
         factor = min(
             (options.deviation / max(deviation, 1e-12)) ** (1.0 / 3.0),
-            options.angle / max(self._angle(point, new), 1e-9),
+            options.angle / max(turn, 1e-9),
             2.0 if new.iterations <= 4 else 4.0 / new.iterations,
         )
         step = step * min(2.0, max(0.3, factor))

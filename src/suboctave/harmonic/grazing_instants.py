@@ -39,7 +39,8 @@ def _turn(c, lo, hi, rises, first):
 
 @kernel()
 def extrema(c, zr, zi):
-    """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative; ascending in tau.
+    """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative, (3, m); ascending in
+    tau.
 
     Brackets of the derivative's zeros on the uniform grid z, then safeguarded Newton. A pair hidden between two samples
     is looked for where the cubic through them nearly turns. Maxima and minima alternate, so that their number is even.
@@ -47,9 +48,8 @@ def extrema(c, zr, zi):
     n = zr.shape[0]
     h = 2.0 * math.pi / n
     values = motion(c, zr, zi)
-    tau = np.empty(2 * n)
-    value = np.empty(2 * n)
-    curve = np.empty(2 * n)
+    found = np.empty((3, 2 * n))
+    tau, value, curve = found[0], found[1], found[2]
     count = 0
     for j in range(n):
         d0 = values[1, j]
@@ -76,7 +76,7 @@ def extrema(c, zr, zi):
             for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
                 tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
                 count += 1
-    return tau[:count].copy(), value[:count].copy(), curve[:count].copy()
+    return found[:, :count].copy()
 
 
 @kernel()
@@ -114,6 +114,13 @@ def _smoothed(x, wanted):
                 kept += 1
         m = kept
     return index
+
+
+@kernel()
+def pass_by(ta, xa, sa, level_a, tb, xb, sb, level_b):
+    """Whether `passages` finds anything: extrema that pass a level, or a level crossed more or less often."""
+    _, count, crossed_a, crossed_b = passages(ta, xa, sa, level_a, tb, xb, sb, level_b)
+    return count > 0 or crossed_a != crossed_b
 
 
 @kernel()

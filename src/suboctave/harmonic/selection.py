@@ -151,7 +151,7 @@ def choose_harmonics(
     basis = state.basis
     if basis.nu > 1:
         return _Classes(state, options).chosen(tolerance, dropping)
-    nu, high = basis.nu, basis.harmonics
+    high = basis.harmonics
     tail, size = state.tails
     if size == 0.0:
         return basis
@@ -159,16 +159,19 @@ def choose_harmonics(
 
     def sufficient(bound: float) -> int:
         for h in ladder:
-            if h * nu < 2 * high and tail[h * nu] <= bound:
+            if h < 2 * high and tail[h] <= bound:
                 return h
         least = max(2.0 * high, min(_expected(tail, high, bound), 2.5 * high))
-        return next((h for h in ladder if h * nu >= least), ladder[-1])
+        return next((h for h in ladder if h >= least), ladder[-1])
 
     if tail[high] > tolerance:
         wanted = sufficient(0.5 * tolerance)
-        return basis if wanted * nu <= high else HarmonicBasis(wanted * nu, nu)
+        return basis if wanted <= high else HarmonicBasis(wanted)
+    fewer = bisect_left(ladder, high) - 1
+    if fewer < 0 or tail[ladder[fewer]] > 0.2 * tolerance:
+        return basis
     wanted = sufficient(0.2 * tolerance)
-    return HarmonicBasis(wanted * nu, nu) if wanted * nu < high else basis
+    return HarmonicBasis(wanted) if wanted < high else basis
 
 
 @dataclass(frozen=True)
