@@ -26,6 +26,8 @@ from suboctave.harmonic.evaluation import evaluate, evaluate_told, jacobian
 #: how a correction ended: solved; given up without convergence; something the general way knows more about
 SOLVED, UNSOLVED, OTHER = 0, 1, 2
 _TINY = float(np.finfo(float).tiny)
+#: largest relative change of a tangent by a refinement that leaves its square
+_CLOSE = 1e-6
 
 
 @kernel()
@@ -37,6 +39,32 @@ def bordered_by_frequency(table, moving, rate, starts, dofs, shape, matrices, mu
     mean = n > 0
     jacobian(extended, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x)
     return bordered_transposed(extended, row, weights)
+
+
+@kernel()
+def refined_tangent(transposed, lu, pivots, direction):
+    """The solution of `B d = (0, ..., 0, 1)` by the factors of a matrix close by, into `direction`; returns whether
+    that goes: one step of iterative refinement squares the distance between the two.
+
+    transposed: B^T; lu, pivots: as `factorise` has left them.
+    """
+    n = direction.shape[0]
+    rest = np.zeros(n)
+    rest[n - 1] = 1.0
+    for i in range(n):
+        direction[i] = rest[i]
+    solve_factorised(lu, pivots, direction)
+    for j in range(n):
+        value = direction[j]
+        for i in range(n):
+            rest[i] -= transposed[j, i] * value
+    solve_factorised(lu, pivots, rest)
+    size = change = 0.0
+    for i in range(n):
+        size += direction[i] * direction[i]
+        change += rest[i] * rest[i]
+        direction[i] += rest[i]
+    return change <= _CLOSE * _CLOSE * size
 
 
 @kernel()
@@ -58,7 +86,8 @@ def corrected(
     multiples, ..., weight
         As in `evaluation.evaluate`; points, ..., rule_weights as in `evaluation.evaluate_told`, or None.
     u, tangent, lu, pivots
-        Filled: solution, its unit tangent along the row, factors of the transposed bordered Jacobian at the solution.
+        Filled: solution, its unit tangent along the row, factors of the transposed bordered Jacobian at the solution,
+        or at an iterate within `spare` of it.
     blocks, table, motions, parts, sizes
         Filled: the evaluation there.
     numbers
@@ -68,8 +97,9 @@ def corrected(
     for i in range(n):
         u[i] = guess[i]
     error = previous = np.inf
-    contraction = before = start = 0.0
+    contraction = before = start = way = 0.0
     factorised = False
+    direction = np.empty(n)
     for iteration in range(iterations + 1):
         numbers[1] = iteration
         omega = u[n - 1]
@@ -107,18 +137,26 @@ def corrected(
             found = bordered_by_frequency(
                 table, moving, omega / nu, starts, dofs, shape, matrices, multiples, omega, x, row, weights
             )
+            if done and factorised and way <= spare and refined_tangent(found, lu, pivots, direction):
+                break
             for i in range(n):
                 for j in range(n):
                     lu[i, j] = found[i, j]
             if factorise(lu, pivots):
                 return OTHER
             factorised = True
+            way = 0.0
         if done:
+            for i in range(n):
+                direction[i] = 0.0
+            direction[n - 1] = 1.0
+            solve_factorised(lu, pivots, direction)
             break
         before = error
         step = right_hand_side(parts[2].ravel(), row, weights, u, guess)
         solve_factorised(lu, pivots, step)
         further, size = moved(u, step, weights, 1.0)
+        way += size
         for i in range(n):
             u[i] = further[i]
         if iteration == 0:
@@ -131,9 +169,6 @@ def corrected(
     numbers[2] = distance(u, guess, weights)
     numbers[3] = contraction
     numbers[4] = determinant_sign(lu, pivots)
-    direction = np.zeros(n)
-    direction[n - 1] = 1.0
-    solve_factorised(lu, pivots, direction)
     unit = normalised(direction, weights)
     for i in range(n):
         tangent[i] = unit[i]

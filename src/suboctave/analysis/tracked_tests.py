@@ -245,8 +245,7 @@ class PairCrossing(CurveTest):
 
     def smooth(self, sample: TrackedSample) -> Array:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
-        column: Array = measures.measured(1.0, sample.others)[:, 3]
-        return column
+        return measures.torus(sample.others)
 
 
 def _frequency(sample: TrackedSample, target: complex) -> float:

@@ -24,7 +24,6 @@ from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.solve import Guess, Singular
-from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
@@ -84,8 +83,7 @@ class Sample:
     def measures(self) -> Array:
         """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
         point = self.point
-        turn = self.slope * float(point.weights[point.curve.parameter]) / length(point.weights * point.tangent)
-        return measures.measured(turn, self.floquet.multipliers)
+        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet.multipliers)
 
 
 class BifurcationKind(ABC):

@@ -32,17 +32,24 @@ from suboctave.harmonic.state import BalanceState
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
+_ONE = np.ones(1)
 
 
-def measured(turn: float, mu: ComplexArray) -> Array:
-    """turn, fold, double, torus from the first of them and the multipliers (2 n,): signs and logarithms of the moduli,
-    shape (2, 4).
+def measured(tangent: Array, weights: Array, parameter: int, mu: ComplexArray) -> Array:
+    """turn, fold, double, torus from the tangent, its scaling, the free parameter's place in it, and the multipliers
+    (2 n,): signs and logarithms of the moduli, shape (2, 4).
 
     `torus` is constant for motions without damping, whose pairs never leave the circle.
     """
     out = np.empty((2, 4))
-    _measure(turn, mu, out[0], out[1])
+    _measure(tangent, weights, parameter, mu, out)
     return out
+
+
+def torus(mu: ComplexArray) -> Array:
+    """torus alone, of any multipliers: sign and logarithm of the modulus, (2,)."""
+    column: Array = measured(_ONE, _ONE, 0, mu)[:, 3]
+    return column
 
 
 def half_sign(state: BalanceState) -> float:
@@ -81,9 +88,14 @@ def _half_sign(table, moving, rate, starts, dofs, shape, matrices, multiples, om
 
 
 @kernel()
-def _measure(turn, mu, sign, log):
+def _measure(tangent, weights, parameter, mu, out):
     """Complex factors come in conjugate pairs: the sign is that of the real ones."""
     n = mu.shape[0]
+    sign, log = out[0], out[1]
+    size = 0.0
+    for i in range(tangent.shape[0]):
+        size += (weights[i] * tangent[i]) ** 2
+    turn = weights[parameter] * tangent[parameter] / math.sqrt(size)
     sign[0] = 1.0 if turn > 0.0 else -1.0
     log[0] = math.log(abs(turn)) if turn != 0.0 else -np.inf
     for k in range(1, 4):

@@ -103,7 +103,11 @@ class _Place:
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
         images = self._images[1]
-        if all(abs(new.u[index] - image[index]) * w[index] > 1.5 * step for image in images):
+        here, reach = new.u[index], 1.5 * step / w[index]
+        for image in images:
+            if abs(here - image[index]) <= reach:
+                break
+        else:
             return None
         heading = new.curve.transfer(own.tangent, own.curve)
         for image, leaving in zip(images, new.curve.images(heading), strict=True):
@@ -370,12 +374,13 @@ class March:
 
     def _bound_passed(self, point: CurvePoint, new: CurvePoint) -> float | None:
         low, high = self.bounds
-        if new.parameter >= high and point.parameter < high:
+        here, before = new.parameter, point.parameter
+        if here >= high and before < high:
             return high
-        if new.parameter <= low and point.parameter > low:
+        if here <= low and before > low:
             return low
-        if not low <= new.parameter <= high:
-            return high if new.parameter > high else low
+        if not low <= here <= high:
+            return high if here > high else low
         return None
 
     def _land(self, point: CurvePoint, new: CurvePoint, bound: float) -> CurvePoint | None:

@@ -303,8 +303,8 @@ def dynamic_stiffness(mass, damping, stiffness, frequency, order):
 
 
 @kernel()
-def tails(x, neglected, weight):
-    """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size.
+def tails(x, neglected, weight, out):
+    """Size of all harmonics above k relative to the motion, into `out` for k = 0 .. 2 H + 1; returns the motion's size.
 
     x (2 H + 1, n) are kept, `neglected` (H + 1, n) complex those from H + 1 on; sizes are weighted per DOF.
     """
@@ -324,12 +324,11 @@ def tails(x, neglected, weight):
     for h in range(high + 1):
         size += squares[h]
     size = math.sqrt(size)
-    out = np.zeros(2 * high + 2)
-    total = 0.0
+    out[2 * high + 1] = total = 0.0
     for h in range(2 * high, -1, -1):
         total += squares[h + 1]
         out[h] = math.sqrt(total) / size if size > 0.0 else 0.0
-    return out, size
+    return size
 
 
 @kernel()

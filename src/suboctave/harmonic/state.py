@@ -353,8 +353,8 @@ class BalanceState:
     @lazy
     def tails(self) -> tuple[Array, float]:
         """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
-        tail, size = group_kernels.tails(self.x, self.neglected, self.balance.scales()[0])
-        return tail, float(size)
+        tail = np.empty(2 * self.basis.harmonics + 2)
+        return tail, float(group_kernels.tails(self.x, self.neglected, self.balance.scales()[0], tail))
 
     @lazy
     def completed(self) -> BalanceState:

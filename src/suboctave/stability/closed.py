@@ -87,9 +87,8 @@ class ClosedSingle:
     """
 
     def __init__(self, state: BalanceState, silent: bool, largest: float) -> None:
-        balance = state.balance
         self.state, self.silent, self.largest = state, silent, largest
-        self.laws = laws = balance.packed_laws(state.values)[0]
+        self.laws = laws = state.balance.packed_laws(state.values)[0]
         degree = max(laws.polynomial.shape[1] - 2, 1 if len(laws.steps) else 0)
         self.varying, self.degree = degree > 0, degree
         self.passed: tuple[Any, Any, Any] = (*laws.places, laws.step_first) if len(laws.steps) else (None, None, None)
@@ -99,13 +98,10 @@ class ClosedSingle:
     def applies(state: BalanceState) -> bool:
         """Whether a motion is of that kind."""
         balance = state.balance
-        return (
-            balance.size == 1
-            and balance.basis.kept is None
-            and not balance.own
-            and isinstance(state.linear, StructuralMatrices)
-            and not any(law.sharp or law.uniform for law in balance.coefficients(state.values)[2])
-        )
+        if balance.size > 1 or balance.basis.kept is not None or balance.own:
+            return False
+        laws = balance.packed_laws(state.values)[0]
+        return isinstance(state.linear, StructuralMatrices) and (laws.told or not laws.sampled)
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """Multipliers, how far the correction has moved them, and the share of it that was taken.

@@ -57,7 +57,11 @@ def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetR
     # there are few: numbers are quicker than arrays
     values = mu.tolist()
     largest = max(1.0, abs(values[0]))
-    distance, nearest = min((abs(1.0 - value), i) for i, value in enumerate(values))
+    distance, nearest = math.inf, 0
+    for i, value in enumerate(values):
+        away = abs(1.0 - value)
+        if away < distance:
+            distance, nearest = away, i
     moved = float(shift[nearest]) / share if share > 0.0 else math.inf
     if moved > _DOUBTFUL * distance:
         mu, shift, share = _beside_fold(motion, moved, shift)
