@@ -182,6 +182,13 @@ def _linear_rates(left, right, mean, multiples, omega, matrices):
 
 
 @kernel()
+def add_steps(left, right, mean, dofs, shape, sampled, steps, gx):
+    """Add the gradient of arctan steps along one direction to `gx`; sampled: their nodes with the motion."""
+    weights = bends_of_smooth_steps(sampled, steps)
+    _add_group(left, right, mean, dofs, shape, sampled[0], sampled[1], weights[0], gx)
+
+
+@kernel()
 def closed_gradient(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
     step_first, line, rule_nodes, rule_weights, top, multiples, omega, matrices, gx,
@@ -209,8 +216,7 @@ def closed_gradient(
             sampled = sharp_nodes(
                 c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
             )
-            weights = bends_of_smooth_steps(sampled, steps[low:high])
-            _add_group(left, right, mean, at, along, sampled[0], sampled[1], weights[0], gx)
+            add_steps(left, right, mean, at, along, sampled, steps[low:high], gx)
     return _linear_rates(left, right, mean, multiples, omega, matrices)
 
 
@@ -222,7 +228,7 @@ def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
         (bends_of_corners, len(packed.pieces)),
         (bends_of_polynomial, packed.polynomial.shape[1] > 2),
         (sharp_nodes, packed.told),
-        (bends_of_smooth_steps, packed.told),
+        (add_steps, packed.told),
     )
     return [_add_group, _linear_rates, *(part for part, needed in asked if needed)]
 
@@ -288,6 +294,7 @@ def by_kappa(state: BalanceState, mean: bool, left: Array, right: Array) -> comp
 
 __all__ = [
     "add_doubled_form",
+    "add_steps",
     "applies",
     "by_kappa",
     "closed_gradient",
