@@ -14,8 +14,8 @@ from suboctave.bifurcation.bordered import bordered, null_vectors
 from suboctave.bifurcation.bordered_kernels import border, fold_step, inverse_iteration
 from suboctave.continuation.lapack import factorise, solve_transposed
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import real_form
-from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic import free_form, real_form
+from suboctave.harmonic.perturbation import Kind, operator
 
 
 def between_stops():
@@ -76,6 +76,8 @@ def generally(monkeypatch):
     monkeypatch.setattr(solve, "_at_once", lambda *_: None)
     monkeypatch.setattr(bordered_module, "_compiled", lambda *_: None)
     monkeypatch.setattr(real_form, "closed_parts", lambda *_: None)
+    monkeypatch.setattr(free_form, "free_operator", lambda *_: None)
+    monkeypatch.setattr(free_form, "free_gradient", lambda *_: None)
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -144,6 +146,43 @@ def test_g_and_its_gradient(monkeypatch, name):
         assert one.factor.solve(rhs) == pytest.approx(other.factor.solve(rhs), rel=1e-7, abs=1e-9)
 
 
+def rubbing():
+    """Two masses, a force that depends on velocity, and a stop between them."""
+    elements = [
+        so.Expression(dof=0, expression="0.3*x**2*v + 0.1*x**3"),
+        so.ElasticStop(direction=[-1.0, 1.0], stiffness=5.0, gap=0.1),
+    ]
+    stiffness = np.array([[3.0, -1.0], [-1.0, 2.0]])
+    loads = [so.HarmonicLoad(dof=0, amplitude=0.3)]
+    return so.System(np.array([[1.0, 0.2], [0.2, 0.7]]), 0.02 * stiffness, stiffness, elements, loads)
+
+
+@pytest.mark.parametrize(
+    "make", [between_stops, rubbing, so.library.reference_oscillator, lambda: so.library.nltva(0.1)]
+)
+@pytest.mark.parametrize("nu", [1, 2])
+def test_complex_operator_and_its_gradient(monkeypatch, make, nu):
+    """J_kappa at any kappa, g and its gradient, against the general way."""
+    balance = so.HarmonicBalance(make(), so.HarmonicBasis(6, nu))
+    rng = np.random.default_rng(3)
+    x = rng.standard_normal((13, balance.size)) / (1.0 + np.arange(13)[:, None]) ** 1.5
+    found = []
+    for general in (False, True):
+        with monkeypatch.context() as patch:
+            if general:
+                patch.setattr(free_form, "free_operator", lambda *_: None)
+                patch.setattr(free_form, "free_gradient", lambda *_: None)
+            state = balance.at(x, 1.7)
+            b = bordered(state, Kind.FREE, null_vectors(balance.at(x, 1.7), Kind.FREE, 0.31), 0.31)
+            found.append((operator(state, Kind.FREE, 0.31), b.g, *b.gradient(("omega",))))
+    (matrix, g, by_x, rates, by_kappa), (matrix_, g_, by_x_, rates_, by_kappa_) = found
+    assert matrix == pytest.approx(matrix_, abs=1e-12 * np.abs(matrix_).max())
+    assert g == pytest.approx(g_, rel=1e-8)
+    assert by_x == pytest.approx(by_x_, abs=1e-8 * np.abs(by_x_).max())
+    assert rates["omega"] == pytest.approx(rates_["omega"], rel=1e-8)
+    assert by_kappa == pytest.approx(by_kappa_, rel=1e-8)
+
+
 def test_left_to_the_general_way():
     """Other parameters than the frequency, Neimark-Sacker points, laws asked at nodes."""
     system = so.library.reference_oscillator()
@@ -155,8 +194,8 @@ def test_left_to_the_general_way():
     assert solve._at_once(along_omega, Kind.FREE, along_omega.state()) is None
     dry = so.System(1.0, 0.1, 1.0, [so.TanhFriction(dof=0, force=0.1, velocity=0.01)], [so.HarmonicLoad(0, 1.0)])
     balance = so.HarmonicBalance(dry, so.HarmonicBasis(5))
-    rubbing = solve.Guess(balance, x, 2.0, balance.values, "omega", 1.0)
-    assert solve._at_once(rubbing, Kind.INTEGER, rubbing.state()) is None
+    at_nodes = solve.Guess(balance, x, 2.0, balance.values, "omega", 1.0)
+    assert solve._at_once(at_nodes, Kind.INTEGER, at_nodes.state()) is None
 
 
 def test_pieces_of_linear_algebra():

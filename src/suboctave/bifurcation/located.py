@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation.bordered_kernels import augment, border, fold_step, inverse_iteration, unit_of
+from suboctave.bifurcation.bordered_kernels import augment, border, border_at, fold_step, inverse_iteration, unit_of
 from suboctave.compiled import kernel
 from suboctave.continuation.lapack import solve_factorised
-from suboctave.harmonic.evaluation import add_told, along_directions, evaluate, jacobian
+from suboctave.harmonic.evaluation import add_told, along_directions, evaluate, evaluate_told, jacobian
 from suboctave.harmonic.group_force import PackedLaws
 from suboctave.harmonic.group_kernels import add_pieces
 from suboctave.harmonic.real_form import add_steps, closed_gradient
@@ -202,10 +202,10 @@ def located(
     return UNSOLVED
 
 
-def located_parts(packed: PackedLaws) -> list[Callable[..., Any]]:
-    """The kernels that `located` calls for laws in closed form, but for those of `real_form.closed_parts`."""
-    asked = ((add_pieces, len(packed.pieces)), (add_told, packed.told))
-    return [evaluate, jacobian, border, closed_gradient, *(part for part, needed in asked if needed)]
+def located_parts(packed: PackedLaws) -> tuple[Callable[..., Any], ...]:
+    """The kernels that are compiled before `located` is, but for those of `real_form.closed_parts`."""
+    forces = (evaluate_told,) if packed.told else (evaluate,)
+    return (border_at, closed_gradient, *forces, *((add_pieces,) if len(packed.pieces) else ()))
 
 
 __all__ = ["AWAY", "OFF_AXIS", "OTHER", "SOLVED", "STILL", "UNSOLVED", "located", "located_parts"]

@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.bifurcation.bordered import Bordered, NullVectors, at_values, bordered, null_vectors, residual_scale
 from suboctave.bifurcation.located import AWAY, OFF_AXIS, OTHER, SOLVED, STILL, UNSOLVED, located, located_parts
-from suboctave.compiled import ready
+from suboctave.compiled import at_hand, ready
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor, length
 from suboctave.errors import ConvergenceError
@@ -308,8 +308,7 @@ def _at_once(guess: Guess, kind: Kind, begin: BalanceState) -> Singular | None:
         return None
     packed, nodes = balance.packed_laws(values)
     called = real_form.closed_parts(packed)
-    # what it calls is compiled one by one, not all at one go
-    if called is None or not all(map(ready, (*called, *located_parts(packed)))):
+    if called is None:
         return None
     n, high, size, groups = balance.dimension, basis.harmonics, balance.size, len(balance.groups)
     known = guess.vectors is not None
@@ -323,11 +322,15 @@ def _at_once(guess: Guess, kind: Kind, begin: BalanceState) -> Singular | None:
     table = np.empty((3, groups, balance.top + 1), dtype=complex)
     motions, sizes, numbers = np.empty((groups, high + 1), dtype=complex), np.empty(4), np.empty(2)
     laws, steps = real_form.closed_laws(balance, packed, nodes)
-    start = (u, kind is Kind.INTEGER, known, right, left, guess.span, least, _LIMITS, _ITERATIONS)
+    start = (u, kind is Kind.INTEGER, known, right, left, float(guess.span), least, _LIMITS, _ITERATIONS)
     structure = (basis.nu, balance.moving, basis.multiples, basis.half_multiples, linear.matrices)
     forces = (*laws, balance.load(values, 1.0), balance.scales()[1], *steps)
     filled = (blocks, table, motions, parts, sizes, numbers)
-    ended = located(*(*start, *structure, *forces, *filled))
+    given = (*start, *structure, *forces, *filled)
+    # what it calls is compiled one by one, not all at one go
+    if not (at_hand(located, *given) or all(map(ready, (*called, *located_parts(packed))))):
+        return None
+    ended = located(*given)
     if ended == OTHER:
         return None
     error, iterations = numbers.tolist()

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.compiled import kernel, ready
+from suboctave.compiled import at_hand, kernel, ready
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.closed_bends import bends_of_corners, bends_of_polynomial, bends_of_smooth_steps
 from suboctave.harmonic.evaluation import told_steps
@@ -221,16 +221,16 @@ def closed_gradient(
 
 
 def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
-    """The kernels that `closed_gradient` calls for laws of some kinds only; None if some are not in closed form."""
+    """The kernels that gradients call for laws of some kinds only; None if some are not in closed form."""
     if packed.sampled and not packed.told:
         return None
     asked = (
         (bends_of_corners, len(packed.pieces)),
         (bends_of_polynomial, packed.polynomial.shape[1] > 2),
         (sharp_nodes, packed.told),
-        (add_steps, packed.told),
+        (bends_of_smooth_steps, packed.told),
     )
-    return [_add_group, _linear_rates, *(part for part, needed in asked if needed)]
+    return [part for part, needed in asked if needed]
 
 
 def closed_laws(balance: HarmonicBalance, packed: PackedLaws, nodes: Array) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -259,13 +259,14 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     gx = np.zeros((basis.size, balance.size))
     multiples = basis.multiples if mean else basis.half_multiples
     packed, nodes = balance.packed_laws(state.values)
-    parts = closed_parts(packed)
-    if parts is not None and "closed_bends" not in state.__dict__ and all(map(ready, parts)):
+    called = closed_parts(packed)
+    if called is not None and "closed_bends" not in state.__dict__:
         laws, steps = closed_laws(balance, packed, nodes)
-        by_omega, by_kappa = closed_gradient(
-            *(u, v, mean, state.motions, *laws, *steps, balance.top, multiples, state.omega, linear.matrices, gx)
-        )
-        return gx, by_omega, 1j * by_kappa
+        given = (u, v, mean, state.motions, *laws, *steps, balance.top, multiples, state.omega, linear.matrices, gx)
+        # what it calls is compiled one by one, not all at one go
+        if at_hand(closed_gradient, *given) or all(map(ready, (_add_group, *called))):
+            by_omega, by_kappa = closed_gradient(*given)
+            return gx, by_omega, 1j * by_kappa
     for group, zr, zi, second in _second(state):
         _add_group(u, v, mean, group.dofs, group.values, zr, zi, second, gx)
     by_omega, by_kappa = _linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
