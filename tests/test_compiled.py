@@ -93,6 +93,18 @@ def test_credit_comes_back_with_time_and_is_limited(made):
     assert compiled._ledger.credit == compiled.CREDIT
 
 
+def test_one_that_takes_long_waits_until_nothing_else_has_been_compiled(made):
+    spent = made("patience=-1.0, alone=True", credit=0.5 * compiled.CREDIT)
+    assert spent(VALUES) == 30.0
+    assert spent(VALUES) == 30.0
+    assert not spent.signatures
+    # the kernel that it calls comes first
+    for compiled_already in (0, 1):
+        compiled._ledger.credit = compiled.CREDIT
+        assert spent(VALUES) == 30.0
+        assert len(spent.signatures) == compiled_already
+
+
 def test_at_once_if_that_is_asked_for(made):
     total = made(credit=-100.0)
     compiled.compile_at_once()

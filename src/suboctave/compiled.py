@@ -7,7 +7,8 @@ most cost less there than their compilation would. So a kernel first runs as the
   the second computation of a process on and where an earlier process has compiled others;
 - a kernel waits until those that it calls are compiled;
 - compilation has an allowance, `CREDIT` seconds at first, that grows by `SHARE` of the time in which nothing is
-  compiled: however much there is to compile, nobody waits for it all at one go.
+  compiled: however much there is to compile, nobody waits for it all at one go;
+- kernels that take seconds of their own (`alone`) wait until that allowance is whole.
 
 What was compiled before, in this process or an earlier one, is used from the first call (Numba's cache). Small
 kernels whose arithmetic would differ (sums that the compiler may reorder, complex roots, sines and cosines of the
@@ -36,6 +37,8 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 PATIENCE, LESS, QUICK = 1.0, 0.03, 0.02
 #: seconds of compilation that may follow each other, and what every second of other work adds to what is left of them
 CREDIT, SHARE = 2.5, 0.7
+#: share of the credit that counts as all of it
+_WHOLE = 0.9
 #: entries of a kernel's arguments beyond which it is compiled at once: a single call could take long
 LARGE = 40000
 
@@ -60,10 +63,10 @@ class _Ledger:
         #: kernels that are being compiled, each because of the one before
         self.depth = 0
 
-    def allows(self) -> bool:
-        """Whether something may be compiled now."""
+    def allows(self, alone: bool = False) -> bool:
+        """Whether something may be compiled now; alone: a kernel that must not follow others at once."""
         self._worked()
-        return self.eager or self.credit > 0.0
+        return self.eager or self.credit > (_WHOLE * CREDIT if alone else 0.0)
 
     def begins(self) -> None:
         """The compilation of a kernel begins."""
@@ -129,6 +132,7 @@ class _Patient(_Kernel):
     """A kernel that has not been compiled yet."""
 
     patience = PATIENCE
+    alone = False
 
     def __call__(self, *args: Any) -> Any:
         spent = self.__dict__.get("_spent")
@@ -155,7 +159,7 @@ class _Patient(_Kernel):
         if _ledger.eager:
             return True
         patience = self.patience if _ledger.fresh and _ledger.runs < 2 else min(self.patience, LESS)
-        if not (spent > patience and _ledger.allows()):
+        if not (spent > patience and _ledger.allows(self.alone)):
             return False
         # those that it has called first, one by one: otherwise all of them would be compiled at one go
         waiting = [part for part in self._parts() if isinstance(part, _Patient) and "_spent" in part.__dict__]
@@ -201,10 +205,12 @@ def at_hand(kernel: Callable[..., Any], *args: Any) -> bool:
     return known[kind]
 
 
-def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+def kernel(
+    patience: float = PATIENCE, at_once: bool = False, alone: bool = False, **options: Any
+) -> Callable[[_Function], _Function]:
     """Decorator of a kernel: `numba.njit` with its cache, and patience (none with `at_once`, or with `fastmath`).
 
-    Options are those of `njit`.
+    `alone` marks those whose compilation takes seconds. Other options are those of `njit`.
     """
 
     def decorate(function: _Function) -> _Function:
@@ -214,7 +220,7 @@ def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) ->
                 result.__class__ = _Kernel
             else:
                 result.__class__ = _Patient
-                result.patience = patience
+                result.patience, result.alone = patience, alone
         return result
 
     return decorate

@@ -25,7 +25,7 @@ from suboctave.harmonic.real_form import add_steps, closed_gradient
 SOLVED, OFF_AXIS, AWAY, STILL, UNSOLVED, OTHER = 0, 1, 2, 3, 4, 5
 
 
-@kernel()
+@kernel(alone=True)
 def located(
     u, mean, known, right, left, span, least, limits, iterations, nu, moving, multiples, halves, matrices, starts, dofs,
     shape, pieces, first, polynomial, grid, nodes, load, weight, points, widths, steps, step_first, line, rule_nodes,
