@@ -11,7 +11,7 @@ import suboctave as so
 from suboctave.bifurcation import bordered as bordered_module
 from suboctave.bifurcation import formulation, solve
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.bifurcation.bordered_kernels import border, fold_step, inverse_iteration
+from suboctave.bifurcation.bordered_kernels import border, border_again, fold_step, inverse_iteration
 from suboctave.continuation.lapack import factorise, solve_transposed
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import free_form, real_form
@@ -218,6 +218,23 @@ def test_null_vectors_in_compiled_code():
     assert abs(right @ expected.right) == pytest.approx(1.0, abs=1e-10)
     assert abs(left @ expected.left) == pytest.approx(1.0, abs=1e-10)
     assert inverse_iteration(np.zeros((3, 3)), np.ones(3), 4, np.empty(3), np.empty(3))
+
+
+def test_solutions_from_the_factors_of_a_matrix_nearby():
+    rng = np.random.default_rng(5)
+    n = 30
+    matrix, change = rng.standard_normal((n, n + 1)), rng.standard_normal((n, n + 1))
+    scale, left, right = rng.uniform(0.5, 2.0, n), rng.standard_normal(n), rng.standard_normal(n)
+    for far, refused in ((0.0, False), (1e-10, False), (1e-6, False), (1e-5, False), (3.0, True)):
+        lu, pivots = np.empty((n + 1, n + 1)), np.empty(n + 1, dtype=np.int32)
+        v, u, exact_v, exact_u = np.empty((4, n + 1))
+        assert not border(matrix, scale, left, right, 1.7, lu, pivots, v, u)
+        near = matrix + far * change
+        assert border_again(near, scale, left + far, right - far, 1.7, lu, pivots, v, u) == refused
+        assert not border(near, scale, left + far, right - far, 1.7, lu, pivots, exact_v, exact_u)
+        if not refused:
+            assert v == pytest.approx(exact_v, abs=1e-11 * np.abs(exact_v).max())
+            assert u == pytest.approx(exact_u, abs=1e-11 * np.abs(exact_u).max())
 
 
 def test_step_at_a_fold():

@@ -105,15 +105,16 @@ class Touch(BifurcationKind):
             state.omega if name == "omega" else state.values[name],
         )
 
-    def solve(self, guess: Guess) -> Grazing:
-        """Newton's method for the grazing from the nearest extremum of the guess's motion.
+    def solve(self, guess: Guess, start: BalanceState | None = None) -> Grazing:
+        """Newton's method for the grazing from the nearest extremum of the guess's motion; `start`: the equations
+        there, where they have been evaluated.
 
         Raises
         ------
         ConvergenceError
             If it does not converge.
         """
-        start = guess.state()
+        start = guess.state() if start is None else start
         tau = np.array([self._nearest(start)])
         direction = read_direction(start, self.element)
         high = start.basis.harmonics
@@ -136,7 +137,7 @@ class Touch(BifurcationKind):
 
             return [Extra(value - level, size, height), Extra(slope, size, rise)], None, [column]
 
-        state, extra, residual, iterations = newton(guess, tau, np.ones(1), augmentation)
+        state, extra, residual, iterations = newton(guess, tau, np.ones(1), augmentation, start=start)
         return Grazing(state, None, 0.0, residual, iterations, float(extra[0]) % (2.0 * math.pi))
 
     def rise(self, found: Grazing, name: str) -> Array:

@@ -13,7 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation.bordered_kernels import augment, border, border_at, fold_step, inverse_iteration, unit_of
+from suboctave.bifurcation.bordered_kernels import (
+    augment,
+    border,
+    border_again,
+    border_at,
+    fold_step,
+    inverse_iteration,
+    unit_of,
+)
 from suboctave.compiled import kernel
 from suboctave.continuation.lapack import solve_factorised
 from suboctave.harmonic.evaluation import add_told, along_directions, evaluate, evaluate_told, jacobian
@@ -23,6 +31,9 @@ from suboctave.harmonic.real_form import add_steps, closed_gradient
 
 #: how a search ended: solved; given up as `solve.newton` does; something that it knows more about
 SOLVED, OFF_AXIS, AWAY, STILL, UNSOLVED, OTHER = 0, 1, 2, 3, 4, 5
+
+#: rows of a matrix whose factors cost more than their repeated use
+_LARGE = 80
 
 
 @kernel(alone=True)
@@ -116,7 +127,11 @@ def located(
         if not known and iteration == 0 and inverse_iteration(matrix, scale, 4, right, left):
             return OTHER
         square = omega * omega
-        if border(matrix, scale, left, right, square, lu, pivots, v, w):
+        # after a short step the factors at hand tell g and its vectors in less time than new ones, of a large matrix
+        anew = m < _LARGE or iteration == 0 or previous > short
+        if (anew or border_again(matrix, scale, left, right, square, lu, pivots, v, w)) and border(
+            matrix, scale, left, right, square, lu, pivots, v, w
+        ):
             return OTHER
         unit_of(v, right)
         unit_of(w, left)

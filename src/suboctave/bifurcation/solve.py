@@ -229,9 +229,9 @@ def _linearised(
     n, q = len(rows), len(spans)
     scale_x = max(motion_size(state), least, NOTHING) / weight
     scale_rows = rows / force
-    packed = kernels.scaled_transposed(state.jacobian, scale_rows, scale_x, 1 + q)
+    along = state.extended_jacobian(guess.name)
+    packed = kernels.scaled_transposed(along, scale_rows, np.append(scale_x, guess.span), 1 + q)[:-1]
     matrix = packed.T
-    matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span
     for j, column in enumerate(columns):
         matrix[:n, n + 1 + j] = column * scale_rows * spans[j]
     for i, e in enumerate(equations):
