@@ -16,9 +16,11 @@ from suboctave.analysis.checks import check_range, is_number
 from suboctave.analysis.integration import start_state
 from suboctave.analysis.poincare import check_observe
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array
 from suboctave.model.system import System
+from suboctave.store.arrays import padded
 from suboctave.timedomain.batch import check_count
 from suboctave.version import __version__
 
@@ -32,7 +34,7 @@ _OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed"}
 
 
 @dataclass(eq=False)
-class Basins:
+class Basins(TimeResult):
     """Basins of attraction on a plane of states at phase 0 of the load.
 
     Attributes
@@ -115,6 +117,8 @@ class Basins:
         """Labels and settling times on (y, x), and the attractors."""
         import xarray
 
+        known = self.attractors
+        points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
         shares, errors, grid = self.shares, self.standard_errors, self.grid_errors
         return xarray.Dataset(
             {
@@ -123,6 +127,9 @@ class Basins:
                 "period": (("attractor",), np.array([one.period for one in self.attractors], dtype=int)),
                 "amplitude": (("attractor",), np.array([one.amplitude for one in self.attractors])),
                 "given": (("attractor",), np.array([one.given for one in self.attractors], dtype=bool)),
+                "multipliers": (("attractor", "multiplier"), padded([one.multipliers for one in known], complex)),
+                "points": (("section", "state"), points),
+                "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
                 "share": (("kind",), np.array([shares[name] for name in shares])),
                 "standard_error": (("kind",), np.array([errors[name] for name in shares])),
                 "grid_error": (("kind",), np.array([grid[name] for name in shares])),
