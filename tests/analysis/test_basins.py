@@ -107,6 +107,28 @@ def test_chaos_and_escape_are_told():
     assert told.labels[0, 0] == -2
 
 
+def test_a_journal_of_other_attractors_is_refused(tmp_path, found):
+    """Names and motions of `attractors=` are part of the question; the same ones from another run are the same."""
+    large, small = sorted(found.attractors, key=lambda one: -one.amplitude)
+    options = {"omega": 1.5, "box": BOX, "grid": (8, 8), "keep": tmp_path / "kept"}
+    first = so.basins(DUFFING, attractors={"large": shoot(DUFFING, large.state, 1.5)}, **options)
+    for given, said in (
+        (None, "attractors=large, not none"),
+        ({"big": shoot(DUFFING, large.state, 1.5)}, "attractors=large, not big"),
+        ({"large": shoot(DUFFING, small.state, 1.5)}, "with other motions as attractors=large"),
+        ([shoot(DUFFING, large.state, 1.5)], "attractors=large, not PeriodicSolution"),
+    ):
+        with pytest.raises(InputError, match=said):
+            so.basins(DUFFING, attractors=given, **options)
+    curve = so.frequency_response(DUFFING, omega=(3.0, 0.5))
+    with pytest.raises(InputError, match="name another file"):
+        so.basins(DUFFING, attractors={"large": curve}, **options)
+    nearly = shoot(DUFFING, large.state * (1.0 + 1e-4), 1.5)
+    again = so.basins(DUFFING, attractors={"large": nearly}, **options)
+    assert (again.labels == first.labels).all()
+    assert [one.name for one in again.attractors] == [one.name for one in first.attractors]
+
+
 def test_mistakes():
     for options, said in (
         ({"plane": ("x_0", "v_1")}, "v_0"),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.analysis.attractors import TOLERANCE
-from suboctave.analysis.basin_attractors import BasinAttractor, Catalogue, given_attractors
+from suboctave.analysis.basin_attractors import BasinAttractor, Catalogue, read_attractors
 from suboctave.analysis.basin_run import APERIODIC, GONE, OPEN, BasinRun
 from suboctave.analysis.checks import check_range, is_number
 from suboctave.analysis.integration import start_state
@@ -241,7 +241,8 @@ def basins(
         As in `poincare_sections`, for trajectories that were not trapped.
     keep
         A file in which what is done is kept as it comes (a journal): called again with the same arguments after a kill
-        or Ctrl-C, only the rest is computed, and the result is the same. Finished ones are read from it.
+        or Ctrl-C, only the rest is computed, and the result is the same. Finished ones are read from it. With other
+        arguments, other `attractors` among them, it is refused.
     observe, workers, progress
         As in `poincare_sections`. The result does not depend on the number of workers.
 
@@ -272,7 +273,7 @@ def basins(
     catalogue = Catalogue(system, float(omega), values, observe, tolerance, workers)
     run = BasinRun(catalogue, states, counts, periods, period_tolerance)
     with reporting(progress, "basins") as report:
-        run.open(keep, lambda: given_attractors(catalogue, attractors))
+        run.open(keep, read_attractors(catalogue, attractors))
         try:
             complete = run.go(report)
         except KeyboardInterrupt:
