@@ -145,6 +145,11 @@ def test_what_is_loaded_goes_on(tmp_path):
     assert np.allclose(ends.end, again.attractors[0].state, atol=1e-9)
 
 
+def test_datasets_are_such_as_netcdf_can_hold(result, tmp_path):
+    """No complex numbers, no objects: what `to_xarray` gives a user can be written by xarray itself."""
+    result.to_xarray().to_netcdf(tmp_path / "plain.nc", engine="h5netcdf")
+
+
 def test_xarray_reads_it_without_us(tmp_path):
     found = MAKERS["basins"]()
     dataset = xr.open_dataset(found.save(tmp_path / "basins.nc"), engine="h5netcdf")

@@ -118,6 +118,7 @@ class Basins(TimeResult):
         import xarray
 
         known = self.attractors
+        multipliers = padded([one.multipliers for one in known], complex)
         points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
         shares, errors, grid = self.shares, self.standard_errors, self.grid_errors
         return xarray.Dataset(
@@ -127,7 +128,8 @@ class Basins(TimeResult):
                 "period": (("attractor",), np.array([one.period for one in self.attractors], dtype=int)),
                 "amplitude": (("attractor",), np.array([one.amplitude for one in self.attractors])),
                 "given": (("attractor",), np.array([one.given for one in self.attractors], dtype=bool)),
-                "multipliers": (("attractor", "multiplier"), padded([one.multipliers for one in known], complex)),
+                "multipliers_real": (("attractor", "multiplier"), multipliers.real),
+                "multipliers_imag": (("attractor", "multiplier"), multipliers.imag),
                 "points": (("section", "state"), points),
                 "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
                 "share": (("kind",), np.array([shares[name] for name in shares])),

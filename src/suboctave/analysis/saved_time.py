@@ -234,7 +234,9 @@ def _basins(d: _Read) -> dict[str, Any]:
 
 def _of_basins(item: Basins) -> dict[str, Any]:
     return {
-        "traps": [[(trap.point, trap.factor, trap.radius) for trap in one.traps] for one in item.attractors],
+        "traps": [
+            [(trap.point, trap.factor, trap.radius, trap.times) for trap in one.traps] for one in item.attractors
+        ],
         "multipliers": [len(one.multipliers) for one in item.attractors],
     }
 

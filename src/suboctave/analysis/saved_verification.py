@@ -64,7 +64,7 @@ def verification_dataset(check: BranchVerification) -> xarray.Dataset:
         "system": check.branch.system.name,
         "suboctave": __version__,
     }
-    return xarray.Dataset(variables, attrs=attributes)
+    return xarray.Dataset(dict(flat(variables)), attrs=attributes)
 
 
 def verification_to_datasets(check: BranchVerification) -> dict[str, xarray.Dataset]:
@@ -79,7 +79,7 @@ def verification_to_datasets(check: BranchVerification) -> dict[str, xarray.Data
     }
     variables = {name: (v.dims, v.values, v.attrs) for name, v in head.variables.items()}
     variables["record"] = ((), np.array(to_json(record)), {"long_name": "numbers of multipliers, parameters, as JSON"})
-    stored = xarray.Dataset(dict(flat(variables)), attrs={**head.attrs, "parts": "branch"})
+    stored = xarray.Dataset(variables, attrs={**head.attrs, "parts": "branch"})
     return {"": stored, "branch": branch_to_dataset(check.branch)}
 
 
