@@ -9,6 +9,7 @@ import suboctave as so
 from suboctave.analysis import basin_run
 from suboctave.errors import InputError
 from suboctave.timedomain import shoot
+from suboctave.timedomain.batch import Flow
 
 DUFFING = so.library.duffing(c=0.1, alpha=1.0, F=0.3)
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
@@ -105,6 +106,52 @@ def test_chaos_and_escape_are_told():
     # beyond the unstable equilibrium at +-1, moving away
     assert told.labels[4, -1] == -2
     assert told.labels[0, 0] == -2
+
+
+@pytest.mark.parametrize(("system", "omega"), [(DUFFING, 1.5), (so.library.reference_oscillator(p=0.55, j=0.5), 2.25)])
+def test_what_is_inside_a_neighbourhood_ends_on_its_motion(system, omega):
+    """Other states than those that were looked at when it was made, half of them on its boundary, to the end."""
+    found = so.basins(system, omega=omega, box=BOX, grid=(16, 16))
+    assert len(found.attractors) >= 2
+    random = np.random.default_rng(11)
+    for one in found.attractors:
+        assert one.traps
+        for trap in one.traps:
+            away = random.normal(size=(400, 2))
+            away /= np.linalg.norm(away, axis=1, keepdims=True)
+            away[::2] *= np.sqrt(random.uniform(size=(200, 1)))
+            back = np.linalg.inv(trap.factor).T
+            states = trap.point + trap.radius * away @ back
+            end = Flow(system, tolerance=1e-8).over(states, omega, 120 * one.period).end
+            assert np.abs(end - trap.point).max() < 0.3 * np.abs(states - trap.point).max()
+            nearest = np.min(np.abs(end[:, None] - one.points[None]).max(axis=2), axis=1)
+            assert nearest.max() < 1e-2
+            flow = Flow(system, tolerance=1e-8, tangents=2, transition=True)
+            periods = trap.times * one.period
+            tangents = flow.over(states, omega, periods, skip=periods).tangents
+            assert np.linalg.norm(trap.factor @ tangents @ back.T, 2, axis=(1, 2)).max() < 1.0
+
+
+def test_a_journal_of_other_attractors_is_refused(tmp_path, found):
+    """Names and motions of `attractors=` are part of the question; the same ones from another run are the same."""
+    large, small = sorted(found.attractors, key=lambda one: -one.amplitude)
+    options = {"omega": 1.5, "box": BOX, "grid": (8, 8), "keep": tmp_path / "kept"}
+    first = so.basins(DUFFING, attractors={"large": shoot(DUFFING, large.state, 1.5)}, **options)
+    for given, said in (
+        (None, "attractors=large, not none"),
+        ({"big": shoot(DUFFING, large.state, 1.5)}, "attractors=large, not big"),
+        ({"large": shoot(DUFFING, small.state, 1.5)}, "with other motions as attractors=large"),
+        ([shoot(DUFFING, large.state, 1.5)], "attractors=large, not PeriodicSolution"),
+    ):
+        with pytest.raises(InputError, match=said):
+            so.basins(DUFFING, attractors=given, **options)
+    curve = so.frequency_response(DUFFING, omega=(3.0, 0.5))
+    with pytest.raises(InputError, match="name another file"):
+        so.basins(DUFFING, attractors={"large": curve}, **options)
+    nearly = shoot(DUFFING, large.state * (1.0 + 1e-4), 1.5)
+    again = so.basins(DUFFING, attractors={"large": nearly}, **options)
+    assert (again.labels == first.labels).all()
+    assert [one.name for one in again.attractors] == [one.name for one in first.attractors]
 
 
 def test_mistakes():

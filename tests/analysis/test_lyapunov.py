@@ -82,7 +82,7 @@ def test_two_trajectories():
     # a single value of this method is good to a seventh: Alcorta et al. 2019 give 0.1918 for a case like this
     assert abs(found.exponent - 0.136) < 3.0 * found.spread / np.sqrt(10) + 0.01
     assert 0.005 < found.spread < 0.05
-    assert found.to_xarray().sizes == {"setting": 10, "time": 201}
+    assert found.to_xarray()["distance"].sizes == {"setting": 10, "time": 201}
     steady = so.lyapunov_exponents(so.library.duffing(c=0.1, F=0.3), omega=1.5, method=how)
     assert np.isnan(steady.exponent)
 

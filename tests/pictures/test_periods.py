@@ -33,11 +33,23 @@ def lines(figure, *gids):
 
 
 def test_each_period_has_a_colour_of_its_own():
-    colours = [period_colour(nu) for nu in (1, 2, 3, 4, 5, 6, 8)]
-    assert len(set(colours)) == 7
+    colours = [period_colour(nu) for nu in (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 16)]
+    assert len(set(colours)) == 12
     assert [period_name(nu) for nu in (1, 2, 12)] == ["T", "2T", "12T"]
-    assert all(period_colour(nu) in colours[1:] for nu in (7, 9, 16, 32, 64))
+    assert not {period_colour(nu) for nu in range(17, 65)} & set(colours)
+    assert not {period_colour(nu) for nu in (11, 13, 14, 15)} & set(colours)
     assert tinted("#000000", 0.5) == "#808080"
+
+
+def test_colours_of_periods_that_time_integration_meets_stay_apart():
+    """CIE 1976 colour differences: 2.3 can just be seen, 25 is one that nobody overlooks."""
+    rgb = np.array([to_rgb(period_colour(nu)) for nu in (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 16)])
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    xyz = linear @ np.array([[0.4125, 0.2127, 0.0193], [0.3576, 0.7152, 0.1192], [0.1804, 0.0722, 0.9503]])
+    f = np.cbrt(xyz / [0.9505, 1.0, 1.0888])
+    lab = np.stack([116.0 * f[:, 1] - 16.0, 500.0 * (f[:, 0] - f[:, 1]), 200.0 * (f[:, 1] - f[:, 2])], axis=1)
+    apart = np.linalg.norm(lab[:, None] - lab[None], axis=-1)
+    assert apart[np.triu_indices(len(lab), 1)].min() > 25.0
 
 
 @pytest.mark.parametrize("order", [(1, 2, 4), (4, 1, 2)])

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import suboctave as so
+from suboctave.store.journal import Journal
 from suboctave.study.file import read_study
+from suboctave.study.keeping import finished, keep, recovered
 from suboctave.study.runner import run_study
 
 STUDY = """
@@ -43,16 +46,36 @@ what = "states"
 
 def test_as_by_a_script(study_file):
     done = run_study(read_study(study_file(STUDY))).finished
-    finished = dict(zip(("response", "rates", "shares", "states"), (one.result for one in done), strict=True))
+    found_by = dict(zip(("response", "rates", "shares", "states"), (one.result for one in done), strict=True))
     system = so.library.duffing(c=0.1, F=0.3)
     rates = so.lyapunov_exponents(system, omega=1.5, periods=200, trajectories=4)
-    assert np.array_equal(finished["rates"]["exponent"], rates.exponents)
+    assert np.array_equal(found_by["rates"]["exponent"], rates.exponents)
     found = so.basins(system, omega=1.5, box=((-2.0, 2.0), (-2.0, 2.0)), grid=(12, 10))
-    assert sorted(finished["shares"]["share"]) == pytest.approx(sorted(found.shares.values()))
-    assert set(finished["shares"]["name"]) == {"response", "response (2)"}
+    assert sorted(found_by["shares"]["share"]) == pytest.approx(sorted(found.shares.values()))
+    assert set(found_by["shares"]["name"]) == {"response", "response (2)"}
     names = [found.names[i] for i in found.labels.ravel().tolist()]
-    assert finished["states"]["motion"].tolist() == names
-    assert finished["states"]["x_0"][:12].tolist() == found.x.tolist()
+    assert found_by["states"]["motion"].tolist() == names
+    assert found_by["states"]["x_0"][:12].tolist() == found.x.tolist()
+
+
+def test_files_and_journals_hold_all_of_it(study_file, tmp_path):
+    study = read_study(study_file(STUDY))
+    outcome = run_study(study)
+    results = so.load(outcome.files[0])
+    journal = Journal.create(tmp_path / "a.journal")
+    for step in study.steps:
+        table = results[step.name]
+        keep(journal, step.name, step.name, table, 1.0)
+        if step.name == "response":
+            continue
+        (first,) = (one.result for one in outcome.finished if one.step.name == step.name)
+        again, _ = finished(journal.records, step.name, False)
+        for other in (table, again):
+            xr.testing.assert_identical(first.result.to_xarray(), other.result.to_xarray())
+    assert [item.branches for item in recovered(tmp_path / "a.journal")[0]] == [None] * 4
+    assert isinstance(results["shares"].result, so.Basins)
+    assert isinstance(results["rates"].result, so.LyapunovExponents)
+    assert results["states"].result.plot()
 
 
 @pytest.mark.parametrize(

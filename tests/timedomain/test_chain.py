@@ -8,7 +8,9 @@ import pytest
 from scipy.linalg import expm
 
 import suboctave as so
+from suboctave.errors import ConvergenceError
 from suboctave.timedomain import integrate, locate_by_shooting, shoot
+from suboctave.timedomain.locate import Curve
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "chain.json").read_text())
 N = DATA["masses"]
@@ -93,3 +95,23 @@ def test_stored_response_is_stable_where_no_multiplier_is_outside():
     settled = integrate(system, np.zeros(2 * N), (0.0, 150 * period), omega, rtol=1e-9)
     last = integrate(system, settled.end, (0.0, period), omega)
     assert last.largest(N - 1) == pytest.approx(entry["amplitude_last_mass"], rel=1e-6)
+
+
+def test_a_search_is_bounded_by_reach_and_by_passes(monkeypatch):
+    """What is not there is given up; what is there is found within the bounds as without them."""
+    spent = []
+    evaluate = Curve.evaluate
+    monkeypatch.setattr(Curve, "evaluate", lambda curve, u: (spent.append(1), evaluate(curve, u))[1])
+    entry = next(e for e in DATA["bifurcations"] if e["kind"] == "PD")
+    near = entry["state"], entry["omega"] * (1.0 + 1e-5)
+    free = locate_by_shooting(chain(), "PD", *near)
+    bound = locate_by_shooting(chain(), "PD", *near, reach=0.1, budget=60)
+    assert bound.omega == free.omega
+    del spent[:]
+    with pytest.raises(ConvergenceError, match=r"within 0\.02 of the motion's size"):
+        locate_by_shooting(chain(), "BP", *near, reach=0.02)
+    assert len(spent) < 60
+    del spent[:]
+    with pytest.raises(ConvergenceError, match="within 10 passes"):
+        locate_by_shooting(chain(), "BP", *near, budget=10)
+    assert len(spent) == 10 + 1  # the one that was refused

@@ -21,7 +21,7 @@ from suboctave.timedomain.recognition import extents, same_cycle
 from suboctave.timedomain.shooting import PeriodicSolution, shoot
 from suboctave.timedomain.trapping import Trap, traps_about
 
-__all__ = ["BasinAttractor", "Catalogue", "given_attractors"]
+__all__ = ["BasinAttractor", "Catalogue", "Given", "enter_attractors", "read_attractors"]
 
 #: relative distance below which two periodic motions are the same
 _SAME = 1e-5
@@ -168,10 +168,26 @@ class Catalogue:
         )
 
 
-def given_attractors(catalogue: Catalogue, given: Any) -> None:
-    """Enter what a user gives: motions, attractors, branches, diagrams; one, several, or by name."""
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What a user gives under one name: its words, and states and periods of its motions at these parameters."""
+
+    name: str | None
+    words: str
+    starts: list[tuple[Array, int]]
+
+    def same(self, other: Given) -> bool:
+        """Whether both have the same name and motions, as far as harmonic balance gives the same again."""
+        if self.name != other.name or [nu for _, nu in self.starts] != [nu for _, nu in other.starts]:
+            return False
+        pairs = zip(self.starts, other.starts, strict=True)
+        return all(np.allclose(a, b, rtol=_SAME, atol=_SAME * np.abs(a).max()) for (a, _), (b, _) in pairs)
+
+
+def read_attractors(catalogue: Catalogue, given: Any) -> list[Given]:
+    """What a user gives: motions, attractors, branches, diagrams; one, several, or by name."""
     if given is None:
-        return
+        return []
     named: list[tuple[str | None, Any]]
     if isinstance(given, Mapping):
         named = [(str(name), one) for name, one in given.items()]
@@ -181,6 +197,7 @@ def given_attractors(catalogue: Catalogue, given: Any) -> None:
         named = [(None, one) for one in given]
     else:
         raise InputError(f"attractors={given!r}: give motions, branches or diagrams, in a sequence or by name")
+    read = []
     for name, one in named:
         if isinstance(one, BifurcationDiagram):
             found = [motion for branch in one.branches for motion in _crossings(catalogue, branch)]
@@ -188,11 +205,17 @@ def given_attractors(catalogue: Catalogue, given: Any) -> None:
             found = _crossings(catalogue, one)
         else:
             found = [_motion(catalogue, one)]
-        entered = {number for state, nu in found if (number := catalogue.add(state, nu, name, True)) is not None}
+        read.append(Given(name, name or repr(one).splitlines()[0], found))
+    return read
+
+
+def enter_attractors(catalogue: Catalogue, given: Iterable[Given]) -> None:
+    """Enter what a user gives; InputError for what has no stable motion."""
+    for one in given:
+        entered = {number for s, nu in one.starts if (number := catalogue.add(s, nu, one.name, True)) is not None}
         if not entered:
             raise InputError(
-                f"attractors: {name or repr(one)} has no stable motion at omega={catalogue.omega:g} and "
-                "these parameters"
+                f"attractors: {one.words} has no stable motion at omega={catalogue.omega:g} and these parameters"
             )
 
 

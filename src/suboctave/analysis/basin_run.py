@@ -7,7 +7,7 @@ one that was never stopped.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.analysis.attractors import attractor_of
-from suboctave.analysis.basin_attractors import Catalogue
+from suboctave.analysis.basin_attractors import Catalogue, Given, enter_attractors
 from suboctave.errors import InputError
 from suboctave.model.description import describe
 from suboctave.model.element import Array
@@ -51,10 +51,10 @@ class BasinRun:
         self._audited = False
 
     # --------------------------------------------------------------------------------------------------- journal
-    def open(self, keep: Any, give: Callable[[], None]) -> None:
-        """Begin, or go on from the file `keep`; `give` enters the attractors that the user knows."""
+    def open(self, keep: Any, given: Sequence[Given]) -> None:
+        """Begin, or go on from the file `keep`; `given` are the attractors that the user knows."""
         if keep is None:
-            give()
+            enter_attractors(self.catalogue, given)
             return
         place = Path(keep)
         mark = self._mark()
@@ -62,7 +62,7 @@ class BasinRun:
             self.journal = Journal.reopen(place)
             if self.journal.records:
                 try:
-                    self._restore(mark, place)
+                    self._restore(mark, given, place)
                 except BaseException:
                     self.journal.close()
                     raise
@@ -72,11 +72,12 @@ class BasinRun:
                 raise InputError(f"{place.parent} is no folder: make it, or keep elsewhere")
             self.journal = Journal.create(place)
         try:
-            give()
+            enter_attractors(self.catalogue, given)
         except BaseException:
             self.journal.remove()
             raise
-        self.journal.append("basins", {"mark": mark})
+        told = [[one.name, one.words, [[state.tolist(), nu] for state, nu in one.starts]] for one in given]
+        self.journal.append("basins", {"mark": mark, "attractors": told})
         self._keep_attractors(0)
 
     def close(self) -> None:
@@ -93,13 +94,15 @@ class BasinRun:
         ])  # fmt: skip
         return hashlib.sha256(said.encode() + self.states.tobytes()).hexdigest()
 
-    def _restore(self, mark: str, place: Path) -> None:
+    def _restore(self, mark: str, given: Sequence[Given], place: Path) -> None:
         assert self.journal is not None
         for record in self.journal.records:
-            if record.kind == "basins" and record.said["mark"] != mark:
-                raise InputError(
-                    f"{place} is of other basins (another system, frequency, grid or option): name another file"
-                )
+            if record.kind == "basins":
+                if record.said["mark"] != mark:
+                    raise InputError(
+                        f"{place} is of other basins (another system, frequency, grid or option): name another file"
+                    )
+                self._compare(record.said.get("attractors"), given, place)
             if record.kind == "attractor":
                 points, multipliers = (from_json(record.said[name]) for name in ("points", "multipliers"))
                 said = record.said
@@ -112,6 +115,17 @@ class BasinRun:
             elif record.kind == "followed":
                 self.followed, self.contradicted = int(record.said["followed"]), int(record.said["contradicted"])
                 self._audited = True
+
+    def _compare(self, told: Any, given: Sequence[Given], place: Path) -> None:
+        """Refuse a journal that was begun with other attractors."""
+        if told is None:
+            raise InputError(f"{place} does not say which attractors it was begun with: name another file")
+        before = [Given(name, words, [(np.array(s), int(nu)) for s, nu in starts]) for name, words, starts in told]
+        if len(before) == len(given) and all(map(Given.same, before, given)):
+            return
+        first, now = (", ".join(one.words for one in some) or "none" for some in (before, given))
+        what = f"with attractors={first}, not {now}" if first != now else f"with other motions as attractors={now}"
+        raise InputError(f"{place} was begun {what}: give the same ones, or name another file")
 
     def _keep_attractors(self, first: int) -> None:
         for one in self.catalogue.known[first:] if self.journal is not None else ():

@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.analysis.attractors import TOLERANCE
-from suboctave.analysis.basin_attractors import BasinAttractor, Catalogue, given_attractors
+from suboctave.analysis.basin_attractors import BasinAttractor, Catalogue, read_attractors
 from suboctave.analysis.basin_run import APERIODIC, GONE, OPEN, BasinRun
 from suboctave.analysis.checks import check_range, is_number
 from suboctave.analysis.integration import start_state
 from suboctave.analysis.poincare import check_observe
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array
 from suboctave.model.system import System
+from suboctave.store.arrays import padded
 from suboctave.timedomain.batch import check_count
 from suboctave.version import __version__
 
@@ -32,7 +34,7 @@ _OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed"}
 
 
 @dataclass(eq=False)
-class Basins:
+class Basins(TimeResult):
     """Basins of attraction on a plane of states at phase 0 of the load.
 
     Attributes
@@ -115,6 +117,9 @@ class Basins:
         """Labels and settling times on (y, x), and the attractors."""
         import xarray
 
+        known = self.attractors
+        multipliers = padded([one.multipliers for one in known], complex)
+        points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
         shares, errors, grid = self.shares, self.standard_errors, self.grid_errors
         return xarray.Dataset(
             {
@@ -123,6 +128,10 @@ class Basins:
                 "period": (("attractor",), np.array([one.period for one in self.attractors], dtype=int)),
                 "amplitude": (("attractor",), np.array([one.amplitude for one in self.attractors])),
                 "given": (("attractor",), np.array([one.given for one in self.attractors], dtype=bool)),
+                "multipliers_real": (("attractor", "multiplier"), multipliers.real),
+                "multipliers_imag": (("attractor", "multiplier"), multipliers.imag),
+                "points": (("section", "state"), points),
+                "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
                 "share": (("kind",), np.array([shares[name] for name in shares])),
                 "standard_error": (("kind",), np.array([errors[name] for name in shares])),
                 "grid_error": (("kind",), np.array([grid[name] for name in shares])),
@@ -234,7 +243,8 @@ def basins(
         As in `poincare_sections`, for trajectories that were not trapped.
     keep
         A file in which what is done is kept as it comes (a journal): called again with the same arguments after a kill
-        or Ctrl-C, only the rest is computed, and the result is the same. Finished ones are read from it.
+        or Ctrl-C, only the rest is computed, and the result is the same. Finished ones are read from it. With other
+        arguments, other `attractors` among them, it is refused.
     observe, workers, progress
         As in `poincare_sections`. The result does not depend on the number of workers.
 
@@ -265,7 +275,7 @@ def basins(
     catalogue = Catalogue(system, float(omega), values, observe, tolerance, workers)
     run = BasinRun(catalogue, states, counts, periods, period_tolerance)
     with reporting(progress, "basins") as report:
-        run.open(keep, lambda: given_attractors(catalogue, attractors))
+        run.open(keep, read_attractors(catalogue, attractors))
         try:
             complete = run.go(report)
         except KeyboardInterrupt:

@@ -18,6 +18,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.progress import reporting
 from suboctave.analysis.shot_branch import LOCATED, Place, Shot, Shots
+from suboctave.analysis.time_result import TimeResult
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
@@ -28,6 +29,7 @@ from suboctave.stability import FloquetResult
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
     from matplotlib.figure import Figure
 
 __all__ = ["BranchVerification", "VerifiedBifurcation", "VerifiedPoint", "verify_branch"]
@@ -107,7 +109,7 @@ class VerifiedBifurcation:
 
 
 @dataclass(frozen=True, eq=False)
-class BranchVerification:
+class BranchVerification(TimeResult):
     """What shooting says of a branch.
 
     Attributes
@@ -155,6 +157,12 @@ class BranchVerification:
         if self.bifurcations:
             text += f"; {confirmed} of {len(self.bifurcations)} bifurcations are confirmed"
         return text + ("." if self.complete else "; interrupted before the end.")
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Points and bifurcations with their outcomes; the branch itself is `branch.to_xarray()`."""
+        from suboctave.analysis.saved_verification import verification_dataset
+
+        return verification_dataset(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per point: distance, true multiplier that leads, errors, verdicts, outcome and reason."""

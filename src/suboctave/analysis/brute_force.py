@@ -19,6 +19,7 @@ from suboctave.analysis.checks import check_parameter, check_range, is_number
 from suboctave.analysis.integration import FEW, _not_negative, _samples, start_state
 from suboctave.analysis.poincare import check_observe, check_tolerance
 from suboctave.analysis.progress import Report, reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -29,14 +30,14 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["BruteForceDiagram", "brute_force_diagram"]
+__all__ = ["BruteForceDiagram", "brute_force_diagram", "told"]
 
 _CARRIED = ("up", "down")
 _STARTS = (*_CARRIED, "rest")
 
 
 @dataclass(eq=False)
-class BruteForceDiagram:
+class BruteForceDiagram(TimeResult):
     """Stroboscopic points over a parameter, for S ways to start and V values.
 
     Attributes
@@ -235,7 +236,7 @@ def brute_force_diagram(
             complete = run.anew(flow, anew, begin, _share(report, len(carried) / whole, 1.0))
     attractors = [
         [
-            _told(system, name, at, float(value), points[s, v], largest[s, v], period_tolerance, observe)
+            told(system, name, at, float(value), points[s, v], largest[s, v], period_tolerance, observe)
             for v, value in enumerate(grid)
         ]
         for s in range(len(labels))
@@ -305,7 +306,7 @@ class _Scan:
         return self.omega, whole, {self.name: values}
 
 
-def _told(
+def told(
     system: System, name: str, omega: float, value: float, points: Array, largest: Array, tolerance: float, observe: int
 ) -> Attractor | None:
     if not np.isfinite(points).all():

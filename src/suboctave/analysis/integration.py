@@ -10,6 +10,7 @@ import numpy as np
 
 from suboctave.analysis.checks import is_number
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -17,6 +18,7 @@ from suboctave.timedomain.batch import Flow, check_count, check_motions
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 __all__ = ["Trajectory", "integrate", "start_state"]
@@ -28,7 +30,7 @@ FEW = 4
 
 
 @dataclass(eq=False)
-class Trajectory:
+class Trajectory(TimeResult):
     """A motion in time.
 
     Attributes
@@ -100,6 +102,15 @@ class Trajectory:
                 "suboctave": __version__,
             },
         )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per sample: time, displacements, velocities."""
+        import pandas as pd
+
+        columns = {"time": self.time}
+        for kind, values in (("x", self.displacement), ("v", self.velocity)):
+            columns |= {f"{kind}_{i}": values[:, i] for i in range(self.system.n)}
+        return pd.DataFrame(columns)
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """Displacement over time in load periods, stroboscopic instants marked; saved if a path is given.

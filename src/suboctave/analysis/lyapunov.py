@@ -22,6 +22,7 @@ import numpy as np
 from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.analysis.two_trajectories import Separation, TwoTrajectories, separate
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array
@@ -45,7 +46,7 @@ _SURE, _LEAST = 5.0, 1e-5
 
 
 @dataclass(eq=False)
-class LyapunovExponents:
+class LyapunovExponents(TimeResult):
     """Lyapunov exponents of the motion that a trajectory settles on.
 
     Attributes
@@ -130,6 +131,7 @@ class LyapunovExponents:
                 "by_trajectory": (("trajectory", "exponent"), self.by_trajectory),
                 "stretches": (("stretch", "exponent"), self.stretches),
                 "running": (("period", "exponent"), self.running),
+                "end": (("state",), self.end),
                 "parameters": (("parameter",), np.array(list(self.parameters.values()), dtype=float)),
             },
             coords={"parameter": list(self.parameters), "period": np.arange(1, len(self.running) + 1)},

@@ -15,6 +15,7 @@ from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.lyapunov import smooth_weights
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
 from suboctave.model.element import Array
@@ -23,6 +24,7 @@ from suboctave.timedomain.batch import Flow, check_count
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 __all__ = ["LyapunovMap", "lyapunov_map"]
@@ -34,7 +36,7 @@ _SURE, _LEAST = 3.0, 1e-3
 
 
 @dataclass(eq=False)
-class LyapunovMap:
+class LyapunovMap(TimeResult):
     """The largest Lyapunov exponent over frequency and a parameter.
 
     Attributes
@@ -90,6 +92,15 @@ class LyapunovMap:
                 "suboctave": __version__,
             },
         )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: frequency, value, exponent, its standard error, whether it counts as chaos."""
+        import pandas as pd
+
+        value, omega = np.meshgrid(self.values, self.omega, indexing="ij")
+        columns = {"omega": omega, self.name: value, "exponent": self.exponent, "standard_error": self.standard_error}
+        told = {name: table.ravel() for name, table in columns.items()}
+        return pd.DataFrame({**told, "chaotic": self.chaotic.ravel()})
 
     def plot(self, path: Any = None, curves: Any = (), **options: Any) -> Any:
         """The map in colours, tracked curves of bifurcations over it if any are given; saved if a path is given.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.analysis.attractors import TOLERANCE, Attractor, attractor_of, distinct
 from suboctave.analysis.integration import _not_negative, _samples, start_state
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -19,13 +20,14 @@ from suboctave.timedomain.batch import Flow, check_count
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 __all__ = ["PoincareSections", "check_observe", "check_tolerance", "poincare_sections"]
 
 
 @dataclass(eq=False)
-class PoincareSections:
+class PoincareSections(TimeResult):
     """Stroboscopic points of B trajectories.
 
     Attributes
@@ -113,11 +115,12 @@ class PoincareSections:
                 "period": (("trajectory",), self.periods),
                 "failed": (("trajectory",), self.failed),
                 "finished": (("trajectory",), self.finished),
-                **{name: (("trajectory",), column) for name, column in self.varied.items()},
+                "parameters": (("trajectory", "parameter"), self._parameters()),
             },
-            coords={"dof": list(names)},
+            coords={"dof": list(names), "parameter": list(self.system.parameters)},
             attrs={
                 "contents": "poincare sections",
+                "varied": "\n".join(self.varied),
                 "transient": self.transient,
                 "method": self.method,
                 "tolerance": self.tolerance,
@@ -127,6 +130,23 @@ class PoincareSections:
                 "suboctave": __version__,
             },
         )
+
+    def _parameters(self) -> Array:
+        """(B, parameters): the values of all of them."""
+        columns = [self.varied.get(name, np.full(len(self), value)) for name, value in self.system.parameters.items()]
+        return np.array(columns, dtype=float).reshape(-1, len(self)).T
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: trajectory, what varies, number of the period, state, period of the motion."""
+        import pandas as pd
+
+        count, sections, size = self.points.shape
+        names = [f"{kind}_{i}" for kind in "xv" for i in range(size // 2)]
+        columns: dict[str, Any] = {"trajectory": np.repeat(np.arange(count), sections)}
+        columns |= {n: np.repeat(values, sections) for n, values in {"omega": self.omega, **self.varied}.items()}
+        columns["section"] = np.tile(np.arange(sections), count)
+        columns |= {name: self.points[:, :, i].ravel() for i, name in enumerate(names)}
+        return pd.DataFrame(columns | {"period": np.repeat(self.periods, sections)})
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """The points in the plane of displacement and velocity; saved if a path is given.

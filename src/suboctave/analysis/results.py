@@ -1,4 +1,4 @@
-"""What a study leaves: branches, diagrams, isolas and tables by name, with their provenance; and `load`."""
+"""What a study leaves: branches, diagrams, isolas, tables and results of time integration by name; and `load`."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.saved import branch_from_dataset, branch_to_dataset
 from suboctave.analysis.saved_diagram import diagram_from_datasets, diagram_to_datasets
 from suboctave.analysis.saved_isolas import isolas_from_datasets, isolas_to_datasets
+from suboctave.analysis.saved_time import TIME_CONTENTS, time_result_from_datasets, time_result_to_datasets
+from suboctave.analysis.time_result import TimeResult
 from suboctave.analysis.tree import BifurcationDiagram
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
@@ -31,14 +33,20 @@ __all__ = ["Result", "Results", "Table", "from_datasets", "load", "provenance", 
 
 #: what a group of a file may hold
 _BRANCH, _TABLE, _DIAGRAM, _ISOLAS = "branch", "table", "diagram", "isolas"
+#: the part of a table that holds what the table was taken from
+_WHOLE = "result"
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Numbers and texts in named columns, (rows,) each: what analyses give that are no curves. `title` says of what."""
+    """Numbers and texts in named columns, (rows,) each: what analyses give that are no curves. `title` says of what.
+
+    `result`: what the table was taken from (basins, a stepped-sine test, ...), saved with it; None if that is all.
+    """
 
     columns: Mapping[str, np.ndarray]
     title: str = ""
+    result: TimeResult | None = None
 
     def __len__(self) -> int:
         return max((len(column) for column in self.columns.values()), default=0)
@@ -161,49 +169,74 @@ def provenance() -> dict[str, str]:
     }
 
 
-def to_datasets(item: Result, details: Mapping[str, Any] | None = None) -> dict[str, xarray.Dataset]:
+def to_datasets(item: Result | TimeResult, details: Mapping[str, Any] | None = None) -> dict[str, xarray.Dataset]:
     """A result as datasets that a file or the journal can hold, `details` among the attributes of the one named "".
 
-    A branch and a table are one dataset; a diagram has one more for each of its branches, isolas one for each curve.
+    A branch is one dataset; a diagram has one more for each of its branches, isolas one for each curve, a table those
+    of the result that it was taken from. The attribute `parts` of tables, isolas and verifications names them.
     """
     said = dict(details or {})
     if isinstance(item, Branch):
         return {"": branch_to_dataset(item).assign_attrs({**said, "contents": _BRANCH})}
-    if isinstance(item, BifurcationDiagram | Isolas):
-        tree = isinstance(item, BifurcationDiagram)
-        parts = diagram_to_datasets(item) if isinstance(item, BifurcationDiagram) else isolas_to_datasets(item)
-        head, *branches = parts.items()
-        told = {"": head[1].assign_attrs({**said, "contents": _DIAGRAM if tree else _ISOLAS})}
-        return told | {name: dataset.assign_attrs({"contents": _BRANCH}) for name, dataset in branches}
+    if isinstance(item, Table):
+        return _table_to_datasets(item, said)
+    if isinstance(item, TimeResult):
+        parts, contents = time_result_to_datasets(item), None
+    elif isinstance(item, BifurcationDiagram):
+        parts, contents = diagram_to_datasets(item), _DIAGRAM
+    else:
+        parts, contents = isolas_to_datasets(item), _ISOLAS
+    head, *branches = parts.items()
+    told = {"": head[1].assign_attrs(said | ({} if contents is None else {"contents": contents}))}
+    return told | {name: dataset.assign_attrs({"contents": _BRANCH}) for name, dataset in branches}
+
+
+def _table_to_datasets(table: Table, said: Mapping[str, Any]) -> dict[str, xarray.Dataset]:
     import xarray
 
-    table = item.to_xarray()
-    held = flat({name: (variable.dims, variable.values) for name, variable in table.variables.items()})
-    dataset = xarray.Dataset(dict(held), attrs=table.attrs)
-    order = "\n".join(item.columns)
-    return {"": dataset.assign_attrs({**said, "contents": _TABLE, "columns": order})}
+    found = table.to_xarray()
+    held = flat({name: (variable.dims, variable.values) for name, variable in found.variables.items()})
+    order = "\n".join(table.columns)
+    dataset = xarray.Dataset(dict(held), attrs={**found.attrs, **said, "contents": _TABLE, "columns": order})
+    if table.result is None:
+        return {"": dataset}
+    whole = to_datasets(table.result)
+    parts = {f"{_WHOLE}/{name}" if name else _WHOLE: part for name, part in whole.items()}
+    return {"": dataset.assign_attrs(parts="\n".join(parts))} | parts
 
 
 def from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
-) -> tuple[Result, dict[str, Any]]:
+) -> tuple[Result | TimeResult, dict[str, Any]]:
     """The result that `to_datasets` wrote, and the attributes of the dataset named ""."""
     dataset = groups[""]
     details = {str(name): _plain(value) for name, value in dataset.attrs.items()}
-    if details.get("contents") == _BRANCH:
+    contents = details.get("contents")
+    if contents == _BRANCH:
         return branch_from_dataset(dataset, allow_code, linear), details
-    if details.get("contents") == _DIAGRAM:
+    if contents == _DIAGRAM:
         return diagram_from_datasets(groups, allow_code, linear), details
-    if details.get("contents") == _ISOLAS:
+    if contents == _ISOLAS:
         return isolas_from_datasets(groups, allow_code, linear), details
-    if details.get("contents") != _TABLE:
-        raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
+    if contents in TIME_CONTENTS:
+        return time_result_from_datasets(groups, allow_code, linear), details
+    if contents != _TABLE:
+        raise InputError(f"a part of the file holds {contents!r}, which this version does not know")
     columns = {name: array_of(dataset, name) for name in str(details.get("columns", "")).splitlines()}
-    return Table(columns, str(details.get("title", ""))), details
+    result = None
+    if "parts" in details:
+        missing = [name for name in str(details["parts"]).splitlines() if name not in groups]
+        if missing:
+            raise InputError(f"{missing[0]} of the table is missing")
+        whole = {
+            name.removeprefix(_WHOLE).removeprefix("/"): groups[name] for name in str(details["parts"]).splitlines()
+        }
+        result = time_result_from_datasets(whole, allow_code, linear)
+    return Table(columns, str(details.get("title", "")), result), details
 
 
-def save(item: Branch | BifurcationDiagram | Isolas, path: str | Path, overwrite: bool = False) -> Path:
-    """One branch or diagram, or isolas, as a NetCDF file (.nc) of its own."""
+def save(item: Branch | BifurcationDiagram | Isolas | TimeResult, path: str | Path, overwrite: bool = False) -> Path:
+    """One branch or diagram, isolas, or a result of time integration, as a NetCDF file (.nc) of its own."""
     target = files.free_place(path, overwrite, (".nc",))
     files.write(target, to_datasets(item), provenance())
     return target
@@ -211,8 +244,8 @@ def save(item: Branch | BifurcationDiagram | Isolas, path: str | Path, overwrite
 
 def load(
     path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None
-) -> Branch | BifurcationDiagram | Isolas | Results:
-    """Read a results file: the branch, diagram or isolas that were saved, or the `Results` of a study.
+) -> Branch | BifurcationDiagram | Isolas | TimeResult | Results:
+    """Read a results file: the branch, diagram, isolas or result in time that were saved, or the `Results` of a study.
 
     Parameters
     ----------
@@ -233,12 +266,13 @@ def load(
     root = groups[""]
     read: dict[str, tuple[Result, dict[str, Any]]] = {}
     try:
-        if root.attrs.get("contents") in (_BRANCH, _DIAGRAM, _ISOLAS):
+        if root.attrs.get("contents") in (_BRANCH, _DIAGRAM, _ISOLAS, *TIME_CONTENTS):
             item, _ = from_datasets(groups, allow_code, linear)
             assert not isinstance(item, Table)
             return item
         for name, parts in _by_analysis(groups).items():
-            read[name] = from_datasets(parts, allow_code, linear)
+            item, details = from_datasets(parts, allow_code, linear)
+            read[name] = item.to_table() if isinstance(item, TimeResult) else item, details
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     order = str(root.attrs.get("analyses", "")).splitlines()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.analysis.poincare import check_observe
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.model.element import Array
@@ -24,7 +25,7 @@ __all__ = ["SteppedSine"]
 
 
 @dataclass(eq=False)
-class SteppedSine:
+class SteppedSine(TimeResult):
     """A virtual stepped-sine test in S directions over V frequencies.
 
     Attributes
@@ -125,6 +126,8 @@ class SteppedSine:
                 "component_imag": ((*axes, "multiple", "dof"), self.components.imag),
                 "largest": ((*axes, "dof"), self.largest),
                 "period": (axes, self.period),
+                "ends": ((*axes, "state"), self.ends),
+                "tapped": (axes[:1], self.tapped),
                 "parameters": (("parameter",), np.array(list(self.system.parameters.values()), dtype=float)),
             },
             coords={

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -22,6 +23,7 @@ from suboctave.timedomain.batch import METHODS, Flow, Report, check_count, check
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 __all__ = ["Separation", "TwoTrajectories", "separate"]
@@ -72,7 +74,7 @@ class TwoTrajectories:
 
 
 @dataclass(eq=False)
-class Separation:
+class Separation(TimeResult):
     """How fast two trajectories parted, for many settings.
 
     Attributes
@@ -118,8 +120,9 @@ class Separation:
                 "value": (("setting",), self.settings[:, 0]),
                 "offset": (("setting",), self.settings[:, 1]),
                 "distance": (("setting", "time"), self.distance),
+                "parameters": (("parameter",), np.array(list(self.parameters.values()), dtype=float)),
             },
-            coords={"time": self.time},
+            coords={"time": self.time, "parameter": list(self.parameters)},
             attrs={
                 "contents": "separation",
                 "omega": self.omega,
@@ -131,6 +134,13 @@ class Separation:
                 "suboctave": __version__,
             },
         )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per setting: steps per period or tolerance, offset, exponent."""
+        import pandas as pd
+
+        setting = "steps_per_period" if self.method.integrator == "newmark" else "tolerance"
+        return pd.DataFrame({setting: self.settings[:, 0], "offset": self.settings[:, 1], "exponent": self.rates})
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """The distances over time, and their mean rate; saved if a path is given.

@@ -23,6 +23,8 @@ from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting
 
 #: the kinds that shooting locates by themselves
 _LOCATED = ("LP", "BP", "PD", "NS")
+#: how far along the curve of motions one is looked for, in tolerances, and the passes through it that may be spent
+_REACH, _PASSES = 100.0, 120
 
 
 def stability(
@@ -126,6 +128,9 @@ def verify(
     ------
     InputError
         If the orbit's unknowns are not all DOFs of its system (a condensed model has no state to shoot from).
+
+    A bifurcation is looked for within a hundred tolerances along the curve of true motions, and given up after 120
+    passes through the motion with its tangent flow: `reason` says so.
     """
     if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
         raise InputError(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
@@ -147,7 +152,8 @@ def verify(
         else:
             solution = _by_shooting(motion, kind, start, tolerance)
     except ConvergenceError as failure:
-        return Verification(math.inf, math.inf, None, False, None, f"shooting found no motion from here: {failure}")
+        what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
+        return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}")
     t = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
     sizes = np.repeat([np.abs(motion.displacement(t)).max(), np.abs(motion.velocity(t)).max()], system.n)
     # a motion at rest differs from another only if that one moves
@@ -204,7 +210,7 @@ def _by_shooting(motion: PeriodicOrbit, kind: str, start: Array, tolerance: floa
     """
     system, omega, periods = motion.system, motion.omega, motion.basis.nu
     try:
-        return locate_by_shooting(system, kind, start, omega, periods=periods)
+        return locate_by_shooting(system, kind, start, omega, periods=periods, reach=_REACH * tolerance, budget=_PASSES)
     except ConvergenceError:
         crossing = {"PD": 1, "NS": 2}.get(kind)
         if crossing is None:

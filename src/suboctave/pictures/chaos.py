@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
 __all__ = ["plot_basins", "plot_lyapunov", "plot_lyapunov_map", "plot_separation"]
 
@@ -31,7 +32,9 @@ _EXPONENT = r"exponent $\lambda$"
 _TINTS = (0.25, 0.65, 0.05, 0.8)
 _GREYS = (0.72, 0.15, 0.45, 0.85)
 _LIGHTEST, _DARKEST = "#dbe9f4", "#08306b"
-_OTHER = {-1: ("aperiodic", "#8c8c8c"), -2: ("left the range", "#d55e00"), -3: ("not computed", "#ffffff")}
+#: hatched besides, so that nobody takes it for a motion of period T
+_APERIODIC, _HATCH = -1, "////"
+_OTHER = {_APERIODIC: ("aperiodic", "#e3e3e3"), -2: ("left the range", "#d55e00"), -3: ("not computed", "#ffffff")}
 
 
 def plot_lyapunov(
@@ -173,11 +176,19 @@ def plot_basins(
     for number, (name, colour) in _OTHER.items():
         if (labels == number).any():
             image[labels == number] = _rgb(colour)
-            legend[name] = _swatch(colour, look)
+            told = f"{name}: {100.0 * shares[name]:.1f} %" if name in shares else name
+            legend[told] = _hatched(colour) if number == _APERIODIC else _swatch(colour, look)
     x, y = _edges(basins["x"].to_numpy()), _edges(basins["y"].to_numpy())
     axes.imshow(
         image, origin="lower", extent=(x[0], x[-1], y[0], y[-1]), aspect="auto", interpolation="nearest", zorder=0
     )
+    if (labels == _APERIODIC).any() and min(labels.shape) > 1:
+        filled = axes.contourf(
+            basins["x"].to_numpy(), basins["y"].to_numpy(), (labels == _APERIODIC).astype(float), levels=[0.5, 1.5],
+            colors="none", hatches=[_HATCH], zorder=1,
+        )  # fmt: skip
+        filled.set_edgecolor(style.SOFT)
+        filled.set_linewidth(0.0)
     _mark(axes, points or (), (x[0], x[-1], y[0], y[-1]), look)
     axes.set_xlim(x[0], x[-1])
     axes.set_ylim(y[0], y[-1])
@@ -190,6 +201,12 @@ def plot_basins(
         legend.values(), legend.keys(), loc="outside lower center", ncols=columns, fontsize=look.small, frameon=False
     )
     return _finish(figure, axes, {}, look, title, path)
+
+
+def _hatched(colour: str) -> Patch:
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=colour, edgecolor=style.SOFT, hatch=_HATCH, linewidth=0.5)
 
 
 def _swatch(colour: str, look: style.Look) -> Line2D:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 __all__ = ["plot_brute_force", "plot_sections", "plot_trajectory"]
 
@@ -87,7 +88,7 @@ def plot_sections(
     for period in sorted(set(periods.tolist()), key=lambda p: (p != 0, p)):
         rows = np.flatnonzero(periods == period)
         last = slice(-period, None) if period else slice(None)
-        line = axes.plot(
+        axes.plot(
             x[rows, last].ravel(),
             v[rows, last].ravel(),
             "o" if period else ".",
@@ -96,8 +97,8 @@ def plot_sections(
             markeredgewidth=0.0,
             zorder=3 + bool(period),
             gid=f"period {period}",
-        )[0]
-        legend[_name(period)] = line
+        )
+        legend[_name(period)] = _dot(period, look)
     several = sections.attrs["dofs"] > 1
     symbol = f"x_{{{dof}}}" if several else "x"
     dress(axes, f"${symbol}$", rf"$\dot {symbol}$", look)
@@ -197,7 +198,7 @@ def _sections(axes: Axes, row: xarray.Dataset, start: str, dof: int, look: style
     for period in sorted({int(p) for p in periods if p >= 0}):
         here = np.flatnonzero(periods == period)
         points = x[here][:, -period:] if period else x[here]
-        legend[_name(period)] = axes.plot(
+        axes.plot(
             np.repeat(values[here], points.shape[1]),
             points.ravel(),
             "o",
@@ -206,8 +207,17 @@ def _sections(axes: Axes, row: xarray.Dataset, start: str, dof: int, look: style
             markeredgewidth=0.0,
             zorder=3 + bool(period),
             gid=f"{start} {_name(period)}",
-        )[0]
+        )
+        legend[_name(period)] = _dot(period, look)
     return legend
+
+
+def _dot(period: int, look: style.Look) -> Line2D:
+    """A point in the legend, large enough for its colour to be seen."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], marker="o", linestyle="none", color=_colour(period), markersize=4.0 * look.marker,
+                  markeredgewidth=0.0)  # fmt: skip
 
 
 def _colour(period: int) -> str:

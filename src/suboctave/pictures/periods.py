@@ -25,8 +25,14 @@ __all__ = [
     "tinted",
 ]
 
-# Okabe and Ito's; those of T, 2T, 3T, 4T and 8T stay apart for every kind of colour blindness
-_OF_PERIODS = {1: style.INK, 2: "#0072B2", 4: "#E69F00", 8: "#56B4E9", 3: "#D55E00", 6: "#009E73", 5: "#CC79A7"}
+# Okabe and Ito's; those of T, 2T, 3T, 4T and 8T stay apart for every kind of colour blindness. The last five, which
+# time integration meets, are at least as far from these and each other as any two of the first
+_OF_PERIODS = {
+    1: style.INK, 2: "#0072B2", 4: "#E69F00", 8: "#56B4E9", 3: "#D55E00", 6: "#009E73", 5: "#CC79A7",
+    7: "#6A3D9A", 9: "#7F1D1D", 10: "#808000", 12: "#B5179E", 16: "#9ACD32",
+}  # fmt: skip
+#: share of white in the colours of all other periods, which take turns
+_OTHERS = 0.5
 #: share of white in the colours of the second and third curve of one period
 _TINTS = (0.0, 0.45, 0.25)
 
@@ -38,7 +44,7 @@ def period_name(nu: int) -> str:
 
 def period_colour(nu: int) -> str:
     """The colour of motions of nu load periods; those of one subharmonic order keep it in every picture."""
-    return _OF_PERIODS.get(nu) or list(_OF_PERIODS.values())[1 + nu % (len(_OF_PERIODS) - 1)]
+    return _OF_PERIODS.get(nu) or tinted(list(_OF_PERIODS.values())[1 + nu % (len(_OF_PERIODS) - 1)], _OTHERS)
 
 
 def tinted(colour: str, share: float) -> str:

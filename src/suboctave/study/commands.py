@@ -14,6 +14,7 @@ import numpy as np
 from suboctave.analysis import BifurcationDiagram, Isola, Isolas, Results, Table, load
 from suboctave.analysis.isola_tables import isola_row
 from suboctave.analysis.results import Result
+from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.store import files
 from suboctave.study.file import Study, read_study
@@ -144,7 +145,8 @@ def show(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, as_jso
         _show_journal(path, as_json)
         return
     found = load(path, allow_code=allow_code)
-    results = found if isinstance(found, Results) else Results({path.stem: found})
+    single = found.to_table() if isinstance(found, TimeResult) else found
+    results = single if isinstance(single, Results) else Results({path.stem: single})
     written = _csv(results, csv, overwrite) if csv is not None else []
     if as_json:
         listed = {name: _result(item) for name, item in results.items()}

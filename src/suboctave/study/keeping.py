@@ -3,7 +3,7 @@
 Records: "points" holds what is new on a curve that is being followed, "branch" a branch of a diagram that is under way,
 told by the number of its parent and the bifurcation that it leaves at, "analysis" a finished one. The branches of a
 finished diagram are those records; its own holds the tree. Before the record of finished isolas stand those of their
-curves and closed branches, "part", told by name.
+curves and closed branches, "part", told by name; before that of a table those of the result that it was taken from.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from suboctave.analysis import Branch, Isolas
+from suboctave.analysis import Branch, Isolas, Table
 from suboctave.analysis.results import Result, from_datasets, to_datasets
+from suboctave.analysis.time_result import TimeResult
 from suboctave.store.journal import Journal, Record, read_journal
 from suboctave.study.steps import Step
 
@@ -31,7 +32,7 @@ _OFTEN = 1.0
 def keep(journal: Journal, name: str, key: str, result: Result, seconds: float) -> None:
     """A finished analysis, on the disk when this returns; the branches of a diagram are there already."""
     datasets = to_datasets(result, {"seconds": seconds})
-    if isinstance(result, Isolas):
+    if isinstance(result, Isolas | Table):
         for part, dataset in datasets.items():
             if part:
                 journal.append("part", {"name": name, "key": key, "part": part}, dataset, sync=False)
@@ -49,10 +50,12 @@ def finished(records: Sequence[Record], key: str, allow_code: bool) -> tuple[Res
         places = zip(groups[""]["parent"].values, groups[""]["origin"].values, strict=True)
         for number, (parent, event) in enumerate(places):
             groups[f"branch_{number}"] = branches[int(parent), int(event)].dataset
-    elif groups[""].attrs.get("contents") == "isolas":
+    elif "parts" in groups[""].attrs:
         parts = {r.said["part"]: r for r in records if r.kind == "part" and r.said["key"] == key}
         groups |= {part: parts[part].dataset for part in str(groups[""].attrs["parts"]).splitlines()}
-    return from_datasets(groups, allow_code)
+    result, said = from_datasets(groups, allow_code)
+    assert not isinstance(result, TimeResult)
+    return result, said
 
 
 def _branches(records: Sequence[Record], key: str) -> dict[tuple[int, int], Record]:
@@ -144,6 +147,8 @@ def recovered(path: str | Path) -> tuple[list[Recovered], bool]:
             item.points += len(record.said["omega"])
             item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.said["bifurcations"]]
             item.bifurcations = len(item.events)
+        elif record.kind == "part" and record.said["part"].startswith("result"):
+            continue  # of a table
         elif record.kind in ("branch", "part"):
             item = found.setdefault(name, Recovered(name))
             sizes = record.dataset.sizes

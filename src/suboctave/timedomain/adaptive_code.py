@@ -85,9 +85,17 @@ class Writer:
         return f"def begin(z, address):\n{code.text()}\n    return 0"
 
     def attempt(self) -> str:
-        """All stages of a step of length h from y, the error estimates, and the corners at its end."""
+        """All stages of a step of length h from y, the error estimates, and the corners at its end.
+
+        The first stage is the last one of the step before, but where a corner has been turned since: what was missed
+        of it, times the jump in slope, would be an error of first order in the rate.
+        """
         n, z, code = self.n, self.z, self.code
-        code.raw("for s in range(1, 13):")
+        code.raw("first = 1")
+        if self.structure.corners:
+            code.raw(*(f"for l in range({z.lanes}):", f"    if z[{z.begin['stale'] * z.lanes} + l] > 0.0:"))
+            code.raw("        first = 0")
+        code.raw("for s in range(first, 13):")
         code.indent += 1
         code.raw(f"for i in range({2 * n}):")
         code.indent += 1
@@ -104,8 +112,16 @@ class Writer:
         code.raw("node = NODES[s]")
         code.each([f"{z('theta')} = {z('omega')} * ({z('t')} + node * {z('h')})"])
         self._rate()
-        self._loop(2 * n, [f"{z.at('K', f's * {2 * n} + i')} = {z.at('rate', 'i')}"])
+        code.raw("if s == 0:")
+        code.indent += 1
+        self._loop(2 * n, [f"{z.at('K', 'i')} = {z.at('rate', 'i')} if {z('stale')} > 0.0 else {z.at('K', 'i')}"])
+        code.each([f"{z('stale')} = 0.0"])
+        code.raw("")
         code.indent -= 1
+        code.raw("else:")
+        code.indent += 1
+        self._loop(2 * n, [f"{z.at('K', f's * {2 * n} + i')} = {z.at('rate', 'i')}"])
+        code.indent -= 2
         code.raw(f"for i in range({2 * n}):")
         code.indent += 1
         code.each([f"{z.at('e3', 'i')} = 0.0", f"{z.at('e5', 'i')} = 0.0"])

@@ -3,7 +3,8 @@
 A step is accepted, repeated with another length, or cut where a corner of a law is met. Corners are located without
 an interpolant: the margin over the first interval is Hermite's cubic, a step is tried to its zero, and tried again
 until it lands there; then the flag of the corner is turned. A trial that stops short of the corner is a step like any
-other. A force that is continuous has no jump at the corner, so that landing within `e` leaves an error of order e^2.
+other. A force that is continuous has no jump at the corner, so that landing within `e` leaves an error of order e^2,
+provided that the next step begins with a rate of its own: the last stage before has the old flag, and is wrong by e.
 
 Step lengths follow Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5.
 """
@@ -28,12 +29,12 @@ ERROR_3, ERROR_5 = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.
 FIELDS = (
     "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "h", "next", "t", "period",
     "omega", "sample", "slot", "left", "tries", "stuck", "failed", "peak", "calm", "weight",
-    "crest", "turning", "spent", "accepted", "extra",
+    "crest", "turning", "spent", "accepted", "extra", "stale",
 )  # fmt: skip
 (
     _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _H, _NEXT, _T, _PERIOD, _OMEGA, _SAMPLE,
     _SLOT, _LEFT, _TRIES, _STUCK, _FAILED, _PEAK, _CALM, _WEIGHT, _CREST,
-    _TURNING, _SPENT, _ACCEPTED, _EXTRA,
+    _TURNING, _SPENT, _ACCEPTED, _EXTRA, _STALE,
 ) = range(len(FIELDS))  # fmt: skip
 _SHRINK, _GROW, _SAFETY = 0.3, 6.0, 0.9
 #: a corner is reached when it is this share of a period away, or after so many trials
@@ -203,6 +204,7 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
         if first == 0.0:
             # over the corner at once: its flag was on the wrong side
             z[(at[_ON] + which) * lanes + l] = 1.0 - z[(at[_ON] + which) * lanes + l]
+            z[at[_STALE] * lanes + l] = 1.0
             z[at[_STUCK] * lanes + l] += 1.0
             return 0
         # a little beyond: the margin is judged by its sign, and a step that stops short is accepted
@@ -250,6 +252,7 @@ def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, m
     for i in range(corners):
         if i == landed or (2.0 * z[(at[_ON] + i) * lanes + l] - 1.0) * z[(at[_G] + i) * lanes + l] < 0.0:
             z[(at[_ON] + i) * lanes + l] = 1.0 - z[(at[_ON] + i) * lanes + l]
+            z[at[_STALE] * lanes + l] = 1.0
     grow = _GROW if error < 1e-7 else min(_GROW, _SAFETY * error**-0.125)
     if z[at[_CALM] * lanes + l] == 0.0:
         grow = min(grow, 1.0)

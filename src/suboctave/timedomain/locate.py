@@ -38,6 +38,10 @@ _IDLE = 3  # iterations without a bracket in which the test function may fail to
 _REAL_MULTIPLIER = 1e-5  # imaginary part below which a pair on the unit circle is taken for two real multipliers
 
 
+class _Spent(ConvergenceError):
+    """The passes through the motion that were allowed are used up."""
+
+
 @dataclass(frozen=True)
 class CurvePoint:
     """A point of the curve: `u` = scaled state and eta, `A`, unit null vector, monodromy, relative residual."""
@@ -52,8 +56,10 @@ class CurvePoint:
 class Curve:
     """Periodic motions with free frequency, in the scales of the start."""
 
-    def __init__(self, model: Field, periods: int, rtol: float, tol: float, branch_point: bool) -> None:
-        self.model, self.periods, self.rtol, self.tol = model, periods, rtol, tol
+    def __init__(
+        self, model: Field, periods: int, rtol: float, tol: float, branch_point: bool, budget: int | None = None
+    ) -> None:
+        self.model, self.periods, self.rtol, self.tol, self.budget = model, periods, rtol, tol, budget
         self.m = 2 * model.n
         self.cut = _NEARLY_SINGULAR if branch_point else 0.0
         self.evaluations = 0
@@ -62,6 +68,11 @@ class Curve:
         """Defect (2n,), `[F_z, F_eta]` (2n, 2n + 1), scaled monodromy."""
         if not u[-1] > 0.0:
             raise ConvergenceError("the search left the positive frequencies: start closer to the bifurcation")
+        if self.budget is not None and self.evaluations >= self.budget:
+            raise _Spent(
+                f"not settled within {self.budget} passes through the motion, near omega = "
+                f"{u[-1] * self.model.reference:.9g}: start closer, or allow more"
+            )
         self.evaluations += 1
         field = self.model.at_frequency(u[-1] * self.model.reference)
         end = 2.0 * np.pi * self.periods
@@ -155,13 +166,17 @@ def locate_by_shooting(
     max_iterations: int = 40,
     observe: int | None = None,
     rtol: float = 1e-12,
+    reach: float | None = None,
+    budget: int | None = None,
 ) -> PeriodicSolution:
     """The LP, PD, NS or BP nearest along the curve of periodic motions through a start, `omega` free.
 
     `state` (2n,), `omega`: a start near it. `periods`: those of the motion itself (a PD that leads from 2T to 4T has
-    2). `max_step`: longest step along the curve, in units of the size of the motion. The returned solution has `kind`,
-    and in `test` what is left of the test function. Raises `InputError`, or `ConvergenceError` with the place it got
-    to. A BP is found where a symmetry makes the crossing branches exist at all.
+    2). `max_step`: longest step along the curve, in units of the size of the motion. `reach`: how far along the curve
+    it is looked for, in the same units, where the first steps do not lead to it; `budget`: passes through the motion
+    with its tangent flow that may be spent (default: neither is bounded but by `max_iterations`). The returned solution
+    has `kind`, and in `test` what is left of the test function. Raises `InputError`, or `ConvergenceError` with the
+    place it got to. A BP is found where a symmetry makes the crossing branches exist at all.
     """
     if kind not in _KINDS:
         raise InputError(f"unknown kind of bifurcation {kind!r}{suggest(str(kind), _KINDS)}")
@@ -171,9 +186,9 @@ def locate_by_shooting(
     # One pass for the size of the motion, then fixed scales: the secant iteration needs one measure of length.
     _, _, passage = flow(model, 0.0, start / model.scale, 2.0 * np.pi * periods, 1e-6)
     model.rescale(measured_lengths(model, passage))
-    curve = Curve(model, periods, rtol, tol, kind == "BP")
+    curve = Curve(model, periods, rtol, tol, kind == "BP", budget)
     point = curve.onto(np.append(start / model.scale, 1.0), None)
-    point, test, steps = _drive(curve, point, kind, max_step, max_iterations)
+    point, test, steps = _drive(curve, point, kind, max_step, max_iterations, reach)
 
     final = model.at_frequency(point.u[-1] * model.reference)
     solution = finish(
@@ -184,23 +199,30 @@ def locate_by_shooting(
 
 
 def _drive(
-    curve: Curve, start: CurvePoint, kind: str, max_step: float, max_iterations: int
+    curve: Curve, start: CurvePoint, kind: str, max_step: float, max_iterations: int, reach: float | None
 ) -> tuple[CurvePoint, float, int]:
     """The bifurcation on the curve: by secants from the start; if they lead nowhere, between two scanned points."""
     try:
         found = _secants(curve, kind, start, None, max_step, max_iterations)
+    except _Spent:
+        raise
     except ConvergenceError:  # a step too far
         found = None
     if found is not None:
         return found
-    pair = _scan(curve, kind, start, max_step, max_iterations)
+    pair = _scan(curve, kind, start, max_step, max_iterations, np.inf if reach is None else reach)
     if pair is not None:
         found = _secants(curve, kind, pair[1], pair[0], max_step, max_iterations)
         if found is not None:
             return found
+    place = (
+        f"no {kind} found along the curve of periodic motions from omega = {start.u[-1] * curve.model.reference:.9g}"
+    )
+    if reach is not None:
+        raise ConvergenceError(f"{place} within {reach:g} of the motion's size either way: start closer")
     raise ConvergenceError(
-        f"no {kind} found along the curve of periodic motions from omega = {start.u[-1] * curve.model.reference:.9g} "
-        f"within {max_iterations} steps either way: start closer, or allow longer steps (max_step = {max_step:g})"
+        f"{place} within {max_iterations} steps either way: start closer, or allow longer steps "
+        f"(max_step = {max_step:g})"
     )
 
 
@@ -249,10 +271,10 @@ def _secants(
 
 
 def _scan(
-    curve: Curve, kind: str, start: CurvePoint, max_step: float, max_iterations: int
+    curve: Curve, kind: str, start: CurvePoint, max_step: float, max_iterations: int, reach: float
 ) -> tuple[CurvePoint, CurvePoint] | None:
     """The first two neighbours between which the kind of bifurcation lies, walking both ways with growing steps."""
-    step = 10.0 * _FIRST_STEP
+    step, walked = 10.0 * _FIRST_STEP, 0.0
     ends = [start, start]
     sides = [_side(kind, start)] * 2
     for _ in range(max_iterations):
@@ -260,12 +282,17 @@ def _scan(
             last = ends[way]
             try:
                 following = curve.onto(last.u + sign * step * last.tangent, last.tangent)
+            except _Spent:
+                raise
             except ConvergenceError:
                 continue
             side = _side(kind, following)
             if side != sides[way]:
                 return last, following
             ends[way] = following
+        walked += step
+        if walked >= reach:
+            return None
         step = min(max_step, 1.5 * step)
     return None
 

@@ -6,8 +6,11 @@ About every stroboscopic point z of the motion, an ellipsoid `|R (y - z)| <= r`,
 
 the norm in which Phi contracts. If the map over a few periods of the motion contracts everywhere in the ellipsoid,
 which is convex, it maps it into itself and every trajectory in it tends to z (Banach). That the derivative of the map
-is at most `_BOUND` < 1 is looked at in a sample of points, half of them on the boundary, and the radius that passes is
-reduced by a tenth: strong evidence, not a proof; `basins` follows a sample of what it stopped to the end.
+is at most `_BOUND` < 1, and that the ellipsoid is mapped into itself, is looked at in a sample of points, half of them
+on the boundary, and the radius that passes is reduced by a tenth: strong evidence, not a proof (a bound from Lipschitz
+constants of the tangent would grow exponentially over the periods of the map). `benchmarks/trapping.py` measures how
+often it is wrong: never, in 17986 trajectories that were stopped and 42000 states inside 17 ellipsoids of six systems.
+`basins` follows a sample of what it stopped to the end.
 """
 
 from __future__ import annotations
@@ -36,11 +39,12 @@ _KEPT = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Trap:
-    """`|factor (y - point)| <= radius`."""
+    """`|factor (y - point)| <= radius`; the map that contracts is that over `times` periods of the motion."""
 
     point: Array
     factor: Array
     radius: float
+    times: int = 1
 
     def holds(self, states: Array) -> NDArray[np.bool_]:
         """Which of the states (B, 2n) are inside."""
@@ -87,7 +91,7 @@ def traps_about(
         radius = _largest(flow, point, factor, ball, omega, n * times, values, workers)
         if radius == 0.0:
             return []
-        traps.append(Trap(point.copy(), factor, _KEPT * radius))
+        traps.append(Trap(point.copy(), factor, _KEPT * radius, times))
     return traps
 
 

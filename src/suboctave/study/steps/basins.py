@@ -77,8 +77,8 @@ class Basins(Step):
         said = f"basins at omega = {self.omega:g}"
         if self.what == "shares":
             frame = found.to_dataframe()
-            return Table({name: frame[name].to_numpy() for name in frame.columns}, f"{said}, shares")
-        return Table(_states(found), f"{said}, state by state")
+            return Table({name: frame[name].to_numpy() for name in frame.columns}, f"{said}, shares", found)
+        return Table(_states(found), f"{said}, state by state", found)
 
     def _side(self, which: int) -> tuple[float, float]:
         return self.box[which][0], self.box[which][1]

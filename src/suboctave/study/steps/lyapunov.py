@@ -39,4 +39,5 @@ class Lyapunov(Step):
         )  # fmt: skip
         rows = list(zip(found.exponents, found.standard_errors, found.per_period, strict=True))
         names = ("exponent", "standard_error", "per_period")
-        return Table(as_table(names, (float, float, float), rows), f"Lyapunov exponents at omega = {self.omega:g}")
+        said = f"Lyapunov exponents at omega = {self.omega:g}"
+        return Table(as_table(names, (float, float, float), rows), said, found)

@@ -51,4 +51,5 @@ class SteppedSineStep(Step):
         found = stepped_sine(context.system, tuple(self.omega), progress=context.progress, **self._arguments())
         frame = found.to_dataframe()
         columns = {str(name): np.asarray(frame[name].tolist()) for name in frame}
-        return Table(columns, f"stepped sine {' and '.join(found.directions)}, amplitudes of x_{found.observed}")
+        said = f"stepped sine {' and '.join(found.directions)}, amplitudes of x_{found.observed}"
+        return Table(columns, said, found)

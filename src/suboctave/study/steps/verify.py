@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from suboctave.analysis import Branch, Table, TrackedBranch, verify
+from suboctave.analysis import Branch, BranchVerification, Table, TrackedBranch, verify
 from suboctave.study.steps.base import (
     Complaint,
     Context,
@@ -46,18 +46,20 @@ class Verify(Step):
         """See `Step.run`."""
         curve = as_curve(self.branch)
         branch = chosen_branch(curve, context.results)
-        rows = (
-            _one_by_one(self, branch, context) if isinstance(branch, TrackedBranch) else _whole(self, branch, context)
-        )
+        found = None if isinstance(branch, TrackedBranch) else _whole(self, branch, context)
+        rows = _one_by_one(self, branch, context) if found is None else _rows(found)
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "outcome", "reason")
         kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str, str)
-        return Table(as_table(names, kinds, rows), f"{curve.said}, held against shooting")
+        return Table(as_table(names, kinds, rows), f"{curve.said}, held against shooting", found)
 
 
-def _whole(step: Verify, branch: Branch, context: Context) -> list[tuple[Any, ...]]:
-    """Rows of a branch of motions, all at once."""
+def _whole(step: Verify, branch: Branch, context: Context) -> BranchVerification:
+    """A branch of motions, all at once."""
     points = [] if step.what == "bifurcations" else range(0, len(branch), step.every)
-    found = verify(branch, step.tolerance, points=points, bifurcations=step.what != "points", progress=context.progress)
+    return verify(branch, step.tolerance, points=points, bifurcations=step.what != "points", progress=context.progress)
+
+
+def _rows(found: BranchVerification) -> list[tuple[Any, ...]]:
     rows: list[tuple[Any, ...]] = [
         (f"point {p.index}", p.omega, p.distance, p.multiplier_error, _said(p.stable), p.agrees, p.outcome, p.reason)
         for p in found.points
