@@ -21,7 +21,7 @@ from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
@@ -142,18 +142,21 @@ class TrackedSample:
         """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
         return self._plain.sign if operator is Kind.INTEGER else self._half.sign
 
-    def determinant(self, operator: Kind) -> Array:
+    def determinant(self, operator: Kind) -> tuple[float, float]:
         """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
         state, size = self.state, self.state.balance.size
         if operator is Kind.INTEGER:
             n = state.balance.dimension
-            sign, found = self._plain.sign, self._plain.log_determinant + float(np.log(self.point.weights[:n]).sum())
+            # its columns are in scaled arclength: the weights are those of the DOFs over the size of the motion
+            sign, found = self._plain.sign, self._plain.log_determinant
+            found += n * math.log(float(self.point.weights[0]) / float(state.balance.scales()[0][0]))
+            masses = state.balance.logarithm_of_masses(n)
         else:
             n = len(self._half.lu)
             sign, found = self._half.sign, self._half.log_determinant
-        masses = 2.0 * float(np.log(state.balance.row_weights(n)).sum())
-        units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) - masses
-        return np.array([sign, found - units])
+            masses = 2.0 * state.balance.logarithm_of_masses(n)
+        units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) + masses
+        return sign, found - units
 
     @lazy
     def _half(self) -> Factor:

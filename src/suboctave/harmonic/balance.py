@@ -103,6 +103,7 @@ class HarmonicBalance:
         ) = None
         self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
         self._row_weights: dict[int, Array] = {}
+        self._changing: dict[str, list[tuple[int, tuple[int, ...]]]] = {}
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -244,6 +245,16 @@ class HarmonicBalance:
             self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
         return self._packed[1]
 
+    def changing(self, name: str) -> list[tuple[int, tuple[int, ...]]]:
+        """The directions along which a parameter changes forces, with the elements that have it in a coefficient."""
+        if name not in self._changing:
+            touched = [
+                (g, tuple(i for i in group.members if any(name in c.names for c in self.elements[i].coefficients)))
+                for g, group in enumerate(self.groups)
+            ]
+            self._changing[name] = [(g, members) for g, members in touched if members]
+        return self._changing[name]
+
     @lazy
     def grid(self) -> Array:
         """Points on the circle for searches along a motion: cosines and sines, (2, N)."""
@@ -273,6 +284,14 @@ class HarmonicBalance:
         if found is None:
             found = self._row_weights[rows] = np.tile(self.scales()[1], rows // self.size)
         return found
+
+    def logarithm_of_masses(self, rows: int) -> float:
+        """Sum of the logarithms of `sqrt(m_i)` (`scales`) over as many rows of an operator."""
+        return rows // self.size * self._mass_logarithm
+
+    @lazy
+    def _mass_logarithm(self) -> float:
+        return float(np.log(self.scales()[0]).sum())
 
     @lazy
     def column_weights(self) -> Array:

@@ -106,7 +106,8 @@ def evaluate_told(
     x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
     points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
 ):  # fmt: skip
-    """`evaluate` with laws that have arctan steps; the table's spectra are zero before.
+    """`evaluate` with laws that have arctan steps; the table's spectra are zero before. Returns besides the nodes of
+    the last direction that has steps, as `sharp_nodes` gives them.
 
     Parameters
     ----------
@@ -122,6 +123,7 @@ def evaluate_told(
     degree = table.shape[2] + motions.shape[1] - 2
     # not a literal, for which the nodes would be compiled once more
     moving = degree < 0
+    sampled = np.empty((4, 0))
     for g in range(motions.shape[0]):
         low, high = step_first[g], step_first[g + 1]
         if high > low:
@@ -130,10 +132,11 @@ def evaluate_told(
                 rule_weights,
             )  # fmt: skip
             add_smooth_steps(sampled, steps[low:high], line[g], table[0, g], table[1, g])
-    return evaluate(
+    finite = evaluate(
         x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
         weight, table, motions, parts, sizes,
     )  # fmt: skip
+    return finite, sampled
 
 
 @kernel()
@@ -244,11 +247,12 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         balance.scales()[1],
     )
     filled = (table, motions, parts, sizes)
+    known = state.__dict__
     if packed.told:
-        finite = evaluate_told(*(*given, *told_steps(packed), *filled))
+        finite, sampled = evaluate_told(*(*given, *told_steps(packed), *filled))
+        known["_told_nodes"] = int(packed.step_owner[-1]), sampled
     else:
         finite = evaluate(*given, *filled)
-    known = state.__dict__
     known["motions"], known["blocks"] = motions, blocks
     if not balance.own:
         known["nodal"] = []
