@@ -101,6 +101,8 @@ class HarmonicBalance:
         self._coefficients: (
             tuple[Mapping[str, float], tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None
         ) = None
+        #: of every element: values of its names, its coefficients there, and what it tells of its law
+        self._laws: dict[int, tuple[tuple[float, ...], Array, Sampling]] = {}
         self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
         self._row_weights: dict[int, Array] = {}
         self._changing: dict[str, list[tuple[int, tuple[int, ...]]]] = {}
@@ -130,7 +132,7 @@ class HarmonicBalance:
         other = HarmonicBalance(self.system, basis, self.values, self.linear, samples)
         # the same mapping, so that a motion's values are known to be its own, with what the laws are there
         other.values, other._own_coefficients = self.values, self._own_coefficients
-        other._constant_laws = self._constant_laws
+        other._names, other._laws = self._names, self._laws
         return other
 
     @lazy
@@ -223,19 +225,20 @@ class HarmonicBalance:
 
     def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
         numbers, kinds = [], []
-        for element, (own, kind) in zip(self.system.elements, self._constant_laws, strict=True):
-            numbers.append(element.coefficient_values(values) if own is None else own)
-            kinds.append(element.sampling(numbers[-1]) if kind is None else kind)
+        for i, (element, names) in enumerate(zip(self.system.elements, self._names, strict=True)):
+            key = tuple([values[name] for name in names])
+            known = self._laws.get(i)
+            if known is None or known[0] != key:
+                own = element.coefficient_values(values)
+                known = self._laws[i] = key, own, element.sampling(own)
+            numbers.append(known[1])
+            kinds.append(known[2])
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
 
     @lazy
-    def _constant_laws(self) -> list[tuple[Array | None, Sampling | None]]:
-        """Coefficients of every element, and what it tells of its law, if no parameter changes them."""
-        numbers = [
-            e.coefficient_values({}) if all(c.constant for c in e.coefficients) else None for e in self.system.elements
-        ]
-        pairs = zip(self.system.elements, numbers, strict=True)
-        return [(c, None if c is None else e.sampling(c)) for e, c in pairs]
+    def _names(self) -> list[tuple[str, ...]]:
+        """The names that every element's coefficients depend on."""
+        return [tuple(sorted({n for c in e.coefficients for n in c.names})) for e in self.system.elements]
 
     def packed_laws(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
         """The groups' laws at parameter values, as arrays, and points on the circle for their polynomials, (2, N)."""
