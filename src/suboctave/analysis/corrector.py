@@ -89,7 +89,7 @@ def corrected(
                 load, weight, table, motions, parts, sizes,
             )  # fmt: skip
         else:
-            finite, _sampled = evaluate_told(
+            finite = evaluate_told(
                 x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
                 load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts,
                 sizes,

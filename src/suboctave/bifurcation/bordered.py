@@ -23,9 +23,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.bifurcation.bordered_kernels import border_at
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.state import BalanceState
 
@@ -137,6 +139,9 @@ def of_equations(state: BalanceState, kind: Kind, vector: np.ndarray) -> np.ndar
 
 def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:
     """Evaluate g and the vectors of its gradient, bordered by `borders` (b = left, c = right)."""
+    found = _compiled(state, kind, borders)
+    if found is not None:
+        return found
     matrix = operator(state, kind, kappa)
     n = matrix.shape[0]
     scale = state.balance.row_weights(n)
@@ -150,6 +155,31 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
     u = factor.solve(rhs, adjoint=True)
     # with b and c scaled by omega^2 the unknown multiplying b is g / omega^2
     return Bordered(state, kind, kappa, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, factor, scale)
+
+
+def _compiled(state: BalanceState, kind: Kind, borders: NullVectors) -> Bordered | None:
+    """`bordered` in one compiled call, for real operators of a structure's own matrices; None where that does not go.
+
+    The operator is left with the state.
+    """
+    balance, basis, linear = state.balance, state.basis, state.linear
+    plain = kind is not Kind.FREE and basis.kept is None and not balance.own
+    if not plain or not isinstance(linear, StructuralMatrices):
+        return None
+    mean = kind is Kind.INTEGER
+    n = borders.right.shape[0]
+    matrix, lu, pivots = np.zeros((n, n)), np.empty((n + 1, n + 1)), np.empty(n + 1, dtype=np.int32)
+    v, u, scale, size = np.empty(n + 1), np.empty(n + 1), balance.row_weights(n), state.omega**2
+    multiples = basis.multiples if mean else basis.half_multiples
+    singular = border_at(
+        *(state.spectra_table, balance.moving, state.rate, mean, *balance.directions, linear.matrices, multiples),
+        *(state.omega, state.x, scale, borders.left, borders.right, size, matrix, lu, pivots, v, u),
+    )
+    if singular:
+        return None
+    state.__dict__["jacobian" if mean else "half_jacobian"] = matrix
+    factor = Factor(lu.T, pivots, False)
+    return Bordered(state, kind, 0.0, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, factor, scale)
 
 
 def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:

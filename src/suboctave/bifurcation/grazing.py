@@ -29,7 +29,8 @@ from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.finder import Located, position
 from suboctave.bifurcation.gaps import contact_side, gap_extrema, level_rate, levels
 from suboctave.bifurcation.kinds import BifurcationKind, Sample
-from suboctave.bifurcation.solve import Extra, Guess, Singular, newton
+from suboctave.bifurcation.solve import Extra, Guess, Singular, Slopes, newton
+from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, point_between
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.errors import ConvergenceError
@@ -117,23 +118,23 @@ class Touch(BifurcationKind):
         direction = read_direction(start, self.element)
         high = start.basis.harmonics
         column = np.zeros(start.balance.dimension)
+        still = levels(start.local(self.element))[self.index] if guess.name == "omega" else None
 
         def augmentation(state: BalanceState, extra: Array) -> tuple[list[Extra], Array | None, list[Array]]:
             rows = basis_rows(high, float(extra[0]))
             u = state.x @ direction
             value, slope, curve = (float(row @ u) for row in rows)
-            level = levels(state.local(self.element))[self.index]
-            rate = level_rate(state, self.element, self.index, guess.name)
-            size = float(np.linalg.norm(u))
-            gradients = [state.balance.packed(np.multiply.outer(row, direction)) for row in rows[:2]]
-            return (
-                [
-                    Extra.of(value - level, gradients[0], -rate, (slope,), size),
-                    Extra.of(slope, gradients[1], 0.0, (curve,), size),
-                ],
-                None,
-                [column],
-            )
+            level = levels(state.local(self.element))[self.index] if still is None else still
+            size = length(u)
+
+            def height() -> Slopes:
+                rate = level_rate(state, self.element, self.index, guess.name)
+                return state.balance.packed(np.multiply.outer(rows[0], direction)), -rate, (slope,)
+
+            def rise() -> Slopes:
+                return state.balance.packed(np.multiply.outer(rows[1], direction)), 0.0, (curve,)
+
+            return [Extra(value - level, size, height), Extra(slope, size, rise)], None, [column]
 
         state, extra, residual, iterations = newton(guess, tau, np.ones(1), augmentation)
         return Grazing(state, None, 0.0, residual, iterations, float(extra[0]) % (2.0 * math.pi))

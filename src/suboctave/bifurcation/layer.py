@@ -247,8 +247,9 @@ def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: G
         quarter, *_ = newton(begin, np.zeros(0), np.zeros(0), augmentation)
     except ConvergenceError:
         return 0.5
-    g = [bordered(s, kind.operator, found.vectors, found.kappa).g for s in (grazing.state, quarter, found.state)]
-    near, far = abs(g[1] - g[0]), abs(g[2] - g[0])
+    # at the bifurcation itself g vanishes
+    g = [bordered(s, kind.operator, found.vectors, found.kappa).g for s in (grazing.state, quarter)]
+    near, far = abs(g[1] - g[0]), abs(g[0])
     if near == 0.0 or far == 0.0:
         return 1.0
     return math.log(far / near) / math.log(4.0)

@@ -14,11 +14,15 @@ from functools import cache
 import numpy as np
 
 from suboctave.bifurcation.bordered import Bordered, NullVectors, at_values, bordered, null_vectors, residual_scale
+from suboctave.bifurcation.located import AWAY, OFF_AXIS, OTHER, SOLVED, STILL, UNSOLVED, located, located_parts
+from suboctave.compiled import ready
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor, length
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic import real_form
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import Array
+from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
@@ -35,6 +39,14 @@ _SHRUNK = 0.01
 _SHORT = 1e-4
 #: step, in units of the motion and of the parameter's range, that leads to no bifurcation of this neighbourhood
 _AWAY = 4.0
+_ITERATIONS = 10
+_LIMITS = np.array((_TOLERANCE, _STEP, _SHORT, _AWAY))
+_ENDS = {
+    OFF_AXIS: "omega left the positive axis",
+    AWAY: "the bordered system leads away from its start",
+    STILL: "the bordered system does not contract",
+    UNSOLVED: "the bordered system did not converge (residual {:.1e})",
+}
 
 
 @dataclass(frozen=True)
@@ -116,7 +128,7 @@ def newton(
     unknowns: Array,
     spans: Array,
     augmentation: Augmentation,
-    iterations: int = 10,
+    iterations: int = _ITERATIONS,
     start: BalanceState | None = None,
 ) -> tuple[BalanceState, Array, float, int]:
     """Solve `[R + columns . unknowns; extras] = 0` in (X, parameter, unknowns).
@@ -151,7 +163,7 @@ def newton(
     for iteration in range(iterations + 1):
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
-            raise ConvergenceError("omega left the positive axis")
+            raise ConvergenceError(_ENDS[OFF_AXIS])
         if iteration > 0:
             state = balance.at(x, omega, values)
         equations, addition, columns = augmentation(state, extra)
@@ -184,9 +196,9 @@ def newton(
         if not math.isfinite(moved):
             raise ConvergenceError("the bordered system is singular")
         if iteration > 0 and moved > _AWAY:
-            raise ConvergenceError("the bordered system leads away from its start")
+            raise ConvergenceError(_ENDS[AWAY])
         if iteration > 3 and moved > 0.5 * previous and previous > 1e-6:
-            raise ConvergenceError("the bordered system does not contract")
+            raise ConvergenceError(_ENDS[STILL])
         damp = min(1.0, 0.5 / moved) if moved > 0.0 else 1.0
         x -= damp * step[:n] * scale_x
         parameter -= damp * step[n] * guess.span
@@ -196,7 +208,7 @@ def newton(
         previous = moved
     if nearest is not None:
         return nearest
-    raise ConvergenceError(f"the bordered system did not converge (residual {error:.1e})")
+    raise ConvergenceError(_ENDS[UNSOLVED].format(error))
 
 
 def _linearised(
@@ -244,6 +256,9 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
         If Newton's method does not converge from the guess.
     """
     begin = guess.state()
+    found = _at_once(guess, kind, begin)
+    if found is not None:
+        return found
     if guess.vectors is None:
         borders = null_vectors(begin, kind, guess.kappa)
     else:
@@ -277,3 +292,47 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
     state, extra, residual, iterations = newton(guess, start, spans, augmentation, start=begin)
     kappa = float(extra[0]) if kind is Kind.FREE else 0.0
     return Singular(state, last[0].vectors, kappa, residual, iterations)
+
+
+def _at_once(guess: Guess, kind: Kind, begin: BalanceState) -> Singular | None:
+    """`locate_singular` in one compiled call; None where that does not go.
+
+    Raises
+    ------
+    ConvergenceError
+        As `newton`.
+    """
+    balance, basis, linear, values = guess.balance, guess.balance.basis, begin.linear, begin.values
+    plain = guess.name == "omega" and balance.steady and basis.kept is None and kind is not Kind.FREE
+    if not plain or not isinstance(linear, StructuralMatrices):
+        return None
+    packed, nodes = balance.packed_laws(values)
+    called = real_form.closed_parts(packed)
+    # what it calls is compiled one by one, not all at one go
+    if called is None or not all(map(ready, (*called, *located_parts(packed)))):
+        return None
+    n, high, size, groups = balance.dimension, basis.harmonics, balance.size, len(balance.groups)
+    known = guess.vectors is not None
+    near = guess.vectors.resized(basis, size, kind) if guess.vectors else None
+    rows = n if kind is Kind.INTEGER else n + size
+    # both are filled with those at the solution
+    right, left = (np.empty(rows), np.empty(rows)) if near is None else (near.right.copy(), near.left.copy())
+    u = np.append(begin.unknowns, guess.omega)
+    least = np.array([max(_SHRUNK * guess.size * unit, NOTHING) for unit in (1.0, guess.omega**2)])
+    blocks, parts = np.empty((high + 1, size, size), dtype=complex), np.empty((3, 2 * high + 1, size))
+    table = np.empty((3, groups, balance.top + 1), dtype=complex)
+    motions, sizes, numbers = np.empty((groups, high + 1), dtype=complex), np.empty(4), np.empty(2)
+    laws, steps = real_form.closed_laws(balance, packed, nodes)
+    start = (u, kind is Kind.INTEGER, known, right, left, guess.span, least, _LIMITS, _ITERATIONS)
+    structure = (basis.nu, balance.moving, basis.multiples, basis.half_multiples, linear.matrices)
+    forces = (*laws, balance.load(values, 1.0), balance.scales()[1], *steps)
+    filled = (blocks, table, motions, parts, sizes, numbers)
+    ended = located(*(*start, *structure, *forces, *filled))
+    if ended == OTHER:
+        return None
+    error, iterations = numbers.tolist()
+    if ended != SOLVED:
+        raise ConvergenceError(_ENDS[ended].format(error))
+    state = BalanceState(balance, linear, u[:n].reshape(basis.size, size), float(u[n]), values)
+    state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
+    return Singular(state, NullVectors(right, left), 0.0, error, int(iterations))

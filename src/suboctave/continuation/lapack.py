@@ -17,6 +17,7 @@ try:
 except (ImportError, AttributeError):  # names that Numba may change
     _getrf = None
 _REAL = ord("d")
+_FAST = {"reassoc", "contract", "nsz"}
 
 
 @kernel(at_once=True)
@@ -76,6 +77,28 @@ def solve_factorised(transposed, pivots, right):
         column, above = transposed[j, :j], right[:j]
         for i in range(j):
             above[i] -= column[i] * value
+
+
+@kernel(fastmath=_FAST)
+def solve_transposed(transposed, pivots, right):
+    """The solution with the transpose of the matrix, as `solve_factorised`."""
+    n = right.shape[0]
+    for i in range(n):
+        row, above = transposed[i, :i], right[:i]
+        total = 0.0
+        for j in range(i):
+            total += row[j] * above[j]
+        right[i] = (right[i] - total) / transposed[i, i]
+    for i in range(n - 2, -1, -1):
+        row, below = transposed[i, i + 1 :], right[i + 1 :]
+        total = 0.0
+        for j in range(below.shape[0]):
+            total += row[j] * below[j]
+        right[i] -= total
+    for i in range(n - 1, -1, -1):
+        other = pivots[i]
+        if other != i:
+            right[i], right[other] = right[other], right[i]
 
 
 if _getrf is None:

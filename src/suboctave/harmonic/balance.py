@@ -33,6 +33,13 @@ from suboctave.model.element import Element
 from suboctave.model.sampling import AdaptiveSampling, CornerSampling, Sampling
 from suboctave.model.system import System
 
+#: what the same equations in another basis share
+_IN_ANY_BASIS = (
+    *("system", "values", "linear", "size", "matrix_names", "elements", "own", "groups", "directions", "moving"),
+    *("any_moving", "load_names", "steady", "_coefficient_names", "_load_shapes", "_load_order"),
+    *("_own_coefficients", "_scales", "highest_load", "_laws", "_names", "_changing", "_mass_logarithm"),
+)
+
 
 class HarmonicBalance:
     """Equations for the coefficients X of a system's periodic motion in a basis.
@@ -65,12 +72,9 @@ class HarmonicBalance:
         samples: tuple[int | None, ...] | None = None,
     ) -> None:
         self.system = system
-        self.basis = basis
         self.values = dict(system.parameters if values is None else values)
         self.linear: LinearPart = StructuralMatrices(system, self.values) if linear is None else linear
         self.size = self.linear.size
-        self.dimension = self.size * basis.count
-        self.samples = samples if samples is not None else (None,) * len(system.elements)
         self._coefficient_names = sorted({n for e in system.elements for c in e.coefficients for n in c.names})
         #: parameters that the linear part depends on
         self.matrix_names = system.mass.names | system.damping.names | system.stiffness.names
@@ -91,21 +95,28 @@ class HarmonicBalance:
             [any(system.elements[i].depends_on_velocity for i in g.members) for g in self.groups], dtype=bool
         )
         self.any_moving = bool(self.moving.any())
-        shapes = [self.linear.retain(c.direction) for c in system.load_components()]
-        self.loads = LoadSpectrum(system, basis, shapes)
-        self._load_cache: tuple[tuple, Array] | None = None
+        self._load_shapes = [self.linear.retain(c.direction) for c in system.load_components()]
         self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
         self._load_order = sorted(self.load_names)
         #: whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X
         self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
+        #: of every element: values of its names, its coefficients there, and what it tells of its law
+        self._laws: dict[int, tuple[tuple[float, ...], Array, Sampling]] = {}
+        self._changing: dict[str, list[tuple[int, tuple[int, ...]]]] = {}
+        self._written_in(basis, samples if samples is not None else (None,) * len(system.elements))
+
+    def _written_in(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> None:
+        """What depends on the basis and the samples."""
+        self.basis = basis
+        self.samples = samples
+        self.dimension = self.size * basis.count
+        self.loads = LoadSpectrum(self.system, basis, self._load_shapes)
+        self._load_cache: tuple[tuple, Array] | None = None
         self._coefficients: (
             tuple[Mapping[str, float], tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None
         ) = None
-        #: of every element: values of its names, its coefficients there, and what it tells of its law
-        self._laws: dict[int, tuple[tuple[float, ...], Array, Sampling]] = {}
         self._packed: tuple[list[GroupLaw], tuple[PackedLaws, Array]] | None = None
         self._row_weights: dict[int, Array] = {}
-        self._changing: dict[str, list[tuple[int, tuple[int, ...]]]] = {}
         #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
         self.top = 2 * basis.harmonics + 1
 
@@ -129,10 +140,11 @@ class HarmonicBalance:
         return self if basis == self.basis else self._like(basis, self.samples)
 
     def _like(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> HarmonicBalance:
-        other = HarmonicBalance(self.system, basis, self.values, self.linear, samples)
-        # the same mapping, so that a motion's values are known to be its own, with what the laws are there
-        other.values, other._own_coefficients = self.values, self._own_coefficients
-        other._names, other._laws = self._names, self._laws
+        # the same mapping of values too: so a motion's values are known to be its own, with what the laws are there
+        _ = self._own_coefficients, self._scales, self.highest_load, self._mass_logarithm
+        other = HarmonicBalance.__new__(HarmonicBalance)
+        other.__dict__.update({name: self.__dict__[name] for name in _IN_ANY_BASIS})
+        other._written_in(basis, samples)
         return other
 
     @lazy

@@ -102,22 +102,12 @@ def evaluate(
 
 
 @kernel()
-def evaluate_told(
+def evaluate_noting(
     x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
     points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
 ):  # fmt: skip
-    """`evaluate` with laws that have arctan steps; the table's spectra are zero before. Returns besides the nodes of
-    the last direction that has steps, as `sharp_nodes` gives them.
-
-    Parameters
-    ----------
-    points, widths, steps, step_first
-        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
-        each direction's begin, (G + 1,).
-    line
-        Constant and slope of the laws that they belong to, (G, 2).
-    rule_nodes, rule_weights
-        `sharp_nodes.tables()`.
+    """`evaluate_told`, which returns besides the nodes of the last direction that has steps, as `sharp_nodes` gives
+    them.
     """
     along_directions(x, starts, dofs, shape, motions)
     degree = table.shape[2] + motions.shape[1] - 2
@@ -137,6 +127,30 @@ def evaluate_told(
         weight, table, motions, parts, sizes,
     )  # fmt: skip
     return finite, sampled
+
+
+@kernel()
+def evaluate_told(
+    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
+    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+):  # fmt: skip
+    """`evaluate` with laws that have arctan steps; the table's spectra are zero before.
+
+    Parameters
+    ----------
+    points, widths, steps, step_first
+        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
+        each direction's begin, (G + 1,).
+    line
+        Constant and slope of the laws that they belong to, (G, 2).
+    rule_nodes, rule_weights
+        `sharp_nodes.tables()`.
+    """
+    finite, _sampled = evaluate_noting(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+    )  # fmt: skip
+    return finite
 
 
 @kernel()
@@ -249,7 +263,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     filled = (table, motions, parts, sizes)
     known = state.__dict__
     if packed.told:
-        finite, sampled = evaluate_told(*(*given, *told_steps(packed), *filled))
+        finite, sampled = evaluate_noting(*(*given, *told_steps(packed), *filled))
         known["_told_nodes"] = int(packed.step_owner[-1]), sampled
     else:
         finite = evaluate(*given, *filled)

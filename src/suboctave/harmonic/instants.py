@@ -159,12 +159,13 @@ def peak(c, samples):
     """
     n = samples
     h = 2.0 * math.pi / n
-    x = np.empty(n)
-    d = np.empty(n)
-    s = np.empty(n)
+    zr, zi = np.empty(n), np.empty(n)
+    for j in range(n):
+        zr[j], zi[j] = math.cos(j * h), math.sin(j * h)
+    values = motion(c, zr, zi)
+    x, d = values[0], values[1]
     best = -1.0
     for j in range(n):
-        x[j], d[j], s[j] = _jet(c, math.cos(j * h), math.sin(j * h))
         if abs(x[j]) > best:
             best = abs(x[j])
             where = j * h

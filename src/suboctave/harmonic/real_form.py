@@ -12,16 +12,23 @@ and the linear part depends on omega through its blocks alone. The general case 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.compiled import kernel, ready
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.group_force import Group
+from suboctave.harmonic.closed_bends import bends_of_corners, bends_of_polynomial, bends_of_smooth_steps
+from suboctave.harmonic.evaluation import told_steps
+from suboctave.harmonic.group_force import Group, PackedLaws
 from suboctave.harmonic.kernels import polynomial, spectra, toeplitz_form
 from suboctave.harmonic.linear_part import StructuralMatrices
+from suboctave.harmonic.sharp_nodes import sharp_nodes
 from suboctave.harmonic.state import BalanceState
+
+if TYPE_CHECKING:
+    from suboctave.harmonic.balance import HarmonicBalance
 
 
 @kernel()
@@ -174,6 +181,59 @@ def _linear_rates(left, right, mean, multiples, omega, matrices):
     return by_omega, by_kappa
 
 
+@kernel()
+def closed_gradient(
+    left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
+    step_first, line, rule_nodes, rule_weights, top, multiples, omega, matrices, gx,
+):  # fmt: skip
+    """Add the derivative of `left^T J right` by the coefficients to `gx` (2 H + 1, n), where all laws are known in
+    closed form; returns that by omega, and the imaginary part of that by kappa.
+
+    left, right (rows, n): vectors of the integer basis (mean) or the half-odd one; multiples: its frequencies in units
+    of omega; motions, ..., nodes and points, ..., rule_weights: as in `evaluation.evaluate` and `evaluate_told`; top:
+    highest Fourier coefficient of the tangent.
+    """
+    degree = top + motions.shape[1] - 1
+    # not a literal, for which the nodes would be compiled once more
+    moving = degree < 0
+    for g in range(motions.shape[0]):
+        c, at, along = motions[g], dofs[starts[g] : starts[g + 1]], shape[starts[g] : starts[g + 1]]
+        if pieces is not None and first[g + 1] > first[g]:
+            bends = bends_of_corners(c, pieces[first[g] : first[g + 1]], grid[0], grid[1])
+            _add_group(left, right, mean, at, along, bends[0], bends[1], bends[2], gx)
+        if polynomial.shape[1] > 2:
+            weights = bends_of_polynomial(c, polynomial[g], nodes[0], nodes[1])
+            _add_group(left, right, mean, at, along, nodes[0], nodes[1], weights[0], gx)
+        if points is not None and step_first[g + 1] > step_first[g]:
+            low, high = step_first[g], step_first[g + 1]
+            sampled = sharp_nodes(
+                c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
+            )
+            weights = bends_of_smooth_steps(sampled, steps[low:high])
+            _add_group(left, right, mean, at, along, sampled[0], sampled[1], weights[0], gx)
+    return _linear_rates(left, right, mean, multiples, omega, matrices)
+
+
+def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
+    """The kernels that `closed_gradient` calls for laws of some kinds only; None if some are not in closed form."""
+    if packed.sampled and not packed.told:
+        return None
+    asked = (
+        (bends_of_corners, len(packed.pieces)),
+        (bends_of_polynomial, packed.polynomial.shape[1] > 2),
+        (sharp_nodes, packed.told),
+        (bends_of_smooth_steps, packed.told),
+    )
+    return [_add_group, _linear_rates, *(part for part, needed in asked if needed)]
+
+
+def closed_laws(balance: HarmonicBalance, packed: PackedLaws, nodes: Array) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """Directions and laws as `closed_gradient` wants them: from `starts` to `nodes`, and the arctan steps."""
+    pieces = packed.pieces if len(packed.pieces) else None
+    steps = told_steps(packed) if packed.told else (None,) * 7
+    return (*balance.directions, pieces, packed.first, packed.polynomial, balance.grid, nodes), steps
+
+
 def applies(state: BalanceState, names: tuple[str, ...]) -> bool:
     """Whether the forces depend on displacements alone, and the linear part is the structure's own."""
     balance = state.balance
@@ -191,9 +251,17 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     u = np.ascontiguousarray(left).reshape(-1, balance.size)
     v = np.ascontiguousarray(right).reshape(-1, balance.size)
     gx = np.zeros((basis.size, balance.size))
+    multiples = basis.multiples if mean else basis.half_multiples
+    packed, nodes = balance.packed_laws(state.values)
+    parts = closed_parts(packed)
+    if parts is not None and "closed_bends" not in state.__dict__ and all(map(ready, parts)):
+        laws, steps = closed_laws(balance, packed, nodes)
+        by_omega, by_kappa = closed_gradient(
+            *(u, v, mean, state.motions, *laws, *steps, balance.top, multiples, state.omega, linear.matrices, gx)
+        )
+        return gx, by_omega, 1j * by_kappa
     for group, zr, zi, second in _second(state):
         _add_group(u, v, mean, group.dofs, group.values, zr, zi, second, gx)
-    multiples = basis.multiples if mean else basis.half_multiples
     by_omega, by_kappa = _linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
     return gx, by_omega, 1j * by_kappa
 
@@ -218,4 +286,14 @@ def by_kappa(state: BalanceState, mean: bool, left: Array, right: Array) -> comp
     return 1j * float(_linear_rates(u, v, mean, multiples, state.omega, state.linear.matrices)[1])
 
 
-__all__ = ["add_doubled_form", "applies", "by_kappa", "half_odd_values", "real_gradient", "toeplitz_part"]
+__all__ = [
+    "add_doubled_form",
+    "applies",
+    "by_kappa",
+    "closed_gradient",
+    "closed_laws",
+    "closed_parts",
+    "half_odd_values",
+    "real_gradient",
+    "toeplitz_part",
+]
