@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.analysis.tracked_matrix import bordered_by_rows
+from suboctave.analysis.tracked_matrix import bordered_by_rows, evaluate_at_once, matrix_at_once
 from suboctave.bifurcation.augmented import Augmentation, Equations
 from suboctave.continuation.kernels import bordered_transposed
 from suboctave.continuation.linear import length
@@ -92,6 +92,9 @@ class TrackedEvaluation:
 
     def bordered_transposed(self, row: Array, weights: Array) -> Array:
         """Transpose of `[F_u / weights; row]`: what Newton's method factorises."""
+        at_once = matrix_at_once(self, row, weights)
+        if at_once is not None:
+            return at_once
         state, equations, names = self.state, self.equations, self.curve.names
         balance, linear = state.balance, state.linear
         plain = names[0] == "omega" and balance.steady and balance.basis.kept is None and equations.column is None
@@ -123,6 +126,7 @@ class TrackedEvaluation:
     @lazy
     def error(self) -> float:
         """The larger of the residual in units of the forces that balance and the scalar equations'."""
+        evaluate_at_once(self)
         state, addition = self.state, self.equations.addition
         if addition is None:
             size = state.residual_size()
