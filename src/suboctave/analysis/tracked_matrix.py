@@ -22,7 +22,7 @@ from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian
 from suboctave.harmonic.group_kernels import add_along, add_pieces
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.real_form import applies, closed_gradient, closed_laws, closed_parts, toeplitz_part
+from suboctave.harmonic.real_form import applies, closed_laws, closed_parts, noted_gradient, noted_nodes, toeplitz_part
 
 if TYPE_CHECKING:
     from suboctave.analysis.tracked_curve import TrackedEvaluation
@@ -107,7 +107,8 @@ def evaluate_and_border(
 @kernel()
 def gradient_and_matrix(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
-    step_first, line, rule_nodes, rule_weights, top, frequencies, omega, matrices, table, moving, rate, multiples, x,
+    step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, rate,
+    multiples, x,
     force_by, stiffness_by, other, unit, force, row, weights, gx, rates,
 ):  # fmt: skip
     """`bordered_by_rows` for u = (X, omega, a parameter) with the gradient of g.
@@ -115,7 +116,7 @@ def gradient_and_matrix(
     Parameters
     ----------
     left, ..., matrices
-        As in `real_form.closed_gradient`; table, ..., multiples, x: as in `evaluation.jacobian`.
+        As in `real_form.noted_gradient`; table, ..., multiples, x: as in `evaluation.jacobian`.
     force_by, stiffness_by
         Spectra of what the parameter does to the forces and stiffnesses along the directions, (G, top + 1).
     other
@@ -125,9 +126,9 @@ def gradient_and_matrix(
     gx, rates
         Filled: minus the gradient by X, zeros before; that by omega, by the parameter, by kappa (imaginary part), (3,).
     """
-    rates[0], rates[2] = closed_gradient(
+    rates[0], rates[2] = noted_gradient(
         left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
-        step_first, line, rule_nodes, rule_weights, top, frequencies, omega, matrices, gx,
+        step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, gx,
     )  # fmt: skip
     rates[1] = 0.0
     for g in range(force_by.shape[0]):
@@ -202,7 +203,7 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
         return None
     packed, nodes = balance.packed_laws(state.values)
     called = closed_parts(packed)
-    own: list[Callable[..., Any]] = [closed_gradient, toeplitz_part, add_along, bordered_by_rows]
+    own: list[Callable[..., Any]] = [noted_gradient, toeplitz_part, add_along, bordered_by_rows]
     if called is None or not all(map(ready, called + own)):
         return None
     changes, count = changes_by(state, name), len(balance.groups)
@@ -218,10 +219,12 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
     frequencies = basis.multiples if mean else basis.half_multiples
     laws, steps = closed_laws(balance, packed, nodes)
     gx, rates = np.zeros(state.x.shape), np.empty(3)
-    form = (left, right, mean, state.motions, *laws, *steps, balance.top, frequencies, state.omega, linear.matrices)
-    whole = (state.spectra_table, balance.moving, state.rate, basis.multiples, state.x, force_by, stiffness_by, other)
+    noted = noted_nodes(state, packed)
+    form = (left, right, mean, state.motions, *laws, *steps, noted, balance.top, frequencies, state.omega)
+    whole = (linear.matrices, state.spectra_table, balance.moving, state.rate, basis.multiples, state.x)
+    changed = (force_by, stiffness_by, other)
     units = (equations.of.unit, evaluation.curve.force, row, weights)
-    found: Array = gradient_and_matrix(*(*form, *whole, *units, gx, rates))
+    found: Array = gradient_and_matrix(*(*form, *whole, *changed, *units, gx, rates))
     by_omega, by_name, by_kappa = (-rates).tolist()
     equations.__dict__["gradient"] = -gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, 1j * by_kappa
     return found

@@ -209,9 +209,15 @@ def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOption
 
 
 def nearest_point(
-    curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions, along: np.ndarray | None = None
+    curve: TrackedCurve,
+    u: np.ndarray,
+    weights: np.ndarray,
+    newton: NewtonOptions,
+    along: np.ndarray | None = None,
+    spare: float = 0.0,
 ) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known.
+    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known; `spare` as
+    in `newton.correct`.
 
     Raises
     ------
@@ -219,7 +225,7 @@ def nearest_point(
         If Newton's method does not converge.
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
-    return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
+    return make_point(correct(curve, u, row, weights, newton, spare=spare), curve, row / weights, 0.0)
 
 
 def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -62,6 +62,16 @@ def change_of_pieces(c, pieces, grid_r, grid_i, force, stiffness):
                 pr, pi = pr * zr + pi * zi, pi * zr - pr * zi
 
 
+@kernel(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+def add_moved_step(u, point, width, factor, by_point, by_width, force, stiffness):
+    """Add what rates of place and width of a step do to force, without its logarithm, and stiffness (N,), in place."""
+    sharpness = 1.0 / width
+    for j in range(u.shape[0]):
+        ratio = (u[j] - point) * sharpness
+        force[j] -= factor * by_point * arctangent(ratio)
+        stiffness[j] -= factor * sharpness * (by_point + by_width * ratio) / (1.0 + ratio * ratio)
+
+
 @kernel()
 def change_of_steps(sampled, steps, line, force, stiffness):
     """Add what changes of arctan steps of the stiffness do to the spectra of force and stiffness (top + 1,), in place.
@@ -80,13 +90,10 @@ def change_of_steps(sampled, steps, line, force, stiffness):
         point, width, step, by_point, by_width, by_step = steps[s]
         if by_step != 0.0:
             add_step(u, point, width, by_step / math.pi, f, f_u)
-        factor = step / math.pi
-        for j in range(n):
-            y = u[j] - point
-            f[j] -= factor * by_point * arctangent(y / width)
-            f_u[j] -= factor * (by_point * width + by_width * y) / (width * width + y * y)
+        if by_point != 0.0 or by_width != 0.0:
+            add_moved_step(u, point, width, step / math.pi, by_point, by_width, f, f_u)
         if by_width != 0.0:
             for j in range(n):
                 ratio = (u[j] - point) / width
-                f[j] -= 0.5 * factor * by_width * math.log1p(ratio * ratio)
+                f[j] -= 0.5 * step / math.pi * by_width * math.log1p(ratio * ratio)
     add_pair(f, f_u, weights, zr, zi, force, stiffness)
