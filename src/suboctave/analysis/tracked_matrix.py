@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from suboctave.analysis.tracked_curve import TrackedEvaluation
     from suboctave.harmonic.basis import Array
 
+#: the kinds of laws for which all kernels that are called are compiled
+_EVALUATED: set[tuple[bool, ...]] = set()
+_DIFFERENTIATED: set[tuple[bool, ...]] = set()
+
 
 @kernel()
 def bordered_by_rows(
@@ -157,9 +161,12 @@ def evaluate_at_once(evaluation: TrackedEvaluation) -> None:
     if packed.sampled and not packed.told:
         return
     # what it calls is compiled one by one, not all at one go
-    asked = (add_pieces, len(packed.pieces)), (evaluate_noting, packed.told)
-    if not all(map(ready, [evaluate, border_at, *(part for part, needed in asked if needed)])):
-        return
+    asked = packed.told, len(packed.pieces) > 0
+    if asked not in _EVALUATED:
+        called = (evaluate_noting, packed.told), (add_pieces, len(packed.pieces))
+        if not all(map(ready, [evaluate, border_at, *(part for part, needed in called if needed)])):
+            return
+        _EVALUATED.add(asked)
     high, size, count, mean = basis.harmonics, balance.size, len(balance.groups), kind is Kind.INTEGER
     borders, unit = own.of.borders, state.omega**2
     n = len(borders.right)
@@ -202,10 +209,13 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
     if not plain or not isinstance(linear, StructuralMatrices):
         return None
     packed, nodes = balance.packed_laws(state.values)
-    called = closed_parts(packed)
-    own: list[Callable[..., Any]] = [noted_gradient, toeplitz_part, add_along, bordered_by_rows]
-    if called is None or not all(map(ready, called + own)):
-        return None
+    asked = packed.sampled, packed.told, len(packed.pieces) > 0, packed.polynomial.shape[1] > 2
+    if asked not in _DIFFERENTIATED:
+        called = closed_parts(packed)
+        own: list[Callable[..., Any]] = [noted_gradient, toeplitz_part, add_along, bordered_by_rows]
+        if called is None or not all(map(ready, called + own)):
+            return None
+        _DIFFERENTIATED.add(asked)
     changes, count = changes_by(state, name), len(balance.groups)
     force_by, stiffness_by = np.zeros((2, count, balance.top + 1), dtype=complex)
     for group, change in changes:

@@ -27,6 +27,7 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.nodal import own_elements
 from suboctave.harmonic.quadrature import on_circle, samples_for, search_count
+from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 from suboctave.model.element import Element
@@ -102,7 +103,7 @@ class HarmonicBalance:
         self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
         #: of every element: values of its names, its coefficients there, and what it tells of its law
         self._laws: dict[int, tuple[tuple[float, ...], Array, Sampling]] = {}
-        self._changing: dict[str, list[tuple[int, tuple[int, ...]]]] = {}
+        self._changing: dict[str, list[tuple[int, dict[int, Array | None]]]] = {}
         self._written_in(basis, samples if samples is not None else (None,) * len(system.elements))
 
     def _written_in(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> None:
@@ -260,15 +261,20 @@ class HarmonicBalance:
             self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
         return self._packed[1]
 
-    def changing(self, name: str) -> list[tuple[int, tuple[int, ...]]]:
-        """The directions along which a parameter changes forces, with the elements that have it in a coefficient."""
+    def changing(self, name: str) -> list[tuple[int, dict[int, Array | None]]]:
+        """The directions along which a parameter changes forces, with the elements that have it in a coefficient; their
+        rates with it where these are constant and not all zero.
+        """
         if name not in self._changing:
             touched = [
-                (g, tuple(i for i in group.members if any(name in c.names for c in self.elements[i].coefficients)))
+                (g, {i: _constant_rates(self.elements[i], name) for i in group.members if self._has(i, name)})
                 for g, group in enumerate(self.groups)
             ]
             self._changing[name] = [(g, members) for g, members in touched if members]
         return self._changing[name]
+
+    def _has(self, i: int, name: str) -> bool:
+        return any(name in c.names for c in self.elements[i].coefficients)
 
     @lazy
     def grid(self) -> Array:
@@ -325,3 +331,11 @@ class HarmonicBalance:
         the units of single DOFs. Shape (size,) each.
         """
         return self._scales
+
+
+def _constant_rates(element: Element, name: str) -> Array | None:
+    """Rates of an element's coefficients with a parameter, if no parameter changes them, and some are not zero."""
+    if not all(c.derivative(name).constant for c in element.coefficients):
+        return None
+    rates = coefficient_rates(element, {}, {name: 1.0})
+    return rates if rates.any() else None

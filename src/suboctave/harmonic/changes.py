@@ -31,11 +31,14 @@ def changes_by(state: BalanceState, name: str) -> list[tuple[Group, CoefficientC
 
 
 def _changes(state: BalanceState, name: str) -> list[tuple[Group, CoefficientChange]]:
-    balance, change = state.balance, {name: 1.0}
+    balance = state.balance
     found = []
     for g, members in balance.changing(name):
-        rates = {i: coefficient_rates(balance.elements[i], state.values, change) for i in members}
-        rates = {i: rate for i, rate in rates.items() if rate.any()}
+        rates = {}
+        for i, known in members.items():
+            rate = coefficient_rates(balance.elements[i], state.values, {name: 1.0}) if known is None else known
+            if known is not None or rate.any():
+                rates[i] = rate
         if rates:
             found.append((balance.groups[g], _along(state, g, rates)))
     return found

@@ -213,7 +213,7 @@ class PackedLaws(NamedTuple):
                 _ends(len(law.smooth_steps)),
                 law.told_places,
                 bool(law.told or law.sharp or law.uniform),
-                _only_told(laws),
+                bool(law.told) and law.in_closed_form and len(law.smooth_steps) > 0,
             )
         number = np.arange(len(laws))
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
