@@ -21,6 +21,9 @@ def state(request):
         so.ElasticStop(dof=(0, 1), stiffness="2*k", gap=-0.5, side="left", regularization=30.0),
         so.ElasticStop(dof=1, stiffness="k", gap="2*gap", side="right", regularization="s"),
         so.PolynomialSpring(dof=(0, 1), coefficients={3: "k*gap"}),
+        so.Freeplay(dof=0, stiffness="k", gap="gap", regularization="s"),
+        so.ElasticStop(dof=0, stiffness="k", gap="2*gap", side="right"),
+        so.ElasticStop(dof=(0, 1), stiffness="k*gap", gap="-gap", side="left"),
     ]
     system = so.System(
         np.diag([1.0, 2.0]),

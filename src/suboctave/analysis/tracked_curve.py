@@ -14,12 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from suboctave.analysis.tracked_matrix import bordered_by_rows, evaluate_at_once, matrix_at_once
 from suboctave.bifurcation.augmented import Augmentation, Equations
+from suboctave.continuation.kernels import bordered_transposed
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, next_harmonics
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
@@ -30,7 +33,6 @@ _CRITICAL = 1e-3
 #: steps after which that is looked at again
 _LOOKED_AT = 5
 _TINY = float(np.finfo(float).tiny)
-_NONE = np.zeros(0)
 
 
 class TrackedEvaluation:
@@ -88,6 +90,34 @@ class TrackedEvaluation:
         out[n:] *= self.curve.force
         return out
 
+    def bordered_transposed(self, row: Array, weights: Array) -> Array:
+        """Transpose of `[F_u / weights; row]`: what Newton's method factorises."""
+        at_once = matrix_at_once(self, row, weights)
+        if at_once is not None:
+            return at_once
+        state, equations, names = self.state, self.equations, self.curve.names
+        balance, linear = state.balance, state.linear
+        plain = names[0] == "omega" and balance.steady and balance.basis.kept is None and equations.column is None
+        if not plain or not isinstance(linear, StructuralMatrices):
+            found: Array = bordered_transposed(self.jacobian, row, weights)
+            return found
+        others = np.array([state.residual_by(name) for name in names[1:]])
+        return bordered_by_rows(
+            state.spectra_table,
+            balance.moving,
+            state.rate,
+            *balance.directions,
+            linear.matrices,
+            balance.basis.multiples,
+            state.omega,
+            state.x,
+            others,
+            equations.rows,
+            self.curve.force,
+            row,
+            weights,
+        )
+
     def takes_over(self, other: Evaluation) -> bool:
         """See `Evaluation`."""
         assert isinstance(other, TrackedEvaluation)
@@ -96,6 +126,7 @@ class TrackedEvaluation:
     @lazy
     def error(self) -> float:
         """The larger of the residual in units of the forces that balance and the scalar equations'."""
+        evaluate_at_once(self)
         state, addition = self.state, self.equations.addition
         if addition is None:
             size = state.residual_size()
@@ -147,13 +178,9 @@ class TrackedCurve:
         """Index of one of the free parameters in u."""
         return self.balance.dimension + self.augmentation.extras + self.names.index(name)
 
-    @lazy
+    @property
     def _weight(self) -> Array:
-        return np.tile(self.balance.scales()[0], self.balance.basis.size)
-
-    @lazy
-    def _parameter_weights(self) -> Array:
-        return 1.0 / np.array(self.spans)
+        return self.balance.column_weights
 
     def split(self, u: Array) -> tuple[Array, Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), extra unknowns, omega and parameter values of a vector u."""
@@ -184,8 +211,13 @@ class TrackedCurve:
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * largest) or 1.0
-        extra = self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu) if self.augmentation.extras else _NONE
-        return self.join(self._weight / size, 1.0 / extra, self._parameter_weights)
+        weights, n = np.empty(len(u)), self.balance.dimension
+        np.divide(self._weight, size, out=weights[:n])
+        if self.augmentation.extras:
+            weights[n : -len(self.names)] = 1.0 / self.augmentation.spans(self.split(u)[2] / self.balance.basis.nu)
+        for i, span in enumerate(self.spans, len(u) - len(self.names)):
+            weights[i] = 1.0 / span
+        return weights
 
     def adapted(self, u: Array, evaluation: Evaluation) -> TrackedCurve:
         """The curve with the harmonics, samples and bordering vectors of this point."""

@@ -29,6 +29,8 @@ _BESIDE = 0.05
 _SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
+#: way in scaled arclength within which derivatives count as those of a point that a search begins at
+_START = 1e-5
 #: share of a test's values at the ends of a step with which a zero is near enough for secants
 _LITTLE = 0.05
 #: ratio of a test's values at two ends beyond which it does not change evenly
@@ -288,7 +290,8 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             x, _, omega, values = finer.split(u)
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
             along = finer.transfer(sample.point.tangent, curve)
-            start = nearest_point(finer, u, finer.weights(u, curve.size(sample.point.u)), newton, along)
+            weights = finer.weights(u, curve.size(sample.point.u))
+            start = nearest_point(finer, u, weights, newton, along, _START)
             start = replace(start, arclength=sample.point.arclength)
             near = TrackedSample(start)
             test = found.test.within(near, near)

@@ -41,13 +41,13 @@ class HiddenPairs:
         self.tests = [test for test in tests if not isinstance(test, Extremum)]
         self.newton = newton
         #: the last points, with sign and logarithm of every test's function
-        self._known: list[tuple[TrackedSample, list[list[float]]]] = []
+        self._known: list[tuple[TrackedSample, list[tuple[float, float]]]] = []
 
     def passed(self, sample: TrackedSample, warnings: list[str]) -> list[Found]:
         """Take in the next point; the pairs found in the step before the last."""
         if not self.tests:
             return []
-        self._known = [*self._known[-3:], (sample, [test.smooth(sample).tolist() for test in self.tests])]
+        self._known = [*self._known[-3:], (sample, [test.smooth(sample) for test in self.tests])]
         return self._look(len(self._known) - 3, warnings)
 
     def rest(self, warnings: list[str]) -> list[Found]:
@@ -79,7 +79,7 @@ class HiddenPairs:
         return found
 
     def _pair(
-        self, test: CurveTest, samples: list[TrackedSample], functions: list[list[float]], at: int
+        self, test: CurveTest, samples: list[TrackedSample], functions: list[tuple[float, float]], at: int
     ) -> list[Found]:
         """The two events of one test in a step that may hide them."""
         a, b = same_discretisation(samples[at], samples[at + 1], self.newton), samples[at + 1]
@@ -105,7 +105,7 @@ class HiddenPairs:
                 both = [located(test, before, middle, self.newton), located(test, middle, after, self.newton)]
                 return [item for item in both if item is not None]
             places.insert(i + 1, place)
-            known.insert(i + 1, test.smooth(middle).tolist())
+            known.insert(i + 1, test.smooth(middle))
             inside.insert(i - low + 1, middle)
         return []
 

@@ -21,7 +21,7 @@ from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import truncation
@@ -142,18 +142,21 @@ class TrackedSample:
         """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
         return self._plain.sign if operator is Kind.INTEGER else self._half.sign
 
-    def determinant(self, operator: Kind) -> Array:
+    def determinant(self, operator: Kind) -> tuple[float, float]:
         """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
         state, size = self.state, self.state.balance.size
         if operator is Kind.INTEGER:
             n = state.balance.dimension
-            sign, found = self._plain.sign, self._plain.log_determinant + float(np.log(self.point.weights[:n]).sum())
+            # its columns are in scaled arclength: the weights are those of the DOFs over the size of the motion
+            sign, found = self._plain.sign, self._plain.log_determinant
+            found += n * math.log(float(self.point.weights[0]) / float(state.balance.scales()[0][0]))
+            masses = state.balance.logarithm_of_masses(n)
         else:
             n = len(self._half.lu)
             sign, found = self._half.sign, self._half.log_determinant
-        masses = 2.0 * float(np.log(state.balance.row_weights(n)).sum())
-        units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) - masses
-        return np.array([sign, found - units])
+            masses = 2.0 * state.balance.logarithm_of_masses(n)
+        units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) + masses
+        return sign, found - units
 
     @lazy
     def _half(self) -> Factor:
@@ -206,9 +209,15 @@ def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOption
 
 
 def nearest_point(
-    curve: TrackedCurve, u: np.ndarray, weights: np.ndarray, newton: NewtonOptions, along: np.ndarray | None = None
+    curve: TrackedCurve,
+    u: np.ndarray,
+    weights: np.ndarray,
+    newton: NewtonOptions,
+    along: np.ndarray | None = None,
+    spare: float = 0.0,
 ) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known.
+    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known; `spare` as
+    in `newton.correct`.
 
     Raises
     ------
@@ -216,7 +225,7 @@ def nearest_point(
         If Newton's method does not converge.
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
-    return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
+    return make_point(correct(curve, u, row, weights, newton, spare=spare), curve, row / weights, 0.0)
 
 
 def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:

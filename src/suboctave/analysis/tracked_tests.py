@@ -17,6 +17,7 @@ passes one (a neutral saddle) stay where they are. (Kuznetsov, Elements of Appli
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
@@ -28,7 +29,7 @@ from suboctave.bifurcation import measures
 from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 
 #: component of the tangent in scaled arclength that may be rounding at both ends of a step
@@ -64,11 +65,10 @@ class CurveTest(ABC):
         """The test with a function that is smooth between two neighbours."""
         return self
 
-    def smooth(self, sample: TrackedSample) -> Array:
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
         """Sign and logarithm of the modulus of a function that vanishes with it, smooth along the whole curve."""
         value = self.value(sample)
-        with np.errstate(divide="ignore"):
-            return np.array([1.0 if value > 0.0 else -1.0, float(np.log(abs(value)))])
+        return (1.0 if value > 0.0 else -1.0), _logarithm(value)
 
     def genuine(self, sample: TrackedSample) -> bool:
         """Whether what was located is an event."""
@@ -118,10 +118,10 @@ class GeneralisedDoubling(CurveTest):
         # at a fold-flip c3 passes through infinity, and det J_0 through zero
         return sample.cubic * sample.sign(Kind.INTEGER)
 
-    def smooth(self, sample: TrackedSample) -> Array:
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
         """See `CurveTest.smooth`."""
-        _, size = super().smooth(sample)
-        return np.array([1.0 if self.value(sample) > 0.0 else -1.0, size + sample.determinant(Kind.INTEGER)[1]])
+        sign, size = super().smooth(sample)
+        return sign, size + sample.determinant(Kind.INTEGER)[1]
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class RealCrossing(CurveTest):
         """See `CurveTest.within`."""
         return replace(self, borders=null_vectors(b.state, self.operator))
 
-    def smooth(self, sample: TrackedSample) -> Array:
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
         """See `CurveTest.smooth`."""
         return sample.determinant(self.operator)
 
@@ -243,9 +243,15 @@ class PairCrossing(CurveTest):
                 raise ConvergenceError("the harmonics kept do not tell where the pair of multipliers is")
         return float(change.imag) * 2.0 * np.pi / rate
 
-    def smooth(self, sample: TrackedSample) -> Array:
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
-        return measures.torus(sample.others)
+        sign, size = measures.torus(sample.others).tolist()
+        return sign, size
+
+
+def _logarithm(value: float) -> float:
+    """Of the modulus; -inf of zero, and what is no number as it is."""
+    return math.log(abs(value)) if value != 0.0 else -math.inf
 
 
 def _frequency(sample: TrackedSample, target: complex) -> float:

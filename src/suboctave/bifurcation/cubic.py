@@ -36,15 +36,17 @@ def cubic_coefficient(
     solve
         Solves with J_0.
     """
-    moving = any(e.depends_on_velocity for e in state.balance.elements)
-    if state.nodal or moving or state.compliance is not None:
+    balance = state.balance
+    if state.nodal or balance.any_moving or state.compliance is not None:
         own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
         return own.cubic(solve(-0.5 * own.squared()))[0]
-    size = state.balance.size
-    right, left = phi.reshape(-1, size), psi.reshape(-1, size)
-    second, third = np.zeros_like(state.x), np.zeros(1)
-    for group, bend in zip(state.balance.groups, bends_of(state), strict=True):
-        for part in bend.parts:
+    right, left = phi.reshape(-1, balance.size), psi.reshape(-1, balance.size)
+    second, third = np.zeros(state.x.shape), np.zeros(1)
+    laws = balance.coefficients(state.values)[2]
+    known = all(law.in_closed_form for law in laws)
+    parts = state.closed_bends if known else [bend.parts for bend in bends_of(state)]
+    for group, along in zip(balance.groups, parts, strict=True):
+        for part in along:
             real_form.add_doubled_form(right, left, group.dofs, group.values, *part, second, third)
     bent = solve(-0.5 * second.ravel())
     return float(by_motion.ravel().dot(bent)) + float(third[0]) / 6.0

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import types
 
 from suboctave.compiled import kernel
+from suboctave.continuation.kernels import determinant_sign, log_modulus
 
 try:
     from numba.np.linalg import _LAPACK, F_INT_nptype
@@ -100,3 +103,43 @@ def solve_transposed(transposed, pivots, right):
 
 if _getrf is None:
     factorise = factorise_plainly
+
+
+@kernel()
+def leading_block(transposed, pivots, size, columns, corner, corner_pivots):
+    """Sign and logarithm of the determinant of the leading block of a factorised matrix, `size` rows and columns.
+
+    Filled: the last columns of the inverse, as rows (k, N), and the factors of their last k entries (k, k); see
+    `linear.LeadingBlock`.
+    """
+    more = columns.shape[0]
+    sign, log = determinant_sign(transposed, pivots), log_modulus(transposed)
+    for c in range(more):
+        for i in range(columns.shape[1]):
+            columns[c, i] = 0.0
+        columns[c, size + c] = 1.0
+        solve_factorised(transposed, pivots, columns[c])
+        for i in range(more):
+            corner[c, i] = columns[c, size + i]
+    if more > 0:
+        if factorise_plainly(corner, corner_pivots):
+            return 0.0, -math.inf
+        sign *= determinant_sign(corner, corner_pivots)
+        log += log_modulus(corner)
+    return sign, log
+
+
+@kernel()
+def solve_leading(transposed, pivots, columns, corner, corner_pivots, right):
+    """The solution with that block; arguments as `leading_block` leaves them."""
+    size, more = right.shape[0], columns.shape[0]
+    whole = np.zeros(size + more)
+    whole[:size] = right
+    solve_factorised(transposed, pivots, whole)
+    if more > 0:
+        last = whole[size:].copy()
+        solve_factorised(corner, corner_pivots, last)
+        for c in range(more):
+            for i in range(size):
+                whole[i] -= columns[c, i] * last[c]
+    return whole[:size]

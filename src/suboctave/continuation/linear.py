@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from suboctave.continuation import kernels
+from suboctave.continuation.lapack import leading_block, solve_leading
 
 Array = NDArray[np.float64]
 
@@ -83,27 +84,18 @@ class LeadingBlock:
     def __init__(self, whole: Factor, size: int) -> None:
         self.whole = whole
         self.size = size
-        last = np.zeros((len(whole.lu), len(whole.lu) - size), order="F")
-        last[size:] = np.eye(len(whole.lu) - size)
-        self.columns = whole.solve(last)
-        self.corner = Factor.of(self.columns[size:]) if len(whole.lu) > size else None
-
-    @property
-    def sign(self) -> float:
-        """Sign of the block's determinant; 0 if it is singular."""
-        return self.whole.sign * (1.0 if self.corner is None else self.corner.sign)
-
-    @property
-    def log_determinant(self) -> float:
-        """Natural logarithm of the modulus of the block's determinant."""
-        return self.whole.log_determinant + (0.0 if self.corner is None else self.corner.log_determinant)
+        order = len(whole.lu)
+        more = order - size
+        #: the last columns of the inverse, and factors of C
+        self.columns, self.corner = np.empty((more, order)), np.empty((more, more))
+        self.pivots = np.empty(more, dtype=np.int32)
+        #: sign of the block's determinant, 0 if it is singular, and natural logarithm of the determinant's modulus
+        self.sign, self.log_determinant = 0.0, -math.inf
+        if not whole.singular:
+            filled = (self.columns, self.corner, self.pivots)
+            self.sign, self.log_determinant = leading_block(whole.lu.T, whole.pivots, size, *filled)
 
     def solve(self, rhs: Array) -> Array:
         """Solve with the block."""
-        if self.corner is None:
-            return self.whole.solve(rhs)
-        filled = np.zeros(len(self.whole.lu))
-        filled[: self.size] = rhs
-        z = self.whole.solve(filled)
-        result: Array = z[: self.size] - self.columns[: self.size] @ self.corner.solve(z[self.size :])
-        return result
+        found: Array = solve_leading(self.whole.lu.T, self.whole.pivots, self.columns, self.corner, self.pivots, rhs)
+        return found

@@ -27,6 +27,7 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.nodal import own_elements
 from suboctave.harmonic.quadrature import on_circle, samples_for, search_count
+from suboctave.harmonic.rates import coefficient_rates
 from suboctave.harmonic.state import BalanceState
 from suboctave.lazy import lazy
 from suboctave.model.element import Element
@@ -37,7 +38,7 @@ from suboctave.model.system import System
 _IN_ANY_BASIS = (
     *("system", "values", "linear", "size", "matrix_names", "elements", "own", "groups", "directions", "moving"),
     *("any_moving", "load_names", "steady", "_coefficient_names", "_load_shapes", "_load_order"),
-    *("_own_coefficients", "_constant_laws", "_scales", "highest_load"),
+    *("_own_coefficients", "_scales", "highest_load", "_laws", "_names", "_changing", "_mass_logarithm"),
 )
 
 
@@ -100,6 +101,9 @@ class HarmonicBalance:
         self._load_order = sorted(self.load_names)
         #: whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X
         self.steady = not (self.any_moving or self.own or "omega" in self.load_names)
+        #: of every element: values of its names, its coefficients there, and what it tells of its law
+        self._laws: dict[int, tuple[tuple[float, ...], Array, Sampling]] = {}
+        self._changing: dict[str, list[tuple[int, dict[int, Array | None]]]] = {}
         self._written_in(basis, samples if samples is not None else (None,) * len(system.elements))
 
     def _written_in(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> None:
@@ -138,7 +142,7 @@ class HarmonicBalance:
 
     def _like(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> HarmonicBalance:
         # the same mapping of values too: so a motion's values are known to be its own, with what the laws are there
-        _ = self._own_coefficients, self._scales, self.highest_load
+        _ = self._own_coefficients, self._scales, self.highest_load, self._mass_logarithm
         other = HarmonicBalance.__new__(HarmonicBalance)
         other.__dict__.update({name: self.__dict__[name] for name in _IN_ANY_BASIS})
         other._written_in(basis, samples)
@@ -234,19 +238,20 @@ class HarmonicBalance:
 
     def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
         numbers, kinds = [], []
-        for element, (own, kind) in zip(self.system.elements, self._constant_laws, strict=True):
-            numbers.append(element.coefficient_values(values) if own is None else own)
-            kinds.append(element.sampling(numbers[-1]) if kind is None else kind)
+        for i, (element, names) in enumerate(zip(self.system.elements, self._names, strict=True)):
+            key = tuple([values[name] for name in names])
+            known = self._laws.get(i)
+            if known is None or known[0] != key:
+                own = element.coefficient_values(values)
+                known = self._laws[i] = key, own, element.sampling(own)
+            numbers.append(known[1])
+            kinds.append(known[2])
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
 
     @lazy
-    def _constant_laws(self) -> list[tuple[Array | None, Sampling | None]]:
-        """Coefficients of every element, and what it tells of its law, if no parameter changes them."""
-        numbers = [
-            e.coefficient_values({}) if all(c.constant for c in e.coefficients) else None for e in self.system.elements
-        ]
-        pairs = zip(self.system.elements, numbers, strict=True)
-        return [(c, None if c is None else e.sampling(c)) for e, c in pairs]
+    def _names(self) -> list[tuple[str, ...]]:
+        """The names that every element's coefficients depend on."""
+        return [tuple(sorted({n for c in e.coefficients for n in c.names})) for e in self.system.elements]
 
     def packed_laws(self, values: Mapping[str, float]) -> tuple[PackedLaws, Array]:
         """The groups' laws at parameter values, as arrays, and points on the circle for their polynomials, (2, N)."""
@@ -255,6 +260,21 @@ class HarmonicBalance:
             found = PackedLaws.of(laws)
             self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
         return self._packed[1]
+
+    def changing(self, name: str) -> list[tuple[int, dict[int, Array | None]]]:
+        """The directions along which a parameter changes forces, with the elements that have it in a coefficient; their
+        rates with it where these are constant and not all zero.
+        """
+        if name not in self._changing:
+            touched = [
+                (g, {i: _constant_rates(self.elements[i], name) for i in group.members if self._has(i, name)})
+                for g, group in enumerate(self.groups)
+            ]
+            self._changing[name] = [(g, members) for g, members in touched if members]
+        return self._changing[name]
+
+    def _has(self, i: int, name: str) -> bool:
+        return any(name in c.names for c in self.elements[i].coefficients)
 
     @lazy
     def grid(self) -> Array:
@@ -286,6 +306,14 @@ class HarmonicBalance:
             found = self._row_weights[rows] = np.tile(self.scales()[1], rows // self.size)
         return found
 
+    def logarithm_of_masses(self, rows: int) -> float:
+        """Sum of the logarithms of `sqrt(m_i)` (`scales`) over as many rows of an operator."""
+        return rows // self.size * self._mass_logarithm
+
+    @lazy
+    def _mass_logarithm(self) -> float:
+        return float(np.log(self.scales()[0]).sum())
+
     @lazy
     def column_weights(self) -> Array:
         """The weights of displacements (`scales`) for all coefficients, shape (dimension,)."""
@@ -303,3 +331,11 @@ class HarmonicBalance:
         the units of single DOFs. Shape (size,) each.
         """
         return self._scales
+
+
+def _constant_rates(element: Element, name: str) -> Array | None:
+    """Rates of an element's coefficients with a parameter, if no parameter changes them, and some are not zero."""
+    if not all(c.derivative(name).constant for c in element.coefficients):
+        return None
+    rates = coefficient_rates(element, {}, {name: 1.0})
+    return rates if rates.any() else None

@@ -1,7 +1,7 @@
 """What a parameter does to the forces along each direction: Fourier coefficients of `df`, `df_u`, `df_v`.
 
-The rounded laws along a direction share the nodes that its force is integrated with; all other elements have their own
-(`local_force.coefficient_change`).
+Laws known in closed form are changed in compiled code (`law_changes`), the rounded ones on the nodes that the force
+along their direction is integrated with; all other elements have their own (`local_force.coefficient_change`).
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from suboctave.harmonic import kernels
-from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.group_force import Group, GroupLaw
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.group_force import Group
+from suboctave.harmonic.law_changes import change_of_pieces, change_of_steps
 from suboctave.harmonic.local_force import CoefficientChange, coefficient_change
-from suboctave.harmonic.quadrature import graded_motion
 from suboctave.harmonic.rates import coefficient_rates
+from suboctave.model.element import Element
+from suboctave.model.sampling import PiecewiseLinear, Sampling, SharpSampling
 
 if TYPE_CHECKING:
     from suboctave.harmonic.state import BalanceState
@@ -30,36 +31,58 @@ def changes_by(state: BalanceState, name: str) -> list[tuple[Group, CoefficientC
 
 
 def _changes(state: BalanceState, name: str) -> list[tuple[Group, CoefficientChange]]:
-    balance, change = state.balance, {name: 1.0}
+    balance = state.balance
     found = []
-    laws = balance.coefficients(state.values)[2]
-    for g, group in enumerate(balance.groups):
-        rates = {i: coefficient_rates(balance.elements[i], state.values, change) for i in group.members}
-        rates = {i: rate for i, rate in rates.items() if rate.any()}
-        if not rates:
-            continue
-        law = laws[g]
-        told = {i for i, _ in law.told}
-        parts = [coefficient_change(state.local_motions[i], rate) for i, rate in rates.items() if i not in told]
-        if not told.isdisjoint(rates):
-            parts.append(_of_told(state, law, state.motions[g], rates))
-        found.append((group, _sum(parts)))
+    for g, members in balance.changing(name):
+        rates = {}
+        for i, known in members.items():
+            rate = coefficient_rates(balance.elements[i], state.values, {name: 1.0}) if known is None else known
+            if known is not None or rate.any():
+                rates[i] = rate
+        if rates:
+            found.append((balance.groups[g], _along(state, g, rates)))
     return found
 
 
-def _of_told(state: BalanceState, law: GroupLaw, motion: ComplexArray, rates: dict[int, Array]) -> CoefficientChange:
-    zr, zi, weights, u = graded_motion(motion, *law.told_places, state.balance.top, moving=False)
-    # these laws do not ask for the velocity
-    still = np.zeros_like(u)
-    rows = np.zeros((2, len(u)))
-    for i, c in law.told:
-        if i in rates:
-            force, stiffness, _ = state.balance.elements[i].coefficient_change(u, still, c, rates[i])
-            rows[0] += force
-            rows[1] += stiffness
-    rows *= weights
-    found = kernels.spectra(rows, zr, zi, state.balance.top)
-    return CoefficientChange(found[0], found[1], None)
+def _along(state: BalanceState, g: int, rates: dict[int, Array]) -> CoefficientChange:
+    """The change along one direction, by the rates of its elements' coefficients."""
+    balance = state.balance
+    numbers, kinds, _ = balance.coefficients(state.values)
+    force, stiffness = np.zeros((2, balance.top + 1), dtype=complex)
+    pieces: list[tuple[float, ...]] = []
+    steps: list[tuple[float, ...]] = []
+    line = np.zeros(2)
+    parts = [CoefficientChange(force, stiffness, None)]
+    for i, rate in rates.items():
+        kind, c = kinds[i], numbers[i]
+        told = _told_change(balance.elements[i], kind, c, rate)
+        if isinstance(kind, PiecewiseLinear):
+            own, by = c.tolist(), rate.tolist()
+            pieces += [(own[p.stiffness], own[p.gap], p.side, by[p.stiffness], by[p.gap]) for p in kind.pieces]
+        elif told is not None:
+            steps += told[0]
+            line += told[1]
+        else:
+            parts.append(coefficient_change(state.local_motions[i], rate))
+    if pieces:
+        grid = balance.grid
+        change_of_pieces(state.motions[g], np.array(pieces), grid[0], grid[1], force, stiffness)
+    if steps:
+        change_of_steps(state.told_nodes(g), np.array(steps), line, force, stiffness)
+    return parts[0] if len(parts) == 1 else _sum(parts)
+
+
+def _told_change(
+    element: Element, kind: Sampling, c: Array, rate: Array
+) -> tuple[list[tuple[float, ...]], tuple[float, float]] | None:
+    """Arctan steps with the rates of their numbers, and those of constant and slope; None where they are not told."""
+    if not isinstance(kind, SharpSampling) or kind.steps is None:
+        return None
+    by = element.told_change(c, rate)
+    if by is None or by.steps is None:
+        return None
+    rows = zip(kind.points, kind.widths, kind.steps, by.points, by.widths, by.steps, strict=True)
+    return list(rows), (by.constant, by.slope)
 
 
 def _sum(parts: list[CoefficientChange]) -> CoefficientChange:

@@ -11,6 +11,7 @@ polynomials have weights on a uniform grid, arctan steps on the graded nodes tha
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import motion
-from suboctave.harmonic.quadrature import even, graded_motion, search_grid, uniform_nodes
+from suboctave.harmonic.quadrature import even, search_grid, uniform_nodes
 
 if TYPE_CHECKING:
     from suboctave.harmonic.group_force import GroupLaw
@@ -37,8 +38,11 @@ class ClosedBends(NamedTuple):
     slope: Array
 
 
-def closed_bends(law: GroupLaw, along: ComplexArray, top: int) -> list[ClosedBends]:
-    """Of all laws of a direction that are known in closed form; `along`: coefficients of its displacement (H + 1,)."""
+def closed_bends(law: GroupLaw, along: ComplexArray, top: int, told_nodes: Callable[[], Array]) -> list[ClosedBends]:
+    """Of all laws of a direction that are known in closed form.
+
+    along: coefficients of its displacement (H + 1,); told_nodes: gives the nodes of its arctan steps (`graded_motion`).
+    """
     high, parts = along.shape[0] - 1, []
     if law.pieces.shape[0]:
         grid = search_grid(high)
@@ -48,7 +52,7 @@ def closed_bends(law: GroupLaw, along: ComplexArray, top: int) -> list[ClosedBen
         second, third = bends_of_polynomial(along, law.polynomial, nodes.zr, nodes.zi)
         parts.append(ClosedBends(nodes.zr, nodes.zi, second, third, _NO_SLOPE))
     if law.told:
-        sampled = graded_motion(along, *law.told_places, top, moving=False)
+        sampled = told_nodes()
         second, third = bends_of_smooth_steps(sampled, law.smooth_steps)
         parts.append(ClosedBends(sampled[0], sampled[1], second, third, _NO_SLOPE))
     return parts

@@ -115,6 +115,30 @@ def add_told(c, points, widths, steps, line, grid, rule_nodes, rule_weights, for
 
 
 @kernel()
+def evaluate_noting(
+    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
+    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+):  # fmt: skip
+    """`evaluate_told`, which returns besides the nodes of the last direction that has steps, as `sharp_nodes` gives
+    them.
+    """
+    along_directions(x, starts, dofs, shape, motions)
+    sampled = np.empty((4, 0))
+    for g in range(motions.shape[0]):
+        low, high = step_first[g], step_first[g + 1]
+        if high > low:
+            sampled = add_told(
+                motions[g], points[low:high], widths[low:high], steps[low:high], line[g], grid, rule_nodes,
+                rule_weights, table[0, g], table[1, g],
+            )  # fmt: skip
+    finite = evaluate(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, table, motions, parts, sizes,
+    )  # fmt: skip
+    return finite, sampled
+
+
+@kernel()
 def evaluate_told(
     x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
     points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
@@ -131,18 +155,11 @@ def evaluate_told(
     rule_nodes, rule_weights
         `sharp_nodes.tables()`.
     """
-    along_directions(x, starts, dofs, shape, motions)
-    for g in range(motions.shape[0]):
-        low, high = step_first[g], step_first[g + 1]
-        if high > low:
-            add_told(
-                motions[g], points[low:high], widths[low:high], steps[low:high], line[g], grid, rule_nodes,
-                rule_weights, table[0, g], table[1, g],
-            )  # fmt: skip
-    return evaluate(
+    finite, _sampled = evaluate_noting(
         x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-        weight, table, motions, parts, sizes,
+        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
     )  # fmt: skip
+    return finite
 
 
 @kernel()
@@ -253,11 +270,12 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
         balance.scales()[1],
     )
     filled = (table, motions, parts, sizes)
+    known = state.__dict__
     if packed.told:
-        finite = evaluate_told(*(*given, *told_steps(packed), *filled))
+        finite, sampled = evaluate_noting(*(*given, *told_steps(packed), *filled))
+        known["_told_nodes"] = int(packed.step_owner[-1]), sampled
     else:
         finite = evaluate(*given, *filled)
-    known = state.__dict__
     known["motions"], known["blocks"] = motions, blocks
     if not balance.own:
         known["nodal"] = []

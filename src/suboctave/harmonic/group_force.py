@@ -8,7 +8,7 @@ graded nodes, other laws one uniform grid, so that the motion is evaluated once 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -29,6 +29,7 @@ from suboctave.harmonic.quadrature import (
     singularities,
     uniform_nodes,
 )
+from suboctave.lazy import lazy
 from suboctave.model.element import Element
 from suboctave.model.sampling import (
     PiecewiseLinear,
@@ -52,7 +53,7 @@ class Group:
     members: tuple[int, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class GroupLaw:
     """What a group's elements tell of their laws at given coefficients, sorted by how it is integrated.
 
@@ -86,7 +87,7 @@ class GroupLaw:
     degree: int
     all: tuple[tuple[int, Sampling, Array], ...] = ()
 
-    @cached_property
+    @lazy
     def levels(self) -> tuple[tuple[int, int, float], ...]:
         """Displacements at which a law has a corner, or is sharp: element, which of its own, displacement."""
         return tuple((i, place, at) for i, kind, c in self.all for place, at in enumerate(told_levels(kind, c)))
@@ -96,7 +97,7 @@ class GroupLaw:
         """Whether no law needs to be asked at nodes."""
         return not (self.sharp or self.uniform)
 
-    @cached_property
+    @lazy
     def told_places(self) -> tuple[Array, Array]:
         """Gaps and widths of the arctan steps, (S,) each."""
         return self.smooth_steps[:, 0].copy(), self.smooth_steps[:, 1].copy()
@@ -115,7 +116,8 @@ class GroupLaw:
         for i in group.members:
             kind, c = kinds[i], numbers[i]
             if isinstance(kind, PiecewiseLinear):
-                pieces += [(c[p.stiffness], c[p.gap], float(p.side)) for p in kind.pieces]
+                own = c.tolist()
+                pieces += [(own[p.stiffness], own[p.gap], float(p.side)) for p in kind.pieces]
             elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
                 polynomials.append(kind.coefficients)
             elif isinstance(kind, SharpSampling) and kind.steps is not None:
@@ -158,6 +160,11 @@ def _zeros(count: int) -> NDArray[np.int64]:
     return np.zeros(count, dtype=np.int64)
 
 
+@lru_cache(maxsize=64)
+def _ends(count: int) -> NDArray[np.int64]:
+    return np.array((0, count))
+
+
 class PackedLaws(NamedTuple):
     """The laws of all directions that are known in closed form, as arrays.
 
@@ -198,15 +205,15 @@ class PackedLaws(NamedTuple):
             return cls(
                 law.pieces,
                 _zeros(len(law.pieces)),
-                np.array((0, len(law.pieces))),
+                _ends(len(law.pieces)),
                 law.polynomial[None],
                 law.smooth_steps,
                 _zeros(len(law.smooth_steps)),
                 law.line[None],
-                np.array((0, len(law.smooth_steps))),
+                _ends(len(law.smooth_steps)),
                 law.told_places,
                 bool(law.told or law.sharp or law.uniform),
-                _only_told(laws),
+                bool(law.told) and law.in_closed_form and len(law.smooth_steps) > 0,
             )
         number = np.arange(len(laws))
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))

@@ -154,6 +154,20 @@ def add_smooth_steps(sampled, steps, line, force, stiffness):
 
 
 @kernel()
+def add_along(spectrum, dofs, shape, out):
+    """Add a force along a direction, given by its Fourier coefficients 0 .. H and more, to coefficients (2 H + 1, n).
+
+    dofs, shape: where the direction is not zero, and its entries there.
+    """
+    for s in range(dofs.shape[0]):
+        d = dofs[s]
+        out[0, d] += shape[s] * spectrum[0].real
+        for k in range(1, out.shape[0] // 2 + 1):
+            out[2 * k - 1, d] += 2.0 * shape[s] * spectrum[k].real
+            out[2 * k, d] -= 2.0 * shape[s] * spectrum[k].imag
+
+
+@kernel()
 def balance_residual(x, blocks, force, load, starts, dofs, shape, weight, parts, sizes):
     """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n), and |R|, |A X|, |F|, |P| into `sizes` (4,).
 

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from suboctave.harmonic.balance import HarmonicBalance
 
 
+_NO_NODES = np.empty((4, 0))
+
+
 @kernel()
 def _half_turn(zr, zi):
     """Real and imaginary part of `exp(i tau / 2)`, up to a sign."""
@@ -189,16 +192,17 @@ def add_steps(left, right, mean, dofs, shape, sampled, steps, gx):
 
 
 @kernel()
-def closed_gradient(
+def noted_gradient(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
-    step_first, line, rule_nodes, rule_weights, top, multiples, omega, matrices, gx,
+    step_first, line, rule_nodes, rule_weights, noted, top, multiples, omega, matrices, gx,
 ):  # fmt: skip
     """Add the derivative of `left^T J right` by the coefficients to `gx` (2 H + 1, n), where all laws are known in
     closed form; returns that by omega, and the imaginary part of that by kappa.
 
     left, right (rows, n): vectors of the integer basis (mean) or the half-odd one; multiples: its frequencies in units
-    of omega; motions, ..., nodes and points, ..., rule_weights: as in `evaluation.evaluate` and `evaluate_told`; top:
-    highest Fourier coefficient of the tangent.
+    of omega; motions, ..., nodes and points, ..., rule_weights: as in `evaluation.evaluate` and `evaluate_told`; noted:
+    the nodes of the only direction that has steps, or an array without nodes, (4, 0); top: highest Fourier coefficient
+    of the tangent.
     """
     degree = top + motions.shape[1] - 1
     # not a literal, for which the nodes would be compiled once more
@@ -213,11 +217,26 @@ def closed_gradient(
             _add_group(left, right, mean, at, along, nodes[0], nodes[1], weights[0], gx)
         if points is not None and step_first[g + 1] > step_first[g]:
             low, high = step_first[g], step_first[g + 1]
-            sampled = sharp_nodes(
-                c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
-            )
+            if noted.shape[1] > 0:
+                sampled = noted
+            else:
+                sampled = sharp_nodes(
+                    c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
+                )
             add_steps(left, right, mean, at, along, sampled, steps[low:high], gx)
     return _linear_rates(left, right, mean, multiples, omega, matrices)
+
+
+@kernel()
+def closed_gradient(
+    left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
+    step_first, line, rule_nodes, rule_weights, top, multiples, omega, matrices, gx,
+):  # fmt: skip
+    """`noted_gradient` without nodes known."""
+    return noted_gradient(
+        left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
+        step_first, line, rule_nodes, rule_weights, np.empty((4, 0)), top, multiples, omega, matrices, gx,
+    )  # fmt: skip
 
 
 def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
@@ -231,6 +250,14 @@ def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
         (bends_of_smooth_steps, packed.told),
     )
     return [part for part, needed in asked if needed]
+
+
+def noted_nodes(state: BalanceState, packed: PackedLaws) -> Array:
+    """The nodes of arctan steps that an evaluated motion has kept, where only one direction has any; else (4, 0)."""
+    known: tuple[int, Array] | None = state.__dict__.get("_told_nodes")
+    if known is None or len(packed.steps) != packed.step_first[known[0] + 1] - packed.step_first[known[0]]:
+        return _NO_NODES
+    return known[1]
 
 
 def closed_laws(balance: HarmonicBalance, packed: PackedLaws, nodes: Array) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -262,10 +289,12 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     called = closed_parts(packed)
     if called is not None and "closed_bends" not in state.__dict__:
         laws, steps = closed_laws(balance, packed, nodes)
-        given = (u, v, mean, state.motions, *laws, *steps, balance.top, multiples, state.omega, linear.matrices, gx)
+        noted = noted_nodes(state, packed)
+        at = (noted, balance.top, multiples, state.omega, linear.matrices, gx)
+        given = (u, v, mean, state.motions, *laws, *steps, *at)
         # what it calls is compiled one by one, not all at one go
-        if at_hand(closed_gradient, *given) or all(map(ready, (_add_group, *called))):
-            by_omega, by_kappa = closed_gradient(*given)
+        if at_hand(noted_gradient, *given) or all(map(ready, (_add_group, *called))):
+            by_omega, by_kappa = noted_gradient(*given)
             return gx, by_omega, 1j * by_kappa
     for group, zr, zi, second in _second(state):
         _add_group(u, v, mean, group.dofs, group.values, zr, zi, second, gx)
@@ -302,6 +331,8 @@ __all__ = [
     "closed_laws",
     "closed_parts",
     "half_odd_values",
+    "noted_gradient",
+    "noted_nodes",
     "real_gradient",
     "toeplitz_part",
 ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
+from suboctave.harmonic.quadrature import graded_motion
 from suboctave.lazy import lazy
 
 if TYPE_CHECKING:
@@ -103,7 +105,18 @@ class BalanceState:
     def closed_bends(self) -> list[list[ClosedBends]]:
         """Second and third derivatives of every group's laws that are known in closed form."""
         laws, top = self.balance.coefficients(self.values)[2], self.balance.top
-        return [closed_bends(law, motion, top) for law, motion in zip(laws, self.motions, strict=True)]
+        return [
+            closed_bends(law, motion, top, partial(self.told_nodes, g))
+            for g, (law, motion) in enumerate(zip(laws, self.motions, strict=True))
+        ]
+
+    def told_nodes(self, g: int) -> Array:
+        """The nodes of the arctan steps along a direction with the motion there (`quadrature.graded_motion`)."""
+        known: tuple[int, Array] | None = self.__dict__.get("_told_nodes")
+        if known is not None and known[0] == g:
+            return known[1]
+        law = self.balance.coefficients(self.values)[2][g]
+        return graded_motion(self.motions[g], *law.told_places, self.balance.top, moving=False)
 
     @lazy
     def curvatures(self) -> list[Curvature]:
@@ -264,13 +277,14 @@ class BalanceState:
             if slope is not None:
                 result += group_kernels.apply_scaled(slope, m, self.unbalanced)
         else:
-            result = np.zeros_like(self.x)
-            block = linear.stiffness_by(freq, (name,))
-            if block is not None:
-                result += apply_blocks(block, self.x)
-            slope = linear.compliance_by(freq, (name,))
-            if slope is not None:
-                result += apply_blocks(slope, self.unbalanced)
+            result = np.zeros(self.x.shape)
+            if name in self.balance.matrix_names:
+                block = linear.stiffness_by(freq, (name,))
+                if block is not None:
+                    result += apply_blocks(block, self.x)
+                slope = linear.compliance_by(freq, (name,))
+                if slope is not None:
+                    result += apply_blocks(slope, self.unbalanced)
         change = self.unbalanced_by(name)
         if change is not None:
             result += change if self.compliance is None else apply_blocks(self.compliance, change)
@@ -289,23 +303,22 @@ class BalanceState:
     def _force_by(self, name: str) -> Array | None:
         """Element forces differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
         parts: list[tuple[Array, Array]] = []
+        total: Array | None = None
         if name == "omega":
-            for group, _, _, damping in self.spectra:
+            for group, _, _, damping in self.spectra if self.balance.any_moving else ():
                 if damping.size:
                     slope = self.basis.derivative(self.x @ group.direction)
                     parts.append((self.toeplitz(damping) @ slope, group.direction))
         else:
             for group, by_name in changes_by(self, name):
-                spectrum = spectrum_to_real(by_name.force[:, None], self.basis.harmonics)
-                parts.append((spectrum[:, 0], group.direction))
+                total = np.zeros(self.x.shape) if total is None else total
+                group_kernels.add_along(by_name.force, group.dofs, group.values, total)
         for nodal in self.nodal:
             change = force_by(nodal, self.x, self.values, name)
             if change is not None:
                 parts.append((change, nodal.own.out))
-        if not parts:
-            return None
-        total = np.zeros_like(self.x)
         for part, direction in parts:
+            total = np.zeros(self.x.shape) if total is None else total
             total += np.multiply.outer(part, direction)
         return total
 

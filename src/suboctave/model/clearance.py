@@ -77,15 +77,13 @@ class _Play(Element):
         """Piecewise linear, or sharp at both ends of the play."""
         if not self.regularised:
             return PiecewiseLinear((Piece(0, 1, -1), Piece(0, 2, 1)))
-        told = [stop.sampling(c[index]) for stop, index in self._stops]
-        left, right = (t for t in told if isinstance(t, SharpSampling))
-        return SharpSampling(
-            left.points + right.points,
-            left.widths + right.widths,
-            left.constant + right.constant,
-            left.slope + right.slope,
-            (left.steps or ()) + (right.steps or ()),
-        )
+        return _together([stop.sampling(c[index]) for stop, index in self._stops])
+
+    def told_change(self, c: Array, rates: Array) -> SharpSampling | None:
+        """See `Element.told_change`."""
+        if not self.regularised:
+            return None
+        return _together([stop.told_change(c[index], rates[index]) for stop, index in self._stops])
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.tangent`."""
@@ -115,6 +113,18 @@ class _Play(Element):
         for stop, index in self._stops:
             f_cc[np.ix_(index, index)] += stop.coefficient_curvature(u, v, c[index])
         return f_cc
+
+
+def _together(both: list[PiecewiseLinear | SharpSampling] | list[SharpSampling | None]) -> SharpSampling:
+    """What a left and a right stop tell, as one law."""
+    left, right = (told for told in both if isinstance(told, SharpSampling))
+    return SharpSampling(
+        left.points + right.points,
+        left.widths + right.widths,
+        left.constant + right.constant,
+        left.slope + right.slope,
+        (left.steps or ()) + (right.steps or ()),
+    )
 
 
 class Freeplay(_Play):

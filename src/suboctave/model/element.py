@@ -174,6 +174,12 @@ class Element(BaseElement):
         f_c, f_uc, f_vc = self.coefficient_tangent(u, v, c)
         return rates @ f_c, rates @ f_uc, None if f_vc is None else rates @ f_vc
 
+    def told_change(self, c: Array, rates: Array) -> SharpSampling | None:
+        """What a change of the coefficients, `rates` (nc,), does to the numbers of a law that tells its arctan steps,
+        in their places; None if it does not tell.
+        """
+        return None
+
     @abstractmethod
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""

@@ -146,6 +146,16 @@ class ElasticStop(Element):
         force, slope = _kernels().regularised_change(np.ascontiguousarray(u), *self._numbers(c), rates)
         return force, slope, None
 
+    def told_change(self, c: Array, rates: Array) -> SharpSampling | None:
+        """See `Element.told_change`."""
+        if not self.regularised:
+            return None
+        sign, (by_stiffness, gap, sharpness) = self._sign, rates.tolist()
+        k, b, s, _, at_rest, by_gap, by_sharpness = self._numbers(c)
+        constant = by_stiffness * (at_rest - 0.5 * sign * b)
+        constant += k * (gap * (by_gap - 0.5 * sign) + sharpness * by_sharpness)
+        return SharpSampling((gap,), (-sharpness / s**2,), constant, 0.5 * by_stiffness, (sign * by_stiffness,))
+
     def _numbers(self, c: Array) -> tuple[float, ...]:
         """Stiffness, gap, sharpness and side, the constant that makes the force right at `u = 0`, and what it adds to
         the derivatives by gap and sharpness per unit of stiffness.

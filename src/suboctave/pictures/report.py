@@ -21,7 +21,13 @@ from suboctave.pictures import style
 from suboctave.pictures.boundary_lines import is_boundary, plane_of
 from suboctave.pictures.interactive import figure_data
 from suboctave.pictures.page import POLICY, SCRIPT, STYLE, plotly_source
-from suboctave.pictures.report_boundaries import Shown, boundary_figure, boundary_overviews, space_figure
+from suboctave.pictures.report_boundaries import (
+    Shown,
+    boundary_figure,
+    boundary_overviews,
+    critical_multipliers,
+    space_figure,
+)
 from suboctave.pictures.report_isolas import IsolasPart, isolas_figures, isolas_part, isolas_words
 from suboctave.pictures.report_text import cell, finite, html_table, number, safe, small, spelt
 from suboctave.pictures.response import plot_response
@@ -290,10 +296,15 @@ def _notes(dataset: xarray.Dataset) -> list[str]:
     notes = [note for note in str(dataset.attrs.get("warnings", "")).splitlines() if note.strip()]
     if "multiplier_errors" in dataset and dataset.sizes.get("multiplier"):
         near = np.abs(np.abs(dataset["multipliers"].to_numpy()) - 1.0) <= dataset["multiplier_errors"].to_numpy()
+        which = "a multiplier"
+        if is_boundary(dataset):
+            # one of them, or a pair, is on the circle all along
+            near &= ~critical_multipliers(dataset)
+            which = "a multiplier besides the critical one"
         open_points = int(np.count_nonzero(near.any(axis=1)))
         if open_points:
             notes.append(
-                f"Unsettled: at {open_points} of {near.shape[0]} points a multiplier is closer to the unit circle than "
+                f"Unsettled: at {open_points} of {near.shape[0]} points {which} is closer to the unit circle than "
                 "its estimated error, so that the verdict there could be the other one."
             )
     doubtful = int(np.count_nonzero(dataset["event_uncertainty"].to_numpy() > 0.0))

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from suboctave.pictures.boundary import plot_boundaries
-from suboctave.pictures.boundary_lines import boundary_names, is_boundary, plane_of
+from suboctave.pictures.boundary_lines import boundary_names, is_boundary, kind_of, plane_of
 from suboctave.pictures.interactive_boundary import plane_data, space_data
 from suboctave.pictures.space import plot_space
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["Shown", "boundary_figure", "boundary_overviews"]
+__all__ = ["Shown", "boundary_figure", "boundary_overviews", "critical_multipliers", "space_figure"]
 
 _SIZE = (6.4, 4.2)
 
@@ -57,6 +59,25 @@ def boundary_overviews(curves: Mapping[str, xarray.Dataset]) -> list[tuple[Mappi
         }
         if responses and len(observed) == 1:
             found.append(({**responses, **bounds}, "space"))
+    return found
+
+
+def critical_multipliers(dataset: xarray.Dataset) -> np.ndarray:
+    """Which multipliers are those that make the points bifurcations, (points, multipliers), bool: one at LP, BP and PD,
+    a pair at NS, none at grazings.
+    """
+    mu = dataset["multipliers"].to_numpy()
+    found = np.zeros(mu.shape, dtype=bool)
+    kind = kind_of(dataset)
+    target = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(kind)
+    if target is None and kind != "NS":
+        return found
+    # a pair that becomes real in a resonance is at the circle still
+    distance = np.abs(np.abs(mu) - 1.0) if target is None else np.abs(mu - target)
+    distance = np.where(np.isnan(distance), np.inf, distance)
+    rows = np.arange(len(mu))
+    for place in np.argsort(distance, axis=1, kind="stable")[:, : 2 if kind == "NS" else 1].T:
+        found[rows, place] = True
     return found
 
 
