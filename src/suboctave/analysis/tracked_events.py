@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
+from suboctave.analysis.tracked_sample import BEGINNING, TrackedSample, nearest_point, zero_along
 from suboctave.analysis.tracked_tests import CurveTest, Cusp, Extremum
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, make_point, point_between
@@ -29,8 +29,6 @@ _BESIDE = 0.05
 _SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
-#: way in scaled arclength within which derivatives count as those of a point that a search begins at
-_START = 1e-5
 #: share of a test's values at the ends of a step with which a zero is near enough for secants
 _LITTLE = 0.05
 #: ratio of a test's values at two ends beyond which it does not change evenly
@@ -148,6 +146,8 @@ class _Stretch:
         self.newton = newton
         self.samples = {0.0: a, 1.0: b}
         self.values = {0.0: test.value(a), 1.0: test.value(b)}
+        #: as in `newton.correct`: points that only lead to the zero may have the derivatives of one beside
+        self.spare = 0.0
 
     def value(self, share: float) -> float:
         """The test's function."""
@@ -180,7 +180,7 @@ class _Stretch:
         # along a corner of the equations, near a grazing, neighbours may lie on both sides of it
         for guess in (between_them, *(start(*end) for end in ends)):
             try:
-                solved = correct(curve, guess, row, weights, self.newton)
+                solved = correct(curve, guess, row, weights, self.newton, spare=self.spare)
                 break
             except ConvergenceError:
                 continue
@@ -193,6 +193,7 @@ class _Stretch:
         the ends, and about the test's derivative by arclength there.
         """
         first, last = self.values[0.0], self.values[1.0]
+        self.spare = BEGINNING
         # components of a tangent change evenly; others may be large at one end
         even = isinstance(self.test, Extremum)
         self.value(self._turn() if even or first == last else first / (first - last))
@@ -232,6 +233,10 @@ class _Stretch:
 
     def zero(self, resolved: float) -> TrackedSample:
         """Where the test vanishes, to a share of the way."""
+        self.spare = 0.0
+        for known in (self.samples, self.values):
+            for share in [share for share in known if 0.0 < share < 1.0]:
+                del known[share]
         return self.samples_at(self._root(resolved))
 
     def _root(self, resolved: float, little: float = 0.0) -> float:
@@ -291,7 +296,7 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
             along = finer.transfer(sample.point.tangent, curve)
             weights = finer.weights(u, curve.size(sample.point.u))
-            start = nearest_point(finer, u, weights, newton, along, _START)
+            start = nearest_point(finer, u, weights, newton, along)
             start = replace(start, arclength=sample.point.arclength)
             near = TrackedSample(start)
             test = found.test.within(near, near)

@@ -31,6 +31,8 @@ from suboctave.stability import FloquetResult, StabilityMethod
 
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
+#: way in scaled arclength within which derivatives count as those of a point that a search begins at
+BEGINNING = 1e-5
 #: way along a curve, in scaled arclength, that a zero may still be off by the last secant, and the first secant's least
 _AT_ZERO, _SECANT = 1e-10, 1e-6
 
@@ -204,7 +206,7 @@ def same_discretisation(a: TrackedSample, b: TrackedSample, newton: NewtonOption
     weights = b.point.weights
     along = curve.transfer(point.tangent, a.curve)
     row = weights * along / length(weights * along)
-    solved = correct(curve, curve.transfer(point.u, a.curve), row, weights, newton)
+    solved = correct(curve, curve.transfer(point.u, a.curve), row, weights, newton, spare=BEGINNING)
     return TrackedSample(make_point(solved, curve, along, point.arclength))
 
 
@@ -214,10 +216,8 @@ def nearest_point(
     weights: np.ndarray,
     newton: NewtonOptions,
     along: np.ndarray | None = None,
-    spare: float = 0.0,
 ) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known; `spare` as
-    in `newton.correct`.
+    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def nearest_point(
         If Newton's method does not converge.
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
-    return make_point(correct(curve, u, row, weights, newton, spare=spare), curve, row / weights, 0.0)
+    return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
 
 
 def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -292,4 +292,4 @@ def zero_along(
     raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")
 
 
-__all__ = ["TrackedSample", "nearest_point", "null_row", "same_discretisation", "zero_along"]
+__all__ = ["BEGINNING", "TrackedSample", "nearest_point", "null_row", "same_discretisation", "zero_along"]
