@@ -12,6 +12,7 @@ from suboctave.bifurcation import bordered as bordered_module
 from suboctave.bifurcation import formulation, solve
 from suboctave.bifurcation.bordered import bordered, null_vectors
 from suboctave.bifurcation.bordered_kernels import border, border_again, fold_step, inverse_iteration
+from suboctave.bifurcation.grazing import Touch, read_direction
 from suboctave.continuation.lapack import factorise, solve_transposed
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import free_form, real_form
@@ -218,6 +219,51 @@ def test_null_vectors_in_compiled_code():
     assert abs(right @ expected.right) == pytest.approx(1.0, abs=1e-10)
     assert abs(left @ expected.left) == pytest.approx(1.0, abs=1e-10)
     assert inverse_iteration(np.zeros((3, 3)), np.ones(3), 4, np.empty(3), np.empty(3))
+
+
+@pytest.mark.parametrize(
+    ("system", "omega"),
+    [
+        (so.library.reference_oscillator(p=0.55, j=0.0), (4.5, 1.3)),
+        (so.library.reference_oscillator(p=0.55, j=0.0, regularization=3000.0), (4.5, 1.3)),
+        (between_stops(), (3.0, 0.9)),
+    ],
+)
+def test_grazings_agree(monkeypatch, system, omega):
+    asked = []
+    solved = Touch.solve
+
+    def noted(self, guess, *start):
+        asked.append((self, guess))
+        return solved(self, guess, *start)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Touch, "solve", noted)
+        so.frequency_response(system, omega)
+    at_once, ways = 0, []
+    for touch, guess in asked:
+        found = []
+        for general in (False, True):
+            with monkeypatch.context() as patch:
+                if general:
+                    patch.setattr(Touch, "_at_once", lambda *_: None)
+                try:
+                    found.append(touch.solve(guess))
+                except ConvergenceError as failure:
+                    found.append(str(failure)[:40])
+        one, other = found
+        ways.append(touch._at_once(guess, guess.state(), read_direction(guess.state(), touch.element), touch.tau))
+        if isinstance(one, str):
+            assert one == other
+            continue
+        at_once += 1
+        assert one.state.omega == pytest.approx(other.state.omega, rel=1e-10)
+        assert one.state.x == pytest.approx(other.state.x, abs=1e-9 * np.abs(other.state.x).max())
+        assert one.tau == pytest.approx(other.tau, abs=1e-8)
+        assert abs(one.iterations - other.iterations) <= 1
+        assert one.residual < 1e-10
+    assert at_once > 0
+    assert any(way is not None for way in ways)
 
 
 def test_solutions_from_the_factors_of_a_matrix_nearby():
