@@ -24,9 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bordered_kernels import border_at
+from suboctave.compiled import at_hand, ready
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.evaluation import jacobian
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.state import BalanceState
@@ -171,11 +173,19 @@ def _compiled(state: BalanceState, kind: Kind, borders: NullVectors) -> Bordered
     matrix, lu, pivots = np.zeros((n, n)), np.empty((n + 1, n + 1)), np.empty(n + 1, dtype=np.int32)
     v, u, scale, size = np.empty(n + 1), np.empty(n + 1), balance.row_weights(n), state.omega**2
     multiples = basis.multiples if mean else basis.half_multiples
-    singular = border_at(
-        *(state.spectra_table, balance.moving, state.rate, mean, *balance.directions, linear.matrices, multiples),
-        *(state.omega, state.x, scale, borders.left, borders.right, size, matrix, lu, pivots, v, u),
+    structure = (
+        balance.moving,
+        state.rate,
+        mean,
+        *balance.directions,
+        linear.matrices,
+        multiples,
+        state.omega,
+        state.x,
     )
-    if singular:
+    given = (state.spectra_table, *structure, scale, borders.left, borders.right, size, matrix, lu, pivots, v, u)
+    # what it calls is compiled one by one, not all at one go
+    if not (at_hand(border_at, *given) or ready(jacobian)) or border_at(*given):
         return None
     state.__dict__["jacobian" if mean else "half_jacobian"] = matrix
     factor = Factor(lu.T, pivots, False)
