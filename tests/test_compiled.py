@@ -108,6 +108,16 @@ def test_what_was_compiled_before_is_used_at_once(made):
     assert not compiled._ledger.fresh
 
 
+def test_what_is_at_hand(made):
+    assert not compiled.at_hand(made(), VALUES)
+    made(eager=True)(VALUES)
+    total = made()
+    assert compiled.at_hand(total, VALUES)
+    assert not compiled.at_hand(total, None)
+    compiled.compile_at_once()
+    assert compiled.at_hand(total, None)
+
+
 def test_costly_calls_are_not_interpreted(made):
     total = made()
     assert total(np.ones(compiled.LARGE + 1)) == compiled.LARGE + 1

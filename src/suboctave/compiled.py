@@ -184,6 +184,23 @@ def ready(kernel: Callable[..., Any]) -> bool:
     return _ledger.eager or not isinstance(kernel, _Patient)
 
 
+def at_hand(kernel: Callable[..., Any], *args: Any) -> bool:
+    """Whether a kernel has been compiled for such arguments, in this process or an earlier one; whether any of them is
+    None is all that may differ from call to call.
+    """
+    if _ledger.eager or not isinstance(kernel, CPUDispatcher):
+        return True
+    known: dict[tuple[bool, ...], bool] = kernel.__dict__.setdefault("_at_hand", {})
+    kind = tuple(a is None for a in args)
+    if not known.get(kind, False):
+        signature = tuple(kernel.typeof_pyval(a) for a in args)
+        known[kind] = kernel.overloads.get(signature) is not None or (
+            # another process may have compiled it meanwhile: looked up once
+            kind not in known and kernel._cache.load_overload(signature, kernel.targetctx) is not None
+        )
+    return known[kind]
+
+
 def kernel(patience: float = PATIENCE, at_once: bool = False, **options: Any) -> Callable[[_Function], _Function]:
     """Decorator of a kernel: `numba.njit` with its cache, and patience (none with `at_once`, or with `fastmath`).
 

@@ -11,11 +11,12 @@ import suboctave as so
 from suboctave.bifurcation import bordered as bordered_module
 from suboctave.bifurcation import formulation, solve
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.bifurcation.bordered_kernels import border, fold_step, inverse_iteration
+from suboctave.bifurcation.bordered_kernels import border, border_again, fold_step, inverse_iteration
+from suboctave.bifurcation.grazing import Touch, read_direction
 from suboctave.continuation.lapack import factorise, solve_transposed
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import real_form
-from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic import free_form, real_form
+from suboctave.harmonic.perturbation import Kind, operator
 
 
 def between_stops():
@@ -76,6 +77,8 @@ def generally(monkeypatch):
     monkeypatch.setattr(solve, "_at_once", lambda *_: None)
     monkeypatch.setattr(bordered_module, "_compiled", lambda *_: None)
     monkeypatch.setattr(real_form, "closed_parts", lambda *_: None)
+    monkeypatch.setattr(free_form, "free_operator", lambda *_: None)
+    monkeypatch.setattr(free_form, "free_gradient", lambda *_: None)
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -144,6 +147,43 @@ def test_g_and_its_gradient(monkeypatch, name):
         assert one.factor.solve(rhs) == pytest.approx(other.factor.solve(rhs), rel=1e-7, abs=1e-9)
 
 
+def rubbing():
+    """Two masses, a force that depends on velocity, and a stop between them."""
+    elements = [
+        so.Expression(dof=0, expression="0.3*x**2*v + 0.1*x**3"),
+        so.ElasticStop(direction=[-1.0, 1.0], stiffness=5.0, gap=0.1),
+    ]
+    stiffness = np.array([[3.0, -1.0], [-1.0, 2.0]])
+    loads = [so.HarmonicLoad(dof=0, amplitude=0.3)]
+    return so.System(np.array([[1.0, 0.2], [0.2, 0.7]]), 0.02 * stiffness, stiffness, elements, loads)
+
+
+@pytest.mark.parametrize(
+    "make", [between_stops, rubbing, so.library.reference_oscillator, lambda: so.library.nltva(0.1)]
+)
+@pytest.mark.parametrize("nu", [1, 2])
+def test_complex_operator_and_its_gradient(monkeypatch, make, nu):
+    """J_kappa at any kappa, g and its gradient, against the general way."""
+    balance = so.HarmonicBalance(make(), so.HarmonicBasis(6, nu))
+    rng = np.random.default_rng(3)
+    x = rng.standard_normal((13, balance.size)) / (1.0 + np.arange(13)[:, None]) ** 1.5
+    found = []
+    for general in (False, True):
+        with monkeypatch.context() as patch:
+            if general:
+                patch.setattr(free_form, "free_operator", lambda *_: None)
+                patch.setattr(free_form, "free_gradient", lambda *_: None)
+            state = balance.at(x, 1.7)
+            b = bordered(state, Kind.FREE, null_vectors(balance.at(x, 1.7), Kind.FREE, 0.31), 0.31)
+            found.append((operator(state, Kind.FREE, 0.31), b.g, *b.gradient(("omega",))))
+    (matrix, g, by_x, rates, by_kappa), (matrix_, g_, by_x_, rates_, by_kappa_) = found
+    assert matrix == pytest.approx(matrix_, abs=1e-12 * np.abs(matrix_).max())
+    assert g == pytest.approx(g_, rel=1e-8)
+    assert by_x == pytest.approx(by_x_, abs=1e-8 * np.abs(by_x_).max())
+    assert rates["omega"] == pytest.approx(rates_["omega"], rel=1e-8)
+    assert by_kappa == pytest.approx(by_kappa_, rel=1e-8)
+
+
 def test_left_to_the_general_way():
     """Other parameters than the frequency, Neimark-Sacker points, laws asked at nodes."""
     system = so.library.reference_oscillator()
@@ -155,8 +195,8 @@ def test_left_to_the_general_way():
     assert solve._at_once(along_omega, Kind.FREE, along_omega.state()) is None
     dry = so.System(1.0, 0.1, 1.0, [so.TanhFriction(dof=0, force=0.1, velocity=0.01)], [so.HarmonicLoad(0, 1.0)])
     balance = so.HarmonicBalance(dry, so.HarmonicBasis(5))
-    rubbing = solve.Guess(balance, x, 2.0, balance.values, "omega", 1.0)
-    assert solve._at_once(rubbing, Kind.INTEGER, rubbing.state()) is None
+    at_nodes = solve.Guess(balance, x, 2.0, balance.values, "omega", 1.0)
+    assert solve._at_once(at_nodes, Kind.INTEGER, at_nodes.state()) is None
 
 
 def test_pieces_of_linear_algebra():
@@ -179,6 +219,68 @@ def test_null_vectors_in_compiled_code():
     assert abs(right @ expected.right) == pytest.approx(1.0, abs=1e-10)
     assert abs(left @ expected.left) == pytest.approx(1.0, abs=1e-10)
     assert inverse_iteration(np.zeros((3, 3)), np.ones(3), 4, np.empty(3), np.empty(3))
+
+
+@pytest.mark.parametrize(
+    ("system", "omega"),
+    [
+        (so.library.reference_oscillator(p=0.55, j=0.0), (4.5, 1.3)),
+        (so.library.reference_oscillator(p=0.55, j=0.0, regularization=3000.0), (4.5, 1.3)),
+        (between_stops(), (3.0, 0.9)),
+    ],
+)
+def test_grazings_agree(monkeypatch, system, omega):
+    asked = []
+    solved = Touch.solve
+
+    def noted(self, guess, *start):
+        asked.append((self, guess))
+        return solved(self, guess, *start)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Touch, "solve", noted)
+        so.frequency_response(system, omega)
+    at_once, ways = 0, []
+    for touch, guess in asked:
+        found = []
+        for general in (False, True):
+            with monkeypatch.context() as patch:
+                if general:
+                    patch.setattr(Touch, "_at_once", lambda *_: None)
+                try:
+                    found.append(touch.solve(guess))
+                except ConvergenceError as failure:
+                    found.append(str(failure)[:40])
+        one, other = found
+        ways.append(touch._at_once(guess, guess.state(), read_direction(guess.state(), touch.element), touch.tau))
+        if isinstance(one, str):
+            assert one == other
+            continue
+        at_once += 1
+        assert one.state.omega == pytest.approx(other.state.omega, rel=1e-10)
+        assert one.state.x == pytest.approx(other.state.x, abs=1e-9 * np.abs(other.state.x).max())
+        assert one.tau == pytest.approx(other.tau, abs=1e-8)
+        assert abs(one.iterations - other.iterations) <= 1
+        assert one.residual < 1e-10
+    assert at_once > 0
+    assert any(way is not None for way in ways)
+
+
+def test_solutions_from_the_factors_of_a_matrix_nearby():
+    rng = np.random.default_rng(5)
+    n = 30
+    matrix, change = rng.standard_normal((n, n + 1)), rng.standard_normal((n, n + 1))
+    scale, left, right = rng.uniform(0.5, 2.0, n), rng.standard_normal(n), rng.standard_normal(n)
+    for far, refused in ((0.0, False), (1e-10, False), (1e-6, False), (1e-5, False), (3.0, True)):
+        lu, pivots = np.empty((n + 1, n + 1)), np.empty(n + 1, dtype=np.int32)
+        v, u, exact_v, exact_u = np.empty((4, n + 1))
+        assert not border(matrix, scale, left, right, 1.7, lu, pivots, v, u)
+        near = matrix + far * change
+        assert border_again(near, scale, left + far, right - far, 1.7, lu, pivots, v, u) == refused
+        assert not border(near, scale, left + far, right - far, 1.7, lu, pivots, exact_v, exact_u)
+        if not refused:
+            assert v == pytest.approx(exact_v, abs=1e-11 * np.abs(exact_v).max())
+            assert u == pytest.approx(exact_u, abs=1e-11 * np.abs(exact_u).max())
 
 
 def test_step_at_a_fold():

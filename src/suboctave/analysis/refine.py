@@ -176,7 +176,8 @@ def _refined(
             basis = next_harmonics(state, adaptive)
         if basis.count <= state.basis.count:
             break
-        x = state.completed.basis.resized(state.completed.x, basis)
+        wide, completed = state.completed_x
+        x = wide.resized(completed, basis)
         # more harmonics need more samples of a law that tells nothing of itself
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
         guess = replace(_guess_from(solution, curve, size), balance=balance, x=x)

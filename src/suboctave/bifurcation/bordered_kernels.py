@@ -14,6 +14,10 @@ from suboctave.compiled import kernel
 from suboctave.continuation.lapack import factorise, solve_factorised, solve_transposed
 from suboctave.harmonic.evaluation import jacobian
 
+_FAST = {"reassoc", "contract", "nsz"}
+#: most improvements of a solution with the factors of another matrix, and the change that is rounding
+_SWEEPS, _ROUNDING = 3, 1e-16
+
 
 @kernel()
 def border(matrix, scale, left, right, size, lu, pivots, v, u):
@@ -38,6 +42,71 @@ def border(matrix, scale, left, right, size, lu, pivots, v, u):
     v[n] = u[n] = size
     solve_factorised(lu, pivots, v)
     solve_transposed(lu, pivots, u)
+    return False
+
+
+@kernel(fastmath=_FAST)
+def _lacking(matrix, scale, left, right, size, v, out):
+    """`(0, s) - B v` into `out` (N + 1,), B the bordered matrix."""
+    n = scale.shape[0]
+    z, last = np.empty(n), 0.0
+    for j in range(n):
+        z[j] = scale[j] * v[j]
+        last += right[j] * v[j]
+    for i in range(n):
+        row, total = matrix[i, :n], 0.0
+        for j in range(n):
+            total += row[j] * z[j]
+        out[i] = -scale[i] * total - size * left[i] * v[n]
+    out[n] = size - size * last
+
+
+@kernel(fastmath=_FAST)
+def _lacking_transposed(matrix, scale, left, right, size, u, out):
+    """`(0, s) - B^T u` into `out` (N + 1,)."""
+    n = scale.shape[0]
+    above, last = out[:n], 0.0
+    for j in range(n):
+        above[j] = 0.0
+    for i in range(n):
+        row, factor = matrix[i, :n], scale[i] * u[i]
+        last += left[i] * u[i]
+        for j in range(n):
+            above[j] -= row[j] * factor
+    for j in range(n):
+        above[j] = above[j] * scale[j] - size * right[j] * u[n]
+    out[n] = size - size * last
+
+
+@kernel()
+def border_again(matrix, scale, left, right, size, lu, pivots, v, u):
+    """`border` from v and u of a matrix nearby and its factors, which are kept: solutions improved until what is
+    missing is rounding. Returns whether that takes more than new factors.
+    """
+    n = scale.shape[0]
+    change = np.empty(n + 1)
+    for transposed in range(2):
+        y = u if transposed else v
+        previous = 1e-6
+        for sweep in range(_SWEEPS):
+            if transposed:
+                _lacking_transposed(matrix, scale, left, right, size, y, change)
+                solve_transposed(lu, pivots, change)
+            else:
+                _lacking(matrix, scale, left, right, size, y, change)
+                solve_factorised(lu, pivots, change)
+            moved = whole = 0.0
+            for i in range(n + 1):
+                y[i] += change[i]
+                moved += change[i] * change[i]
+                whole += y[i] * y[i]
+            moved = math.sqrt(moved / whole) if whole > 0.0 else np.inf
+            # the next change is as much smaller as this one has been
+            if moved * moved <= _ROUNDING * previous:
+                break
+            if not moved <= 1e-2 or sweep == _SWEEPS - 1:
+                return True
+            previous = moved
     return False
 
 
@@ -152,4 +221,4 @@ def augment(matrix, rows, columns, span, by_x, by_parameter, size, lu, pivots):
     return factorise(lu, pivots)
 
 
-__all__ = ["augment", "border", "border_at", "fold_step", "inverse_iteration", "unit_of"]
+__all__ = ["augment", "border", "border_again", "border_at", "fold_step", "inverse_iteration", "unit_of"]

@@ -28,8 +28,9 @@ import numpy as np
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.finder import Located, position
 from suboctave.bifurcation.gaps import contact_side, gap_extrema, level_rate, levels
+from suboctave.bifurcation.grazed import grazed
 from suboctave.bifurcation.kinds import BifurcationKind, Sample
-from suboctave.bifurcation.solve import Extra, Guess, Singular, Slopes, newton
+from suboctave.bifurcation.solve import AtOnce, Extra, Guess, Singular, Slopes, newton
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import CurvePoint, between, point_between
 from suboctave.continuation.newton import NewtonOptions
@@ -105,17 +106,21 @@ class Touch(BifurcationKind):
             state.omega if name == "omega" else state.values[name],
         )
 
-    def solve(self, guess: Guess) -> Grazing:
-        """Newton's method for the grazing from the nearest extremum of the guess's motion.
+    def solve(self, guess: Guess, start: BalanceState | None = None) -> Grazing:
+        """Newton's method for the grazing from the nearest extremum of the guess's motion; `start`: the equations
+        there, where they have been evaluated.
 
         Raises
         ------
         ConvergenceError
             If it does not converge.
         """
-        start = guess.state()
+        start = guess.state() if start is None else start
         tau = np.array([self._nearest(start)])
         direction = read_direction(start, self.element)
+        known = self._at_once(guess, start, direction, float(tau[0]))
+        if known is not None:
+            return known
         high = start.basis.harmonics
         column = np.zeros(start.balance.dimension)
         still = levels(start.local(self.element))[self.index] if guess.name == "omega" else None
@@ -136,8 +141,19 @@ class Touch(BifurcationKind):
 
             return [Extra(value - level, size, height), Extra(slope, size, rise)], None, [column]
 
-        state, extra, residual, iterations = newton(guess, tau, np.ones(1), augmentation)
+        state, extra, residual, iterations = newton(guess, tau, np.ones(1), augmentation, start=start)
         return Grazing(state, None, 0.0, residual, iterations, float(extra[0]) % (2.0 * math.pi))
+
+    def _at_once(self, guess: Guess, start: BalanceState, direction: Array, tau: float) -> Grazing | None:
+        """`solve` in one compiled call; None where that does not go."""
+        equations = AtOnce.of(guess, start)
+        if equations is None:
+            return None
+        level = float(levels(start.local(self.element))[self.index])
+        u = np.concatenate((start.unknowns, (guess.omega, tau)))
+        along = np.ascontiguousarray(direction, dtype=float)
+        found = equations.search(grazed, guess, u, along, level)
+        return None if found is None else Grazing(found[0], None, 0.0, *found[1:], float(u[-1]) % (2.0 * math.pi))
 
     def rise(self, found: Grazing, name: str) -> Array:
         """Gradient of the extremum's height over the gap by coefficients and free parameter, shape (dimension + 1,)."""

@@ -202,9 +202,8 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
                 continue
             touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
             try:
-                grazing = touch.solve(
-                    replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values)
-                )
+                here = replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values)
+                grazing = touch.solve(here, state)
             except ConvergenceError:
                 continue
             yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, state, guess)))

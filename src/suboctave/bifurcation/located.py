@@ -13,16 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation.bordered_kernels import augment, border, fold_step, inverse_iteration, unit_of
+from suboctave.bifurcation.bordered_kernels import (
+    augment,
+    border,
+    border_again,
+    border_at,
+    fold_step,
+    inverse_iteration,
+    unit_of,
+)
 from suboctave.compiled import kernel
 from suboctave.continuation.lapack import solve_factorised
-from suboctave.harmonic.evaluation import evaluate, evaluate_told, jacobian
+from suboctave.harmonic.evaluation import add_told, along_directions, evaluate, evaluate_told, jacobian
 from suboctave.harmonic.group_force import PackedLaws
 from suboctave.harmonic.group_kernels import add_pieces
-from suboctave.harmonic.real_form import closed_gradient
+from suboctave.harmonic.real_form import add_steps, closed_gradient
 
 #: how a search ended: solved; given up as `solve.newton` does; something that it knows more about
 SOLVED, OFF_AXIS, AWAY, STILL, UNSOLVED, OTHER = 0, 1, 2, 3, 4, 5
+
+#: rows of a matrix whose factors cost more than their repeated use
+_LARGE = 80
 
 
 @kernel()
@@ -73,6 +84,7 @@ def located(
     rows, columns = np.empty(n), np.empty(n)
     by_x = np.empty((parts.shape[1], size))
     left_form, right_form = np.empty((m // size, size)), np.empty((m // size, size))
+    sampled = [np.empty((4, 0)) for _ in range(motions.shape[0])]
     previous, contraction, unit = np.inf, 0.0, 1.0
     factorised = False
     for iteration in range(iterations + 1):
@@ -90,17 +102,20 @@ def located(
             for g in range(motions.shape[0]):
                 for q in range(top + 1):
                     table[part, g, q] = 0.0
-        if points is None:
-            finite = evaluate(
-                x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                load, weight, table, motions, parts, sizes,
-            )  # fmt: skip
-        else:
-            finite = evaluate_told(
-                x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts,
-                sizes,
-            )  # fmt: skip
+        if points is not None:
+            # `evaluate_told`, whose nodes the gradient of g needs as well
+            along_directions(x, starts, dofs, shape, motions)
+            for g in range(motions.shape[0]):
+                low, high = step_first[g], step_first[g + 1]
+                if high > low:
+                    sampled[g] = add_told(
+                        motions[g], points[low:high], widths[low:high], steps[low:high], line[g], grid, rule_nodes,
+                        rule_weights, table[0, g], table[1, g],
+                    )  # fmt: skip
+        finite = evaluate(
+            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+            weight, table, motions, parts, sizes,
+        )  # fmt: skip
         if not finite:
             return OTHER
         # J_0, which Newton's step needs, or J_half
@@ -112,7 +127,11 @@ def located(
         if not known and iteration == 0 and inverse_iteration(matrix, scale, 4, right, left):
             return OTHER
         square = omega * omega
-        if border(matrix, scale, left, right, square, lu, pivots, v, w):
+        # after a short step the factors at hand tell g and its vectors in less time than new ones, of a large matrix
+        anew = m < _LARGE or iteration == 0 or previous > short
+        if (anew or border_again(matrix, scale, left, right, square, lu, pivots, v, w)) and border(
+            matrix, scale, left, right, square, lu, pivots, v, w
+        ):
             return OTHER
         unit_of(v, right)
         unit_of(w, left)
@@ -146,9 +165,14 @@ def located(
                 left_form[i // size, i % size] = w[i] * scale[i]
             by_omega, _ = closed_gradient(
                 left_form, right_form, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                points, widths, steps, step_first, line, rule_nodes, rule_weights, top, frequencies, omega, matrices,
-                by_x,
+                None, None, None, None, None, None, None, top, frequencies, omega, matrices, by_x,
             )  # fmt: skip
+            if points is not None:
+                for g in range(motions.shape[0]):
+                    low, high = step_first[g], step_first[g + 1]
+                    at, along = dofs[starts[g] : starts[g + 1]], shape[starts[g] : starts[g + 1]]
+                    if high > low:
+                        add_steps(left_form, right_form, mean, at, along, sampled[g], steps[low:high], by_x)
             for r in range(parts.shape[1]):
                 for i in range(size):
                     by_x[r, i] = -by_x[r, i]
@@ -193,10 +217,10 @@ def located(
     return UNSOLVED
 
 
-def located_parts(packed: PackedLaws) -> list[Callable[..., Any]]:
-    """The kernels that `located` calls for laws in closed form, but for those of `real_form.closed_parts`."""
-    asked = ((add_pieces, len(packed.pieces)), (evaluate_told, packed.told), (evaluate, not packed.told))
-    return [jacobian, border, closed_gradient, *(part for part, needed in asked if needed)]
+def located_parts(packed: PackedLaws) -> tuple[Callable[..., Any], ...]:
+    """The kernels that are compiled before `located` is, but for those of `real_form.closed_parts`."""
+    forces = (evaluate_told,) if packed.told else (evaluate,)
+    return (border_at, closed_gradient, *forces, *((add_pieces,) if len(packed.pieces) else ()))
 
 
 __all__ = ["AWAY", "OFF_AXIS", "OTHER", "SOLVED", "STILL", "UNSOLVED", "located", "located_parts"]

@@ -10,12 +10,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from suboctave.bifurcation.bordered import Bordered, NullVectors, at_values, bordered, null_vectors, residual_scale
 from suboctave.bifurcation.located import AWAY, OFF_AXIS, OTHER, SOLVED, STILL, UNSOLVED, located, located_parts
-from suboctave.compiled import ready
+from suboctave.compiled import at_hand, ready
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor, length
 from suboctave.errors import ConvergenceError
@@ -229,9 +230,9 @@ def _linearised(
     n, q = len(rows), len(spans)
     scale_x = max(motion_size(state), least, NOTHING) / weight
     scale_rows = rows / force
-    packed = kernels.scaled_transposed(state.jacobian, scale_rows, scale_x, 1 + q)
+    along = state.extended_jacobian(guess.name)
+    packed = kernels.scaled_transposed(along, scale_rows, np.append(scale_x, guess.span), 1 + q)[:-1]
     matrix = packed.T
-    matrix[:n, n] = state.residual_by(guess.name) * scale_rows * guess.span
     for j, column in enumerate(columns):
         matrix[:n, n + 1 + j] = column * scale_rows * spans[j]
     for i, e in enumerate(equations):
@@ -294,45 +295,82 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
     return Singular(state, last[0].vectors, kappa, residual, iterations)
 
 
-def _at_once(guess: Guess, kind: Kind, begin: BalanceState) -> Singular | None:
-    """`locate_singular` in one compiled call; None where that does not go.
+@dataclass
+class AtOnce:
+    """The equations of a guess as compiled searches want them, where these apply: see `located.located`.
 
-    Raises
-    ------
-    ConvergenceError
-        As `newton`.
+    structure, forces, filled: their arguments from `nu`, `starts` and `blocks` on; called: what is compiled before.
     """
-    balance, basis, linear, values = guess.balance, guess.balance.basis, begin.linear, begin.values
-    plain = guess.name == "omega" and balance.steady and basis.kept is None and kind is not Kind.FREE
-    if not plain or not isinstance(linear, StructuralMatrices):
+
+    begin: BalanceState
+    structure: tuple[Any, ...]
+    forces: tuple[Any, ...]
+    filled: tuple[Any, ...]
+    called: tuple[Callable[..., Any], ...]
+
+    @classmethod
+    def of(cls, guess: Guess, begin: BalanceState) -> AtOnce | None:
+        """From a guess and the equations there: along omega, of a structure's own matrices, laws in closed form."""
+        balance, basis, linear, values = guess.balance, guess.balance.basis, begin.linear, begin.values
+        plain = guess.name == "omega" and balance.steady and basis.kept is None
+        if not plain or not isinstance(linear, StructuralMatrices):
+            return None
+        packed, nodes = balance.packed_laws(values)
+        called = real_form.closed_parts(packed)
+        if called is None:
+            return None
+        high, size, groups = basis.harmonics, balance.size, len(balance.groups)
+        blocks, parts = np.empty((high + 1, size, size), dtype=complex), np.empty((3, 2 * high + 1, size))
+        table = np.empty((3, groups, balance.top + 1), dtype=complex)
+        motions, sizes, numbers = np.empty((groups, high + 1), dtype=complex), np.empty(4), np.empty(2)
+        laws, steps = real_form.closed_laws(balance, packed, nodes)
+        return cls(
+            begin,
+            (basis.nu, balance.moving, basis.multiples, basis.half_multiples, linear.matrices),
+            (*laws, balance.load(values, 1.0), balance.scales()[1], *steps),
+            (blocks, table, motions, parts, sizes, numbers),
+            (*called, *located_parts(packed)),
+        )
+
+    def search(self, kernel: Callable[..., Any], guess: Guess, *asked: Any) -> tuple[BalanceState, float, int] | None:
+        """State, residual and iterations of a search, `asked` its arguments before the span of omega, u first; None
+        where it does not go.
+
+        Raises
+        ------
+        ConvergenceError
+            As `newton`.
+        """
+        least = np.array([max(_SHRUNK * guess.size * unit, NOTHING) for unit in (1.0, guess.omega**2)])
+        limits = (float(guess.span), least, _LIMITS, _ITERATIONS)
+        given = (*asked, *limits, *self.structure, *self.forces, *self.filled)
+        # what it calls is compiled one by one, not all at one go
+        if not (at_hand(kernel, *given) or all(map(ready, self.called))):
+            return None
+        ended = kernel(*given)
+        if ended == OTHER:
+            return None
+        blocks, table, motions, parts, sizes, numbers = self.filled
+        error, iterations = numbers.tolist()
+        if ended != SOLVED:
+            raise ConvergenceError(_ENDS[ended].format(error))
+        balance, u = guess.balance, asked[0]
+        x = u[: balance.dimension].reshape(balance.basis.size, balance.size)
+        state = BalanceState(balance, self.begin.linear, x, float(u[balance.dimension]), self.begin.values)
+        state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
+        return state, error, int(iterations)
+
+
+def _at_once(guess: Guess, kind: Kind, begin: BalanceState) -> Singular | None:
+    """`locate_singular` in one compiled call; None where that does not go."""
+    equations = None if kind is Kind.FREE else AtOnce.of(guess, begin)
+    if equations is None:
         return None
-    packed, nodes = balance.packed_laws(values)
-    called = real_form.closed_parts(packed)
-    # what it calls is compiled one by one, not all at one go
-    if called is None or not all(map(ready, (*called, *located_parts(packed)))):
-        return None
-    n, high, size, groups = balance.dimension, basis.harmonics, balance.size, len(balance.groups)
-    known = guess.vectors is not None
-    near = guess.vectors.resized(basis, size, kind) if guess.vectors else None
-    rows = n if kind is Kind.INTEGER else n + size
+    balance, mean = guess.balance, kind is Kind.INTEGER
+    rows = balance.dimension if mean else balance.dimension + balance.size
+    near = None if guess.vectors is None else guess.vectors.resized(balance.basis, balance.size, kind)
     # both are filled with those at the solution
     right, left = (np.empty(rows), np.empty(rows)) if near is None else (near.right.copy(), near.left.copy())
     u = np.append(begin.unknowns, guess.omega)
-    least = np.array([max(_SHRUNK * guess.size * unit, NOTHING) for unit in (1.0, guess.omega**2)])
-    blocks, parts = np.empty((high + 1, size, size), dtype=complex), np.empty((3, 2 * high + 1, size))
-    table = np.empty((3, groups, balance.top + 1), dtype=complex)
-    motions, sizes, numbers = np.empty((groups, high + 1), dtype=complex), np.empty(4), np.empty(2)
-    laws, steps = real_form.closed_laws(balance, packed, nodes)
-    start = (u, kind is Kind.INTEGER, known, right, left, guess.span, least, _LIMITS, _ITERATIONS)
-    structure = (basis.nu, balance.moving, basis.multiples, basis.half_multiples, linear.matrices)
-    forces = (*laws, balance.load(values, 1.0), balance.scales()[1], *steps)
-    filled = (blocks, table, motions, parts, sizes, numbers)
-    ended = located(*(*start, *structure, *forces, *filled))
-    if ended == OTHER:
-        return None
-    error, iterations = numbers.tolist()
-    if ended != SOLVED:
-        raise ConvergenceError(_ENDS[ended].format(error))
-    state = BalanceState(balance, linear, u[:n].reshape(basis.size, size), float(u[n]), values)
-    state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
-    return Singular(state, NullVectors(right, left), 0.0, error, int(iterations))
+    found = equations.search(located, guess, u, mean, near is not None, right, left)
+    return None if found is None else Singular(found[0], NullVectors(right, left), 0.0, *found[1:])

@@ -102,6 +102,19 @@ def evaluate(
 
 
 @kernel()
+def add_told(c, points, widths, steps, line, grid, rule_nodes, rule_weights, force, stiffness):
+    """Add the Fourier coefficients of the arctan steps along one direction to force and stiffness (top + 1,), in place;
+    returns the nodes with the motion there (`sharp_nodes`). Arguments as in `evaluate_told`.
+    """
+    degree = force.shape[0] + c.shape[0] - 2
+    # not a literal, for which the nodes would be compiled once more
+    moving = degree < 0
+    sampled = sharp_nodes(c, points, widths, degree, moving, grid[0], grid[1], rule_nodes, rule_weights)
+    add_smooth_steps(sampled, steps, line, force, stiffness)
+    return sampled
+
+
+@kernel()
 def evaluate_noting(
     x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
     points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
@@ -110,18 +123,14 @@ def evaluate_noting(
     them.
     """
     along_directions(x, starts, dofs, shape, motions)
-    degree = table.shape[2] + motions.shape[1] - 2
-    # not a literal, for which the nodes would be compiled once more
-    moving = degree < 0
     sampled = np.empty((4, 0))
     for g in range(motions.shape[0]):
         low, high = step_first[g], step_first[g + 1]
         if high > low:
-            sampled = sharp_nodes(
-                motions[g], points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes,
-                rule_weights,
+            sampled = add_told(
+                motions[g], points[low:high], widths[low:high], steps[low:high], line[g], grid, rule_nodes,
+                rule_weights, table[0, g], table[1, g],
             )  # fmt: skip
-            add_smooth_steps(sampled, steps[low:high], line[g], table[0, g], table[1, g])
     finite = evaluate(
         x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
         weight, table, motions, parts, sizes,
@@ -309,4 +318,13 @@ def structural_jacobian(state: BalanceState, matrices: Array, mean: bool, column
     return out
 
 
-__all__ = ["along_directions", "evaluate", "evaluated", "jacobian", "neglected_of_one", "structural_jacobian"]
+__all__ = [
+    "add_told",
+    "along_directions",
+    "evaluate",
+    "evaluate_told",
+    "evaluated",
+    "jacobian",
+    "neglected_of_one",
+    "structural_jacobian",
+]

@@ -19,7 +19,7 @@ from enum import Enum
 
 import numpy as np
 
-from suboctave.harmonic import kernels, nodal_second, real_form
+from suboctave.harmonic import free_form, kernels, nodal_second, real_form
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.changes import changes_by
 from suboctave.harmonic.local_force import CoefficientChange, Curvature
@@ -60,6 +60,9 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
     size, high = state.balance.size, state.basis.harmonics
     k = np.arange(-high, high + 1)
     frequency = np.asarray(k * state.rate + kappa, dtype=float)
+    compiled = free_form.free_operator(state, frequency)
+    if compiled is not None:
+        return compiled
     out = np.zeros((len(k) * size, len(k) * size), dtype=complex)
     for group, _, stiffness, damping in state.spectra:
         matrix = _two_sided(stiffness, k)
@@ -128,6 +131,10 @@ def bilinear_gradient(
     v, _ = _as_waves(right, kind, size, left=False)
     frequency = f * state.rate + (kappa if kind is Kind.FREE else 0.0)
     by_omega = f / basis.nu  # d frequency / d omega
+    if kind is Kind.FREE and names in ((), ("omega",)):
+        found = free_form.free_gradient(state, u, v, frequency, by_omega)
+        if found is not None:
+            return Gradient(found[0], dict.fromkeys(names, found[1]), found[2])
     linear = state.linear
     slope = linear.stiffness(frequency, 1)
     compliance = linear.compliance(frequency)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.compiled import kernel, ready
+from suboctave.compiled import at_hand, kernel, ready
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.closed_bends import bends_of_corners, bends_of_polynomial, bends_of_smooth_steps
 from suboctave.harmonic.evaluation import told_steps
@@ -185,6 +185,13 @@ def _linear_rates(left, right, mean, multiples, omega, matrices):
 
 
 @kernel()
+def add_steps(left, right, mean, dofs, shape, sampled, steps, gx):
+    """Add the gradient of arctan steps along one direction to `gx`; sampled: their nodes with the motion."""
+    weights = bends_of_smooth_steps(sampled, steps)
+    _add_group(left, right, mean, dofs, shape, sampled[0], sampled[1], weights[0], gx)
+
+
+@kernel()
 def noted_gradient(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
     step_first, line, rule_nodes, rule_weights, noted, top, multiples, omega, matrices, gx,
@@ -216,8 +223,7 @@ def noted_gradient(
                 sampled = sharp_nodes(
                     c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
                 )
-            weights = bends_of_smooth_steps(sampled, steps[low:high])
-            _add_group(left, right, mean, at, along, sampled[0], sampled[1], weights[0], gx)
+            add_steps(left, right, mean, at, along, sampled, steps[low:high], gx)
     return _linear_rates(left, right, mean, multiples, omega, matrices)
 
 
@@ -234,7 +240,7 @@ def closed_gradient(
 
 
 def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
-    """The kernels that `closed_gradient` calls for laws of some kinds only; None if some are not in closed form."""
+    """The kernels that gradients call for laws of some kinds only; None if some are not in closed form."""
     if packed.sampled and not packed.told:
         return None
     asked = (
@@ -243,7 +249,7 @@ def closed_parts(packed: PackedLaws) -> list[Callable[..., Any]] | None:
         (sharp_nodes, packed.told),
         (bends_of_smooth_steps, packed.told),
     )
-    return [_add_group, _linear_rates, *(part for part, needed in asked if needed)]
+    return [part for part, needed in asked if needed]
 
 
 def noted_nodes(state: BalanceState, packed: PackedLaws) -> Array:
@@ -280,13 +286,16 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     gx = np.zeros((basis.size, balance.size))
     multiples = basis.multiples if mean else basis.half_multiples
     packed, nodes = balance.packed_laws(state.values)
-    parts = closed_parts(packed)
-    if parts is not None and "closed_bends" not in state.__dict__ and all(map(ready, parts)):
+    called = closed_parts(packed)
+    if called is not None and "closed_bends" not in state.__dict__:
         laws, steps = closed_laws(balance, packed, nodes)
         noted = noted_nodes(state, packed)
         given = (u, v, mean, state.motions, *laws, *steps, noted, balance.top, multiples, state.omega)
-        by_omega, by_kappa = noted_gradient(*(*given, linear.matrices, gx))
-        return gx, by_omega, 1j * by_kappa
+        whole = (*given, linear.matrices, gx)
+        # what it calls is compiled one by one, not all at one go
+        if at_hand(noted_gradient, *whole) or all(map(ready, (_add_group, *called))):
+            by_omega, by_kappa = noted_gradient(*whole)
+            return gx, by_omega, 1j * by_kappa
     for group, zr, zi, second in _second(state):
         _add_group(u, v, mean, group.dofs, group.values, zr, zi, second, gx)
     by_omega, by_kappa = _linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
@@ -315,6 +324,7 @@ def by_kappa(state: BalanceState, mean: bool, left: Array, right: Array) -> comp
 
 __all__ = [
     "add_doubled_form",
+    "add_steps",
     "applies",
     "by_kappa",
     "closed_gradient",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from suboctave.harmonic import evaluation, group_kernels, kernels
-from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
 from suboctave.harmonic.changes import changes_by
 from suboctave.harmonic.closed_bends import ClosedBends, closed_bends
 from suboctave.harmonic.group_force import Group, curvature_of
@@ -375,14 +375,20 @@ class BalanceState:
 
         It solves the equations no better within the basis, but as a function of time it lies closer to the true motion.
         """
-        balance, high = self.balance.completed, self.basis.harmonics
-        x = self.basis.resized(self.x, balance.basis)
+        return BalanceState(self.balance.completed, self.linear, self.completed_x[1], self.omega, self.values)
+
+    @lazy
+    def completed_x(self) -> tuple[HarmonicBasis, Array]:
+        """The basis of 2 H + 1 harmonics, and the coefficients of the completed motion in it."""
+        high = self.basis.harmonics
+        basis = HarmonicBasis(self.balance.top, self.basis.nu)
+        x = self.basis.resized(self.x, basis)
         x[2 * high + 1 :: 2] = self.neglected.real
         x[2 * high + 2 :: 2] = -self.neglected.imag
         if self.basis.kept is not None:
             out = self.basis.left_out
             x[2 * out - 1], x[2 * out] = self.left_out.real, -self.left_out.imag
-        return BalanceState(balance, self.linear, x, self.omega, self.values)
+        return basis, x
 
     def force_scale(self) -> float:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
