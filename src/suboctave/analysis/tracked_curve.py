@@ -11,6 +11,7 @@ import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -278,13 +279,11 @@ class TrackedCurve:
             return [u]
         extra, parameters = u[n : -len(self.names)], u[-len(self.names) :]
         found = []
-        for shift in range(basis.nu):
-            turn = 2.0 * np.pi * shift / basis.nu
-            angle = turn * np.arange(1, basis.harmonics + 1)[:, None]
-            x = u[:n].reshape(basis.size, -1)
+        x = u[:n].reshape(basis.size, -1)
+        for turn, cosine, sine in _turns(basis.nu, basis.harmonics):
             y = x.copy()
-            y[1::2] = np.cos(angle) * x[1::2] + np.sin(angle) * x[2::2]
-            y[2::2] = np.cos(angle) * x[2::2] - np.sin(angle) * x[1::2]
+            y[1::2] = cosine * x[1::2] + sine * x[2::2]
+            y[2::2] = cosine * x[2::2] - sine * x[1::2]
             found.append(self.join(y, self.augmentation.shifted(extra, turn), parameters))
         return found
 
@@ -295,6 +294,14 @@ class TrackedCurve:
     def where(self, u: Array) -> str:
         """Where in the plane of the parameters, in words."""
         return ", ".join(f"{name} = {value:.6g}" for name, value in self.named(u).items())
+
+
+@lru_cache(maxsize=64)
+def _turns(nu: int, harmonics: int) -> list[tuple[float, Array, Array]]:
+    """The shifts by load periods as angles of the motion's own period, with cosine and sine at every harmonic."""
+    turns = [2.0 * np.pi * shift / nu for shift in range(nu)]
+    angles = [turn * np.arange(1, harmonics + 1)[:, None] for turn in turns]
+    return [(turn, np.cos(angle), np.sin(angle)) for turn, angle in zip(turns, angles, strict=True)]
 
 
 __all__ = ["TrackedCurve", "TrackedEvaluation"]
