@@ -234,7 +234,8 @@ class TrackedCurve:
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
         force = max(state.force_scale(), self.floor)
-        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
+        what = (self.names, self.spans, self.omega, self.adaptive, self.tolerance)
+        return TrackedCurve(balance, augmentation, *what, force, self.floor, self.cache, self.steps + 1)
 
     def _basis(self, evaluation: TrackedEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
         """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""

@@ -101,13 +101,14 @@ def _brackets(
     test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
 ) -> list[tuple[TrackedSample, TrackedSample]]:
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    changed = test.changed(a, b)
+    share = None if changed or not isinstance(test, Extremum) else _turn_inside(test.name, a, b)
+    if not changed and share is None:
+        return []
     if isinstance(test, Extremum) and test.level(a, b):
         return []
-    if test.changed(a, b):
-        return [(a, b)]
-    share = _turn_inside(test.name, a, b) if isinstance(test, Extremum) else None
     if share is None:
-        return []
+        return [(a, b)]
     middle = TrackedSample(point_between(a.point, b.point, share, newton))
     return [(a, middle), (middle, b)] if test.changed(a, middle) else []
 

@@ -19,6 +19,7 @@ import numpy as np
 from suboctave.analysis.tracked_events import Found, located
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.analysis.tracked_tests import CurveTest, Extremum
+from suboctave.compiled import kernel
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.march import point_between
 from suboctave.continuation.problem import Array
@@ -64,6 +65,8 @@ class HiddenPairs:
         near = self._known
         samples = [sample for sample, _ in near]
         places = [sample.point.arclength for sample in samples]
+        if _clear(np.array(places), np.array([known for _, known in near]), at):
+            return []
         if not all(a < b for a, b in pairwise(places)):
             return []
         for i, test in enumerate(self.tests):
@@ -142,6 +145,43 @@ def falling(places: Sequence[float], values: Sequence[float], at: int) -> float 
         if lowest.min() < bound:
             return float(_GRID[lowest.argmin()])
     return None
+
+
+@kernel()
+def _clear(places, functions, at):
+    """Whether `falling` finds nothing for any of the functions, as its first looks tell; False where it takes more.
+
+    functions (m, tests, 2): signs and logarithms.
+    """
+    m = places.shape[0]
+    if at < 1 or at + 2 >= m:
+        return False
+    way = places[at + 1] - places[at]
+    for i in range(m - 1):
+        if not places[i] < places[i + 1]:
+            return False
+    for k in range(functions.shape[1]):
+        top = -np.inf
+        for i in range(at - 1, at + 3):
+            top = max(top, functions[i, k, 1])
+        if not math.isfinite(top):
+            return False
+        bend = 0.0
+        for i in range(at - 1, at + 1):
+            f0 = functions[i, k, 0] * math.exp(functions[i, k, 1] - top)
+            f1 = functions[i + 1, k, 0] * math.exp(functions[i + 1, k, 1] - top)
+            f2 = functions[i + 2, k, 0] * math.exp(functions[i + 2, k, 1] - top)
+            first = (f1 - f0) / (places[i + 1] - places[i])
+            last = (f2 - f1) / (places[i + 2] - places[i + 1])
+            bend = max(bend, abs(last - first) / (places[i + 2] - places[i]))
+        one = functions[at, k, 0] * math.exp(functions[at, k, 1] - top)
+        other = functions[at + 1, k, 0] * math.exp(functions[at + 1, k, 1] - top)
+        if one * other <= 0.0:
+            continue
+        # a number that is none is not clear
+        if not 0.25 * bend * way * way <= (1.0 - _FALLS) * min(abs(one), abs(other)):
+            return False
+    return True
 
 
 def _second(x: Sequence[float], f: Sequence[float], i: int) -> float:

@@ -202,7 +202,7 @@ class SingularEquations(Equations):
 
     def renewed(self) -> SingularOperator:
         """See `Equations.renewed`."""
-        return replace(self.of, borders=self.bordered.vectors, unit=self.state.omega**2)
+        return SingularOperator(self.of.kind, self.bordered.vectors, self.state.omega**2)
 
 
 @dataclass(frozen=True)

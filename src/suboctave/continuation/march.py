@@ -280,7 +280,9 @@ class March:
             if adapted is not new.curve:
                 u, t = adapted.transfer(new.u, new.curve), adapted.transfer(new.tangent, new.curve)
                 weights = adapted.weights(u, largest)
-                point = replace(new, curve=adapted, u=u, tangent=t, weights=weights)
+                point = CurvePoint(
+                    adapted, u, t, weights, new.evaluation, new.orientation, new.arclength, new.iterations, new.factor
+                )
             else:
                 point = new
 

@@ -48,7 +48,8 @@ class LoadSpectrum:
                 result[0] += wave.real * shape
             else:
                 result[2 * k - 1] += wave.real * shape
-                result[2 * k] -= wave.imag * shape
+                if wave.imag != 0.0:
+                    result[2 * k] -= wave.imag * shape
         return result
 
 
