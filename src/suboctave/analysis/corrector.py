@@ -21,7 +21,7 @@ from suboctave.continuation.kernels import (
 )
 from suboctave.continuation.lapack import factorise, solve_factorised
 from suboctave.continuation.newton import SHORT
-from suboctave.harmonic.evaluation import evaluate, evaluate_told, jacobian
+from suboctave.harmonic.evaluation import evaluate_anew, jacobian
 
 #: how a correction ended: solved; given up without convergence; something the general way knows more about
 SOLVED, UNSOLVED, OTHER = 0, 1, 2
@@ -109,21 +109,10 @@ def corrected(
         if not (math.isfinite(total) and omega > 0.0):
             return OTHER
         x = u[: n - 1].reshape(parts.shape[1], parts.shape[2])
-        for g in range(motions.shape[0]):
-            for part in range(3):
-                for q in range(table.shape[2]):
-                    table[part, g, q] = 0.0
-        if points is None:
-            finite = evaluate(
-                x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                load, weight, table, motions, parts, sizes,
-            )  # fmt: skip
-        else:
-            finite = evaluate_told(
-                x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts,
-                sizes,
-            )  # fmt: skip
+        finite = evaluate_anew(
+            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+            weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+        )  # fmt: skip
         error = sizes[0] / max(sizes[1] + sizes[2] + sizes[3], floor * omega * omega, _TINY)
         if not (finite and math.isfinite(error)):
             return OTHER

@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 
-from suboctave.bifurcation.located import AWAY, OFF_AXIS, OTHER, SOLVED, STILL, UNSOLVED
+from suboctave.bifurcation.located import GOES_ON, OFF_AXIS, OTHER, SOLVED, UNSOLVED, judged
 from suboctave.compiled import kernel
 from suboctave.continuation.lapack import factorise, solve_factorised
-from suboctave.harmonic.evaluation import evaluate, evaluate_told, jacobian
+from suboctave.harmonic.evaluation import evaluate_anew, jacobian
 
 
 @kernel()
@@ -89,21 +89,10 @@ def grazed(
         if not math.isfinite(total):
             return OTHER
         x = u[:n].reshape(parts.shape[1], size)
-        for part in range(3):
-            for g in range(motions.shape[0]):
-                for q in range(table.shape[2]):
-                    table[part, g, q] = 0.0
-        if points is None:
-            finite = evaluate(
-                x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                load, weight, table, motions, parts, sizes,
-            )  # fmt: skip
-        else:
-            finite = evaluate_told(
-                x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
-                load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts,
-                sizes,
-            )  # fmt: skip
+        finite = evaluate_anew(
+            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+            weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+        )  # fmt: skip
         at, rate, bend, large = graze_rows(x, direction, u[n + 1], value, slope)
         if not (finite and large > 0.0):
             return OTHER
@@ -141,19 +130,10 @@ def grazed(
             step[i] = residual[i] * rows[i]
         step[n], step[n + 1] = (at - level) / unit, rate / unit
         solve_factorised(lu, pivots, step)
-        moved = 0.0
-        for i in range(n + 2):
-            moved += step[i] * step[i]
-        moved = math.sqrt(moved)
-        if not math.isfinite(moved):
-            return OTHER
+        ended, moved = judged(step, previous, iteration, far, error, tolerance)
+        if ended != GOES_ON:
+            return ended
         contraction = moved / previous if previous > 0.0 else 0.0
-        if iteration > 0 and moved > far:
-            return AWAY
-        if iteration > 3 and moved > 0.5 * previous and previous > 1e-6:
-            return STILL
-        if moved <= 1e-12 and error <= tolerance:
-            return SOLVED
         damp = min(1.0, 0.5 / moved) if moved > 0.0 else 1.0
         for i in range(n):
             u[i] -= damp * step[i] * columns[i]

@@ -30,10 +30,31 @@ from suboctave.harmonic.group_kernels import add_pieces
 from suboctave.harmonic.real_form import add_steps, closed_gradient
 
 #: how a search ended: solved; given up as `solve.newton` does; something that it knows more about
-SOLVED, OFF_AXIS, AWAY, STILL, UNSOLVED, OTHER = 0, 1, 2, 3, 4, 5
+SOLVED, OFF_AXIS, AWAY, STILL, UNSOLVED, OTHER, GOES_ON = 0, 1, 2, 3, 4, 5, 6
 
 #: rows of a matrix whose factors cost more than their repeated use
 _LARGE = 80
+
+
+@kernel()
+def judged(step, previous, iteration, far, error, tolerance):
+    """What a dimensionless step means for the iteration, GOES_ON if it is to be taken; and its length.
+
+    previous: length of the last one; far: one that leads away; error: that before the step.
+    """
+    moved = 0.0
+    for i in range(step.shape[0]):
+        moved += step[i] * step[i]
+    moved = math.sqrt(moved)
+    if not math.isfinite(moved):
+        return OTHER, moved
+    if iteration > 0 and moved > far:
+        return AWAY, moved
+    if iteration > 3 and moved > 0.5 * previous and previous > 1e-6:
+        return STILL, moved
+    if moved <= 1e-12 and error <= tolerance:
+        return SOLVED, moved
+    return GOES_ON, moved
 
 
 @kernel(alone=True)
@@ -196,19 +217,10 @@ def located(
                 step[i] = residual[i] * rows[i]
             step[n] = value / unit
             solve_factorised(factors, turns, step)
-        moved = 0.0
-        for i in range(n + 1):
-            moved += step[i] * step[i]
-        moved = math.sqrt(moved)
-        if not math.isfinite(moved):
-            return OTHER
+        ended, moved = judged(step, previous, iteration, far, error, tolerance)
+        if ended != GOES_ON:
+            return ended
         contraction = moved / previous if previous > 0.0 else 0.0
-        if iteration > 0 and moved > far:
-            return AWAY
-        if iteration > 3 and moved > 0.5 * previous and previous > 1e-6:
-            return STILL
-        if moved <= 1e-12 and error <= tolerance:
-            return SOLVED
         damp = min(1.0, 0.5 / moved) if moved > 0.0 else 1.0
         for i in range(n):
             u[i] -= damp * step[i] * columns[i]
@@ -223,4 +235,4 @@ def located_parts(packed: PackedLaws) -> tuple[Callable[..., Any], ...]:
     return (border_at, closed_gradient, *forces, *((add_pieces,) if len(packed.pieces) else ()))
 
 
-__all__ = ["AWAY", "OFF_AXIS", "OTHER", "SOLVED", "STILL", "UNSOLVED", "located", "located_parts"]
+__all__ = ["AWAY", "GOES_ON", "OFF_AXIS", "OTHER", "SOLVED", "STILL", "UNSOLVED", "judged", "located", "located_parts"]

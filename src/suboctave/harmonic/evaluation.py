@@ -163,6 +163,27 @@ def evaluate_told(
 
 
 @kernel()
+def evaluate_anew(
+    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
+    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+):  # fmt: skip
+    """`evaluate`, or `evaluate_told` where there are `points`, into a table that holds anything before."""
+    for part in range(table.shape[0]):
+        for g in range(table.shape[1]):
+            for q in range(table.shape[2]):
+                table[part, g, q] = 0.0
+    if points is None:
+        return evaluate(
+            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+            weight, table, motions, parts, sizes,
+        )  # fmt: skip
+    return evaluate_told(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+    )  # fmt: skip
+
+
+@kernel()
 def jacobian(out, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x):
     """Add R_X of a structure's own matrices to a matrix of zeros, in the integer (mean) or the half-odd basis.
 
@@ -322,6 +343,7 @@ __all__ = [
     "add_told",
     "along_directions",
     "evaluate",
+    "evaluate_anew",
     "evaluate_told",
     "evaluated",
     "jacobian",
