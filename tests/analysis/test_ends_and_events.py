@@ -51,8 +51,8 @@ def test_progress_reports_and_never_runs_backwards(duffing_curve):
     seen = []
     so.frequency_response(duffing_curve.system, (3.0, 0.5), progress=lambda share, text: seen.append((share, text)))
     shares = [share for share, _ in seen]
-    # the start once more, before its stability is known
-    assert len(seen) == len(duffing_curve) + 1
+    # the start twice more: before it is solved for, and before its stability is known
+    assert len(seen) == len(duffing_curve) + 2
     assert shares == sorted(shares)
     assert shares[0] == 0.0
     assert shares[-1] == 1.0

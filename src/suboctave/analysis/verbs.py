@@ -109,6 +109,9 @@ def frequency_response(
     computation_begins()
     with one_thread(), reporting(progress, "frequency response") as report:
         settings = replace(settings, report=report)
+        if report is not None:
+            # in a fresh installation the start waits for kernels to be compiled
+            report(0.0, f"omega = {first:.6g}")
         searched = start is None and nu > 1
         if searched:
             trace = subharmonic_start(curve, (first, last), settings)
