@@ -9,8 +9,8 @@ import suboctave as so
 from suboctave.analysis.response import ResponseCurve
 from suboctave.continuation.lapack import factorise, factorise_plainly, solve_factorised
 from suboctave.continuation.linear import Factor
-from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 

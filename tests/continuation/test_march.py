@@ -9,8 +9,8 @@ import pytest
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import Factor
-from suboctave.continuation.march import between, make_point, point_between, solve_at
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import between, make_point, point_between, solve_at
 from suboctave.errors import ConvergenceError, InputError
 
 NEWTON = NewtonOptions()

@@ -24,8 +24,9 @@ from suboctave.bifurcation.layer import behind_their_grazings
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import Arrival, make_point, point_between
+from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point, point_between
 from suboctave.errors import ConvergenceError, InputError
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point

@@ -32,7 +32,7 @@ from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
 from suboctave.compiled import kernel
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import CurvePoint, between
+from suboctave.continuation.point import CurvePoint, between
 from suboctave.errors import ConvergenceError
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart

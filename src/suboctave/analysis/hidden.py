@@ -18,8 +18,8 @@ from suboctave.bifurcation import ALL_KINDS, Sample
 from suboctave.bifurcation.finder import Located, locate
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, next_harmonics

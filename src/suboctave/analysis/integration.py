@@ -14,7 +14,8 @@ from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow, check_count, check_motions
+from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.motions import check_motions
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ def integrate(
         )
     if not motions.finished.all():
         raise KeyboardInterrupt
-    check_motions(motions, flow)
+    check_motions(motions)
     assert motions.peaks is not None
     states, peaks = motions.states[0], motions.peaks[0]
     if transient:  # the last instant of the transient is the first that is given

@@ -18,8 +18,9 @@ from suboctave.bifurcation.finder import position
 from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.bifurcation.solve import Guess, Singular, locate_singular
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import Arrival, CurvePoint, between, make_point
+from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray

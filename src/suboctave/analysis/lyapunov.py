@@ -27,7 +27,8 @@ from suboctave.analysis.two_trajectories import Separation, TwoTrajectories, sep
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow, check_count, check_motions
+from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.motions import check_motions
 from suboctave.timedomain.recognition import extents
 from suboctave.version import __version__
 
@@ -280,7 +281,7 @@ def lyapunov_exponents(
         motions = flow.over(starts, omega, transient + periods, values, transient, workers=workers, report=report)
     if not motions.finished.all():
         raise KeyboardInterrupt
-    check_motions(motions, flow)
+    check_motions(motions)
     assert motions.growth is not None
     rates = motions.growth * (float(omega) / (2.0 * np.pi))
     smooth, mean, error, stretches = averaged(rates)
@@ -348,7 +349,7 @@ def _starts(flow: Flow, first: Array, omega: float, values: Mapping[str, float],
     motions = flow.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True)
     if not motions.finished.all():
         raise KeyboardInterrupt
-    check_motions(motions, flow)
+    check_motions(motions)
     assert motions.peaks is not None
     mass = np.diagonal(system.mass.value({**system.parameters, **values}))
     sizes = extents(motions.peaks[0].max(axis=0), float(omega), mass)

@@ -28,7 +28,8 @@ from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow, Motions, check_count, check_motions
+from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.motions import Motions, check_motions
 
 __all__ = ["check_stepped_sine", "stepped_sine"]
 
@@ -218,7 +219,7 @@ def _over(flow: Flow, states: Array, omega: Array, periods: int, measured: bool 
     motions = flow.over(states, omega, periods, skip=skip, measure=measured, workers=1)
     if not motions.finished.all():
         raise KeyboardInterrupt
-    check_motions(motions, flow)
+    check_motions(motions)
     return motions
 
 

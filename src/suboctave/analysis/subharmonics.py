@@ -32,8 +32,8 @@ from suboctave.bifurcation.formulation import Formulation
 from suboctave.compiled import computation_begins
 from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
-from suboctave.continuation.march import solve_at
 from suboctave.continuation.newton import Solved
+from suboctave.continuation.point import solve_at
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import HarmonicBalance

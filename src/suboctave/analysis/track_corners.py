@@ -18,8 +18,8 @@ from suboctave.bifurcation.gaps import GapExtrema, gap_extrema, level_rate
 from suboctave.bifurcation.grazing import basis_rows, read_direction
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit

@@ -21,8 +21,8 @@ from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.analysis.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
-from suboctave.continuation.march import between, make_point
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import between, make_point
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation

@@ -25,8 +25,8 @@ from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.perturbation import Kind

@@ -27,8 +27,8 @@ from suboctave.bifurcation.formulation import BORDERED, Alcorta2019, ExtendedSys
 from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint
-from suboctave.continuation.march import make_point
 from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis

@@ -16,8 +16,8 @@ from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_sample import BEGINNING, TrackedSample, nearest_point, zero_along
 from suboctave.analysis.tracked_tests import CurveTest, Cusp, Extremum
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import CurvePoint, between, make_point, point_between
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point, point_between
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis

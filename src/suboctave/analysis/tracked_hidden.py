@@ -21,7 +21,7 @@ from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.analysis.tracked_tests import CurveTest, Extremum
 from suboctave.compiled import kernel
 from suboctave.continuation import NewtonOptions
-from suboctave.continuation.march import point_between
+from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 
@@ -128,9 +128,7 @@ def falling(places: Sequence[float], values: Sequence[float], at: int) -> float 
         return None
     least = min(abs(first), abs(last))
     if at > 0 and at + 2 < len(places):
-        # parabolas leave the chord by no more than this
-        bend = max(abs(_second(places, values, i)) for i in (at - 1, at)) * (places[at + 1] - places[at]) ** 2 / 4.0
-        if bend <= (1.0 - _FALLS) * least:
+        if _straight(np.array(places), np.array(values), at):
             return None
         spans = [(at - 1, at + 2), (at, at + 3)]
     elif at > 0:
@@ -149,46 +147,38 @@ def falling(places: Sequence[float], values: Sequence[float], at: int) -> float 
 
 @kernel()
 def _clear(places, functions, at):
-    """Whether `falling` finds nothing for any of the functions, as its first looks tell; False where it takes more.
-
-    functions (m, tests, 2): signs and logarithms.
+    """Whether `falling` finds nothing for any of the functions at the first look; functions (m, tests, 2): signs and
+    logarithms.
     """
     m = places.shape[0]
     if at < 1 or at + 2 >= m:
         return False
-    way = places[at + 1] - places[at]
     for i in range(m - 1):
         if not places[i] < places[i + 1]:
             return False
+    values = np.empty(m)
     for k in range(functions.shape[1]):
-        top = -np.inf
-        for i in range(at - 1, at + 3):
-            top = max(top, functions[i, k, 1])
+        top = functions[:, k, 1].max()
         if not math.isfinite(top):
             return False
-        bend = 0.0
-        for i in range(at - 1, at + 1):
-            f0 = functions[i, k, 0] * math.exp(functions[i, k, 1] - top)
-            f1 = functions[i + 1, k, 0] * math.exp(functions[i + 1, k, 1] - top)
-            f2 = functions[i + 2, k, 0] * math.exp(functions[i + 2, k, 1] - top)
-            first = (f1 - f0) / (places[i + 1] - places[i])
-            last = (f2 - f1) / (places[i + 2] - places[i + 1])
-            bend = max(bend, abs(last - first) / (places[i + 2] - places[i]))
-        one = functions[at, k, 0] * math.exp(functions[at, k, 1] - top)
-        other = functions[at + 1, k, 0] * math.exp(functions[at + 1, k, 1] - top)
-        if one * other <= 0.0:
-            continue
-        # a number that is none is not clear
-        if not 0.25 * bend * way * way <= (1.0 - _FALLS) * min(abs(one), abs(other)):
+        for i in range(m):
+            values[i] = functions[i, k, 0] * math.exp(functions[i, k, 1] - top)
+        if values[at] * values[at + 1] > 0.0 and not _straight(places, values, at):
             return False
     return True
 
 
-def _second(x: Sequence[float], f: Sequence[float], i: int) -> float:
-    """The second divided difference at three points from the i-th."""
-    first = (f[i + 1] - f[i]) / (x[i + 1] - x[i])
-    last = (f[i + 2] - f[i + 1]) / (x[i + 2] - x[i + 1])
-    return (last - first) / (x[i + 2] - x[i])
+@kernel()
+def _straight(places, values, at):
+    """Whether the parabolas through two neighbours and either place beside them stay close to the chord."""
+    bend = 0.0
+    for i in range(at - 1, at + 1):
+        first = (values[i + 1] - values[i]) / (places[i + 1] - places[i])
+        last = (values[i + 2] - values[i + 1]) / (places[i + 2] - places[i + 1])
+        bend = max(bend, abs((last - first) / (places[i + 2] - places[i])))
+    # they leave it by no more than this
+    bend *= 0.25 * (places[at + 1] - places[at]) ** 2
+    return bend <= (1.0 - _FALLS) * min(abs(values[at]), abs(values[at + 1]))
 
 
 def _interpolated(x: Sequence[float], f: Sequence[float], s: Array) -> Array:

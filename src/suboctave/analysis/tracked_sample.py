@@ -18,8 +18,8 @@ from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.extremum import ExtremalEquations
 from suboctave.continuation.linear import Factor, LeadingBlock, length
-from suboctave.continuation.march import CurvePoint, make_point
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit

@@ -19,7 +19,8 @@ from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import METHODS, Flow, Report, check_count, check_motions
+from suboctave.timedomain.batch import METHODS, Flow, Report, check_count
+from suboctave.timedomain.motions import check_motions
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ def separate(
         if not motions.finished.all():
             raise KeyboardInterrupt
         if motions.failed.any():
-            check_motions(motions, flow)
+            check_motions(motions)
         states = np.concatenate([starts[:, None], motions.states], axis=1) * metric
         size = float(np.max(np.linalg.norm(states[0], axis=1)))
         for offset, other in zip(offsets, states[1:], strict=True):

@@ -16,8 +16,8 @@ import numpy as np
 from suboctave.bifurcation.kinds import BifurcationKind, Sample
 from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import CurvePoint, between, point_between
 from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.point import CurvePoint, between, point_between
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 

@@ -32,8 +32,8 @@ from suboctave.bifurcation.grazed import grazed
 from suboctave.bifurcation.kinds import BifurcationKind, Sample
 from suboctave.bifurcation.solve import AtOnce, Extra, Guess, Singular, Slopes, newton
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import CurvePoint, between, point_between
 from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.point import CurvePoint, between, point_between
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.grazing_instants import passages

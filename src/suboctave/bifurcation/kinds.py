@@ -24,7 +24,7 @@ from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.bifurcation.solve import Guess, Singular
-from suboctave.continuation.march import CurvePoint
+from suboctave.continuation.point import CurvePoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from suboctave.continuation.march import CurvePoint, point_between
 from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.point import CurvePoint, point_between
 from suboctave.errors import ConvergenceError, InputError
 
 

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation import kernels
-from suboctave.continuation.linear import Factor, length
-from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
-from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.problem import Array, Curve
 from suboctave.errors import ConvergenceError, InputError
 
 #: points behind the last one that a prediction takes into account
@@ -65,28 +66,6 @@ class SteppingOptions:
             raise InputError(f"SteppingOptions out of range: {self}")
 
 
-@dataclass(eq=False, slots=True)
-class CurvePoint:
-    """A point of a curve with its tangent (in u, unit length in scaled arclength); `factor` as in `Solved`, while the
-    point is new.
-    """
-
-    curve: Curve
-    u: Array
-    tangent: Array
-    weights: Array
-    evaluation: Evaluation
-    orientation: float
-    arclength: float
-    iterations: int
-    factor: Factor | None = None
-
-    @property
-    def parameter(self) -> float:
-        """Value of the curve's free parameter."""
-        return float(self.u[self.curve.parameter])
-
-
 class _Place:
     """A point of a curve that a march may come back to."""
 
@@ -131,48 +110,6 @@ class Arrival:
 
     point: CurvePoint | None
     reason: str
-
-
-def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
-    """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
-    t = tangent(solved)
-    sign = solved.factor.sign if solved.sign is None else solved.sign
-    # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of
-    # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
-    if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:
-        t, sign = -t, -sign
-    return CurvePoint(
-        curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations, solved.factor
-    )
-
-
-def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
-    """Solve at the guess's own parameter value."""
-    row = np.zeros(len(guess))
-    row[curve.parameter] = 1.0
-    return correct(curve, guess, row, curve.weights(guess, largest), newton)
-
-
-def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
-    """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
-    ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    result: Array = kernels.between(ua, ta, b.u, b.tangent, b.weights, fraction)
-    return result
-
-
-def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonOptions) -> CurvePoint:
-    """The point of the curve at a fraction of the way between two neighbours.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method does not converge there.
-    """
-    guess = between(a, b, fraction)
-    chord = b.u - b.curve.transfer(a.u, a.curve)
-    row = b.weights * chord
-    solved = correct(b.curve, guess, row / length(row), b.weights, newton)
-    return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
 
 
 class March:

@@ -21,6 +21,7 @@ from suboctave.harmonic.closed_bends import ClosedBends, closed_bends
 from suboctave.harmonic.group_force import Group, curvature_of
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion
+from suboctave.harmonic.neglected import completed_coefficients, excited
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
 from suboctave.harmonic.nodal_second import force_by
 from suboctave.harmonic.quadrature import graded_motion
@@ -340,28 +341,12 @@ class BalanceState:
                 self.spectra_table[0], balance.directions[2], balance.beyond, self.omega, linear.matrices, found
             )
             return found
-        return self._excited(np.arange(self.basis.harmonics + 1, self.balance.top + 1))
+        return excited(self, np.arange(self.basis.harmonics + 1, self.balance.top + 1))
 
     @lazy
     def left_out(self) -> ComplexArray:
         """The same of the harmonics below H that the basis leaves out, shape (len(basis.left_out), size)."""
-        return self._excited(self.basis.left_out)
-
-    def _excited(self, k: np.ndarray) -> ComplexArray:
-        """First-order answer at harmonics k > 0 that are no unknowns, shape (len(k), size)."""
-        size = self.balance.size
-        force = np.zeros((len(k), size), dtype=complex)
-        for group, spectrum, _, _ in self.spectra:
-            force += np.multiply.outer(2.0 * spectrum[k], group.direction)
-        for nodal in self.nodal:
-            force += np.multiply.outer(2.0 * nodal.force[k], nodal.own.out)
-        frequency = k / self.basis.nu * self.omega
-        compliance = self.linear.compliance(frequency)
-        if compliance is not None:
-            force = np.einsum("kij,kj->ki", compliance, force)
-        blocks = self.linear.stiffness(frequency)
-        motion = force / blocks[:, :, 0] if size == 1 else np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
-        return -motion.astype(complex, copy=False)
+        return excited(self, self.basis.left_out)
 
     @lazy
     def tails(self) -> tuple[Array, float]:
@@ -380,15 +365,7 @@ class BalanceState:
     @lazy
     def completed_x(self) -> tuple[HarmonicBasis, Array]:
         """The basis of 2 H + 1 harmonics, and the coefficients of the completed motion in it."""
-        high = self.basis.harmonics
-        basis = HarmonicBasis(self.balance.top, self.basis.nu)
-        x = self.basis.resized(self.x, basis)
-        x[2 * high + 1 :: 2] = self.neglected.real
-        x[2 * high + 2 :: 2] = -self.neglected.imag
-        if self.basis.kept is not None:
-            out = self.basis.left_out
-            x[2 * out - 1], x[2 * out] = self.left_out.real, -self.left_out.imag
-        return basis, x
+        return completed_coefficients(self)
 
     def force_scale(self) -> float:
         """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""

@@ -92,11 +92,13 @@ class _Play(Element):
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
         """`f_uu`; for the exact law its regular part, which is zero."""
-        return sum(stop.curvature(u, v, c[index])[0] for stop, index in self._stops), None, None  # type: ignore[return-value]
+        one, other = (stop.curvature(u, v, c[index])[0] for stop, index in self._stops)
+        return one + other, None, None
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
         """`f_uuu`; for the exact law its regular part, which is zero."""
-        return sum(stop.third(u, v, c[index])[0] for stop, index in self._stops), None, None, None  # type: ignore[return-value]
+        one, other = (stop.third(u, v, c[index])[0] for stop, index in self._stops)
+        return one + other, None, None, None
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`; for the exact law the regular parts."""

@@ -29,7 +29,8 @@ class FrequencyResponse(CurveStep):
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         start = self.started(context)
-        return frequency_response(context.system, tuple(self.omega), start=start, **options)  # type: ignore[arg-type]
+        first, last = self.omega
+        return frequency_response(context.system, (first, last), start=start, **options)
 
     def _moved(self, orbit: Any, context: Context) -> Any:
         return orbit  # a first guess at other parameters, too
