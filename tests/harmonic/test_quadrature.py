@@ -123,6 +123,25 @@ def test_weights_add_up_to_the_period():
         assert len(nodes.tau) == len(np.unique(nodes.tau))
 
 
+@pytest.mark.parametrize("harmonics", [1, 2, 3, 4, 6, 8])
+@pytest.mark.parametrize("gap", [0.2, 0.9, 1.7])
+def test_motions_of_few_harmonics_are_integrated_as_well(harmonics, gap):
+    """Against a uniform grid so fine that the law is smooth on it: panels are long there, and the gap is out of reach
+    or not.
+    """
+    c = np.array([0.1] + [0.7 / k**2 * np.exp(1j * k) for k in range(1, harmonics + 1)])
+    stop, top = ElasticStop(0, 1.0, gap, side="right", regularization=40.0), 2 * harmonics + 1
+    local = LocalMotion(stop, c, 1.0, stop.coefficient_values({}), top)
+    nodes, spectra = local.nodes(), local_force(local)
+    assert np.abs(nodes.zr**2 + nodes.zi**2 - 1.0).max() < 1e-14
+    tau = 2 * np.pi * np.arange(8192) / 8192
+    f, f_u, _ = stop.tangent(value(c, tau), np.zeros_like(tau), stop.coefficient_values({}))
+    waves = np.exp(-1j * np.outer(np.arange(top + 1), tau)) / len(tau)
+    for found, law in ((spectra.force, f), (spectra.stiffness, f_u)):
+        exact = waves @ law
+        np.testing.assert_allclose(found, exact, atol=2e-12 * np.abs(exact).max())
+
+
 class Silent(ElasticStop):
     """A stop that tells nothing of its law."""
 

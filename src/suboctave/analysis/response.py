@@ -193,7 +193,13 @@ class ResponseCurve:
         return equations + (told_steps(packed) if packed.told else (None,) * 7), parts
 
     def corrected(
-        self, guess: Array, row: Array, weights: Array, options: NewtonOptions, spare: float
+        self,
+        guess: Array,
+        row: Array,
+        weights: Array,
+        options: NewtonOptions,
+        spare: float,
+        factor: Factor | None = None,
     ) -> Solved | None:
         """`newton.correct` in one compiled call; None where that does not go.
 
@@ -204,7 +210,7 @@ class ResponseCurve:
         """
         known, balance = self._known, self.balance
         # what it calls is compiled one by one, not all at one go
-        if known is None or not all(map(ready, known[1])):
+        if factor is not None or known is None or not all(map(ready, known[1])):
             return None
         n, high, size, groups = len(guess), balance.basis.harmonics, balance.size, len(balance.groups)
         u, tangent, lu, pivots = np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, dtype=np.int32)
@@ -225,8 +231,9 @@ class ResponseCurve:
         state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
         evaluation = ResponseEvaluation(state, self.name, self.reference)
         evaluation.__dict__["error"] = error
-        factor = Factor(lu.T, pivots, False)
-        return Solved(u, evaluation, weights, factor, int(iterations), way, contraction, tangent, sign)
+        return Solved(
+            u, evaluation, weights, Factor(lu.T, pivots, False), int(iterations), way, contraction, tangent, sign
+        )
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""

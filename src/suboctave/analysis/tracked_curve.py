@@ -15,10 +15,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from suboctave.analysis import tracked_newton
 from suboctave.analysis.tracked_matrix import bordered_by_rows, evaluate_at_once, matrix_at_once
 from suboctave.bifurcation.augmented import Augmentation, Equations
 from suboctave.continuation.kernels import bordered_transposed
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.newton import NewtonOptions, Solved
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
@@ -204,6 +206,33 @@ class TrackedCurve:
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
         return TrackedEvaluation(self, self.balance.at(x, omega, values), extra)
+
+    def corrected(
+        self,
+        guess: Array,
+        row: Array,
+        weights: Array,
+        options: NewtonOptions,
+        spare: float,
+        known: Factor | None = None,
+    ) -> Solved | None:
+        """`newton.correct` in few compiled calls; None where that does not go.
+
+        Raises
+        ------
+        ConvergenceError
+            If the iterations do not contract or run out.
+        """
+        if not tracked_newton.applies(self):
+            return None
+        found = tracked_newton.corrected(self, guess, row, weights, options, spare, known)
+        if found is None:
+            return None
+        evaluation = TrackedEvaluation(self, found.state, found.u[:0])
+        evaluation.__dict__["error"] = found.error
+        evaluation.equations.own.__dict__.update(bordered=found.bordered, gradient=found.gradient)
+        made = (found.factor, found.iterations, found.distance, found.rate, found.tangent, found.sign)
+        return Solved(found.u, evaluation, weights, *made)
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""

@@ -193,7 +193,7 @@ def evaluate_at_once(evaluation: TrackedEvaluation) -> None:
         right, left = vectors
         g = complex(right[n]) * unit
         factor = Factor(lu.T, pivots, False)
-        own.__dict__["bordered"] = Bordered(state, kind, 0.0, g, right[:n], left[:n], factor, scale)
+        own.__dict__["bordered"] = Bordered(state, kind, 0.0, g, right[:n], left[:n], scale, borders, factor)
 
 
 def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) -> Array | None:

@@ -64,7 +64,10 @@ def _resized(vector: np.ndarray, rows: int, two_sided: bool) -> np.ndarray:
 
 @dataclass(eq=False, slots=True)
 class Bordered:
-    """The scalar g of an operator at one motion, with what its gradient needs."""
+    """The scalar g of an operator at one motion, with what its gradient needs.
+
+    `known`: the factors of the bordered matrix, where there are any.
+    """
 
     state: BalanceState
     kind: Kind
@@ -72,8 +75,16 @@ class Bordered:
     g: complex
     right: np.ndarray
     left: np.ndarray
-    factor: Factor
     scale: np.ndarray
+    borders: NullVectors
+    known: Factor | None
+
+    @property
+    def factor(self) -> Factor:
+        """LU factors of the bordered matrix."""
+        if self.known is None:
+            self.known = _factorised(self.state, self.kind, self.kappa, self.borders, self.scale)
+        return self.known
 
     def gradient(self, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
         """Derivatives of g by the unknown coefficients (dimension,), by names, by kappa."""
@@ -144,19 +155,25 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
     found = _compiled(state, kind, borders)
     if found is not None:
         return found
-    matrix = operator(state, kind, kappa)
-    n = matrix.shape[0]
+    n = len(of_equations(state, kind, borders.right))
     scale = state.balance.row_weights(n)
-    left, right = of_equations(state, kind, borders.left), of_equations(state, kind, borders.right)
+    factor = _factorised(state, kind, kappa, borders, scale)
     # the operator's own size balances the bordering rows
     size = state.omega**2
-    factor = Factor.of(kernels.bordered_and_scaled(matrix, scale, left, right, size).T, overwrite=True)
-    rhs = np.zeros(n + 1, dtype=matrix.dtype)
+    rhs = np.zeros(n + 1, dtype=factor.lu.dtype)
     rhs[n] = size
     v = factor.solve(rhs)
     u = factor.solve(rhs, adjoint=True)
     # with b and c scaled by omega^2 the unknown multiplying b is g / omega^2
-    return Bordered(state, kind, kappa, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, factor, scale)
+    g = complex(v[n]) * size
+    return Bordered(state, kind, kappa, g, v[:n] * scale, u[:n] * scale, scale, borders, factor)
+
+
+def _factorised(state: BalanceState, kind: Kind, kappa: float, borders: NullVectors, scale: Array) -> Factor:
+    """The bordered matrix with weights, borders in units of omega^2."""
+    matrix = operator(state, kind, kappa)
+    left, right = of_equations(state, kind, borders.left), of_equations(state, kind, borders.right)
+    return Factor.of(kernels.bordered_and_scaled(matrix, scale, left, right, state.omega**2).T, overwrite=True)
 
 
 def _compiled(state: BalanceState, kind: Kind, borders: NullVectors) -> Bordered | None:
@@ -189,7 +206,7 @@ def _compiled(state: BalanceState, kind: Kind, borders: NullVectors) -> Bordered
         return None
     state.__dict__["jacobian" if mean else "half_jacobian"] = matrix
     factor = Factor(lu.T, pivots, False)
-    return Bordered(state, kind, 0.0, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, factor, scale)
+    return Bordered(state, kind, 0.0, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, scale, borders, factor)
 
 
 def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:

@@ -15,6 +15,8 @@ from suboctave.continuation.lapack import factorise, solve_factorised, solve_tra
 from suboctave.harmonic.evaluation import jacobian
 
 _FAST = {"reassoc", "contract", "nsz"}
+#: rows of a matrix whose factors cost more than their repeated use
+LARGE = 80
 #: most improvements of a solution with the factors of another matrix, and the change that is rounding
 _SWEEPS, _ROUNDING = 3, 1e-16
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.bifurcation.bordered_kernels import (
+    LARGE,
     augment,
     border,
     border_again,
@@ -31,9 +32,6 @@ from suboctave.harmonic.real_form import add_steps, closed_gradient
 
 #: how a search ended: solved; given up as `solve.newton` does; something that it knows more about
 SOLVED, OFF_AXIS, AWAY, STILL, UNSOLVED, OTHER, GOES_ON = 0, 1, 2, 3, 4, 5, 6
-
-#: rows of a matrix whose factors cost more than their repeated use
-_LARGE = 80
 
 
 @kernel()
@@ -149,7 +147,7 @@ def located(
             return OTHER
         square = omega * omega
         # after a short step the factors at hand tell g and its vectors in less time than new ones, of a large matrix
-        anew = m < _LARGE or iteration == 0 or previous > short
+        anew = m < LARGE or iteration == 0 or previous > short
         if (anew or border_again(matrix, scale, left, right, square, lu, pivots, v, w)) and border(
             matrix, scale, left, right, square, lu, pivots, v, w
         ):

@@ -106,9 +106,9 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    if known is None and not options.damped:
+    if not options.damped:
         at_once: Callable[..., Solved | None] | None = getattr(curve, "corrected", None)
-        solved = None if at_once is None else at_once(guess, row, weights, options, spare)
+        solved = None if at_once is None else at_once(guess, row, weights, options, spare, known)
         if solved is not None:
             return solved
     u = guess.copy()

@@ -40,8 +40,8 @@ class Curve(Protocol):
     """A curve as the engine sees it. `parameter` is the index in u of the parameter that bounds and directions refer
     to.
 
-    It may have a method `corrected(guess, row, weights, options, spare)` too, which does what `newton.correct` does at
-    once, or returns None.
+    It may have a method `corrected(guess, row, weights, options, spare, known)` too, which does what `newton.correct`
+    does at once, or returns None.
     """
 
     @property

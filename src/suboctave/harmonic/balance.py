@@ -231,21 +231,24 @@ class HarmonicBalance:
         known = self._coefficients
         if known is not None and known[0] is values:
             return known[2]
-        key = tuple(values[name] for name in self._coefficient_names)
+        key = tuple([values[name] for name in self._coefficient_names])
         found = known[2] if known is not None and known[1] == key else self._sorted_coefficients(values)
         self._coefficients = (values, key, found)
         return found
 
     def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
-        numbers, kinds = [], []
-        for i, (element, names) in enumerate(zip(self.system.elements, self._names, strict=True)):
+        laws = self._laws
+        for i, names in enumerate(self._names):
+            known = laws.get(i)
+            if known is not None and not names:
+                continue
             key = tuple([values[name] for name in names])
-            known = self._laws.get(i)
             if known is None or known[0] != key:
+                element = self.system.elements[i]
                 own = element.coefficient_values(values)
-                known = self._laws[i] = key, own, element.sampling(own)
-            numbers.append(known[1])
-            kinds.append(known[2])
+                laws[i] = key, own, element.sampling(own)
+        every = [laws[i] for i in range(len(self._names))]
+        numbers, kinds = [law[1] for law in every], [law[2] for law in every]
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
 
     @lazy

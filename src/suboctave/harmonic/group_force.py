@@ -134,7 +134,9 @@ class GroupLaw:
                 uniform.append((i, c))
                 if isinstance(kind, PolynomialSampling):
                     degree = max(degree, kind.degree)
-        total = np.array(polynomials[0] if len(polynomials) == 1 else _added(polynomials), dtype=float)
+        total = _NONE
+        if polynomials:
+            total = np.array(polynomials[0] if len(polynomials) == 1 else _added(polynomials), dtype=float)
         return cls(
             np.array(pieces, dtype=float) if pieces else _NO_ROWS,
             total,

@@ -20,8 +20,9 @@ from suboctave.harmonic.arctangent import add_step, arctangent
 from suboctave.harmonic.group_kernels import add_pair
 from suboctave.harmonic.instants import _jet, crossings_of
 from suboctave.harmonic.kernels import contact_spectrum, motion, product_spectrum
+from suboctave.harmonic.sharp_nodes import sharp_nodes
 
-__all__ = ["change_of_pieces", "change_of_steps"]
+__all__ = ["add_changes", "change_of_pieces", "change_of_steps"]
 
 
 @kernel()
@@ -97,3 +98,40 @@ def change_of_steps(sampled, steps, line, force, stiffness):
                 ratio = (u[j] - point) / width
                 f[j] -= 0.5 * step / math.pi * by_width * math.log1p(ratio * ratio)
     add_pair(f, f_u, weights, zr, zi, force, stiffness)
+
+
+@kernel()
+def add_changes(
+    motions, pieces, first, steps, step_first, line, grid, noted, points, widths, places, rule_nodes, rule_weights,
+    force, stiffness,
+):  # fmt: skip
+    """Add what a parameter does to the laws along all directions to the spectra of force and stiffness (G, top + 1).
+
+    Parameters
+    ----------
+    motions, grid
+        As in `evaluation.evaluate`.
+    pieces, first, steps, step_first, line
+        `changes.PackedChanges`; None for no pieces, and for no steps.
+    noted
+        The nodes of the only direction that has steps, or an array without nodes, (4, 0).
+    points, widths, places, rule_nodes, rule_weights
+        Places and widths of all steps, where each direction's begin, and the nodes' rule, as in
+        `evaluation.evaluate_told`.
+    """
+    degree = force.shape[1] + motions.shape[1] - 2
+    # not a literal, for which the nodes would be compiled once more
+    moving = degree < 0
+    for g in range(motions.shape[0]):
+        c = motions[g]
+        if pieces is not None and first[g + 1] > first[g]:
+            change_of_pieces(c, pieces[first[g] : first[g + 1]], grid[0], grid[1], force[g], stiffness[g])
+        if steps is not None and step_first[g + 1] > step_first[g]:
+            low, high = places[g], places[g + 1]
+            if noted.shape[1] > 0:
+                sampled = noted
+            else:
+                sampled = sharp_nodes(
+                    c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
+                )
+            change_of_steps(sampled, steps[step_first[g] : step_first[g + 1]], line[g], force[g], stiffness[g])

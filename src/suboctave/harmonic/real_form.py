@@ -159,7 +159,7 @@ def toeplitz_part(left, right, mean, dofs, shape, spectrum):
 
 
 @kernel()
-def _linear_rates(left, right, mean, multiples, omega, matrices):
+def linear_rates(left, right, mean, multiples, omega, matrices):
     """Derivatives of the linear part of the form by omega, and by kappa (its imaginary part, the real one is zero)."""
     n = left.shape[1]
     by_omega = by_kappa = 0.0
@@ -224,7 +224,7 @@ def noted_gradient(
                     c, points[low:high], widths[low:high], degree, moving, grid[0], grid[1], rule_nodes, rule_weights
                 )
             add_steps(left, right, mean, at, along, sampled, steps[low:high], gx)
-    return _linear_rates(left, right, mean, multiples, omega, matrices)
+    return linear_rates(left, right, mean, multiples, omega, matrices)
 
 
 @kernel()
@@ -298,7 +298,7 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
             return gx, by_omega, 1j * by_kappa
     for group, zr, zi, second in _second(state):
         _add_group(u, v, mean, group.dofs, group.values, zr, zi, second, gx)
-    by_omega, by_kappa = _linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
+    by_omega, by_kappa = linear_rates(u, v, mean, multiples, state.omega, linear.matrices)
     return gx, by_omega, 1j * by_kappa
 
 
@@ -319,7 +319,7 @@ def by_kappa(state: BalanceState, mean: bool, left: Array, right: Array) -> comp
     assert isinstance(state.linear, StructuralMatrices)
     u, v = (np.ascontiguousarray(one).reshape(-1, state.balance.size) for one in (left, right))
     multiples = state.basis.multiples if mean else state.basis.half_multiples
-    return 1j * float(_linear_rates(u, v, mean, multiples, state.omega, state.linear.matrices)[1])
+    return 1j * float(linear_rates(u, v, mean, multiples, state.omega, state.linear.matrices)[1])
 
 
 __all__ = [

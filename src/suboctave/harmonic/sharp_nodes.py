@@ -24,9 +24,11 @@ from suboctave.harmonic.kernels import displacement, slope
 #: nodes of the Gauss-Legendre rules in the tables, from 0 to this
 ORDERS = 64
 #: phase (highest harmonic times length) of plain panels, of the pieces next to a singularity, and of those that follow
-_PLAIN, _NEAR, _FAR = 28.0, 4.0, 28.0
+_PLAIN, _NEAR, _NEXT = 56.0, 4.0, 28.0
+#: longest piece: sines and cosines of its half are known by their series to rounding
+_LONGEST = 1.2
 #: a singularity this far from the axis, in half-lengths of a plain panel, does not disturb it
-_HARMLESS = 0.75
+_HARMLESS = 1.3
 _FAST = {"reassoc", "contract", "nsz"}
 #: coefficients of the series of sine and cosine
 _S2, _S3, _S4, _S5, _S6, _S7, _S8 = -1 / 2, -1 / 6, 1 / 24, 1 / 120, -1 / 720, -1 / 5040, 1 / 40320
@@ -154,12 +156,13 @@ def singular_instants(c, points, widths, reach, zr, zi):
 def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, nodes, weights, offset):
     """Append the nodes of one piece, offsets (first, last) from `centre` in the direction `sign`; returns the count."""
     if plain:
-        orders = math.ceil(8.0 + 0.42 * phase)
+        # in a short one the law may still be singular as close by as in a long one
+        orders = max(20, math.ceil(8.0 + 0.36 * phase))
         low, high = first, last
     else:
         low, high = math.asinh(first / distance), math.asinh(last / distance)
         t = high - low
-        orders = math.ceil(8.0 + 2.8 * t**0.8 if first == 0.0 else 7.0 + 0.45 * phase + 3.0 * t)
+        orders = math.ceil(8.0 + 2.8 * t**0.8 if first == 0.0 else 7.0 + 0.4 * phase + 3.0 * t)
     orders = min(max(orders, 7), ORDERS)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     origin = 0.5 * (first + last)
@@ -233,9 +236,9 @@ def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
     nodes, weights
         `tables()`.
     """
-    panel = _PLAIN / degree
+    panel = min(_PLAIN / degree, _LONGEST)
     at = singular_instants(c, points, widths, 0.5 * _HARMLESS * panel, zr, zi)
-    number = at.shape[1]
+    near, number = min(_NEAR / degree, _LONGEST), at.shape[1]
     intervals = max(1, 2 * number)
     capacity = ORDERS * (8 + 3 * intervals + math.ceil(2.0 * math.pi / panel))
     out_r, out_i, w = np.empty(capacity), np.empty(capacity), np.empty(capacity)
@@ -256,7 +259,9 @@ def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
         done = 0.0
         while done < length * (1.0 - 1e-15):
             # far from the singularity, in units of its own length, a piece needs no map
-            piece = _NEAR / degree if done == 0.0 and number > 0 else _FAR / degree
+            piece = panel
+            if number > 0 and done < 1.5 * near:
+                piece = near if done == 0.0 else min(_NEXT / degree, _LONGEST)
             plain = number == 0 or done > 0.5 * piece
             if done + 1.3 * piece >= length:
                 piece = length - done

@@ -1,0 +1,213 @@
+"""Newton's method for a point of a curve of limit points or period doublings, two compiled calls an iteration.
+
+What `continuation.newton.correct` does step by step, for the common case: omega and one parameter of loads or laws are
+free, the structure has matrices of its own, and all laws are known in closed form. There the calls would cost more than
+what they do. Only what the laws and the load are at an iterate's parameter is asked for in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from suboctave.analysis.tracked_iteration import (
+    ANEW,
+    BORDERED,
+    ERROR,
+    FACTORS,
+    GIVEN,
+    ITERATION,
+    LAST,
+    MOVED,
+    PREVIOUS,
+    RATE,
+    SOLVED,
+    UNSOLVED,
+    WAY,
+    differentiated,
+    looked_at,
+)
+from suboctave.analysis.tracked_matrix import bordered_by_rows
+from suboctave.bifurcation.augmented import SingularOperator
+from suboctave.bifurcation.bordered import Bordered
+from suboctave.bifurcation.bordered_kernels import border
+from suboctave.compiled import ready
+from suboctave.continuation.linear import Factor
+from suboctave.continuation.newton import NewtonOptions, not_converged
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.changes import packed_changes
+from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian, told_steps
+from suboctave.harmonic.group_force import PackedLaws
+from suboctave.harmonic.group_kernels import add_along, add_pieces
+from suboctave.harmonic.law_changes import change_of_pieces, change_of_steps
+from suboctave.harmonic.linear_part import StructuralMatrices
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.real_form import closed_parts, noted_gradient, toeplitz_part
+from suboctave.harmonic.state import BalanceState
+
+if TYPE_CHECKING:
+    from suboctave.analysis.tracked_curve import TrackedCurve
+
+#: the kinds of laws for which all kernels that are called are compiled
+_COMPILED: set[tuple[bool, ...]] = set()
+_NO_NODES = np.empty((4, 0))
+
+
+def _at_hand(packed: PackedLaws, pieces: bool, steps: bool) -> bool:
+    """Whether all kernels that are called are compiled: one by one, not all at one go."""
+    asked = packed.sampled, packed.told, len(packed.pieces) > 0, packed.polynomial.shape[1] > 2, pieces, steps
+    if asked not in _COMPILED:
+        called = closed_parts(packed)
+        own: list[Callable[..., Any]] = [evaluate, jacobian, border, noted_gradient, toeplitz_part, add_along]
+        kinds = (evaluate_noting, packed.told), (add_pieces, len(packed.pieces))
+        changes = (change_of_pieces, pieces), (change_of_steps, steps)
+        own += [bordered_by_rows, *(part for part, needed in kinds + changes if needed)]
+        if called is None or not all(map(ready, called + own)):
+            return False
+        _COMPILED.add(asked)
+    return True
+
+
+def applies(curve: TrackedCurve) -> bool:
+    """Whether the common case is that of a curve, whatever its laws."""
+    balance, names, own = curve.balance, curve.names, curve.augmentation
+    if type(own) is not SingularOperator or own.kind is Kind.FREE or len(names) != 2 or names[0] != "omega":
+        return False
+    plain = balance.steady and balance.basis.kept is None and names[1] not in balance.matrix_names
+    return plain and isinstance(balance.linear, StructuralMatrices)
+
+
+class Corrected(NamedTuple):
+    """A solved point: its motion, g with its gradient as `SingularEquations` has them, and what makes a `Solved`."""
+
+    u: Array
+    state: BalanceState
+    error: float
+    bordered: Bordered
+    gradient: tuple[Array, dict[str, complex], complex]
+    factor: Factor
+    iterations: int
+    distance: float
+    rate: float
+    tangent: Array
+    sign: float
+
+
+def corrected(
+    curve: TrackedCurve,
+    guess: Array,
+    row: Array,
+    weights: Array,
+    options: NewtonOptions,
+    spare: float,
+    known: Factor | None,
+) -> Corrected | None:
+    """`newton.correct` of a curve to which this `applies`; None where its laws are others.
+
+    Raises
+    ------
+    ConvergenceError
+        If the iterations do not contract or run out.
+    """
+    balance, own, name = curve.balance, curve.augmentation, curve.names[1]
+    assert isinstance(own, SingularOperator)
+    assert isinstance(balance.linear, StructuralMatrices)
+    basis, mean, borders = balance.basis, own.kind is Kind.INTEGER, own.borders
+    n, high, size, groups, m = len(guess), basis.harmonics, balance.size, len(balance.groups), len(borders.right)
+    frequencies, scale = (basis.multiples if mean else basis.half_multiples), balance.row_weights(m)
+    u, tangent, numbers = guess.copy(), np.empty(n), np.empty(3)
+    memo = np.zeros(10)
+    memo[PREVIOUS] = np.inf
+    if known is None:
+        lu, pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
+    else:
+        lu, pivots = known.lu.T, known.pivots
+        memo[WAY], memo[FACTORS], memo[GIVEN] = np.inf, 1.0, 1.0
+    blocks, motions = np.empty((high + 1, size, size), dtype=complex), np.empty((groups, high + 1), dtype=complex)
+    table, parts = np.empty((3, groups, balance.top + 1), dtype=complex), np.empty((3, 2 * high + 1, size))
+    operator, vectors = np.empty((m, m)), np.empty((2, m + 1))
+    border_lu, border_pivots = np.empty((m + 1, m + 1)), np.empty(m + 1, dtype=np.int32)
+    sizes, gx, rates = np.empty(4), np.empty((2 * high + 1, size)), np.empty(3)
+    limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
+    same = (guess, row, weights)
+    of = (own.unit, curve.force, mean, frequencies, basis.nu, balance.moving)
+    linear = (basis.multiples, balance.linear.matrices)
+    loaded = name in balance.load_names
+    while True:
+        values = {**balance.values, name: float(u[-1])}
+        packed, nodes = balance.packed_laws(values)
+        if packed.sampled and not packed.told:
+            return None
+        if not _at_hand(packed, False, False):
+            return None
+        told = told_steps(packed) if packed.told else (None,) * 7
+        pieces = packed.pieces if len(packed.pieces) else None
+        laws = (*balance.directions, pieces, packed.first, packed.polynomial, balance.grid, nodes)
+        load = (balance.load(values, float(u[-2])), balance.scales()[1])
+        filled = (blocks, table, motions, parts, sizes, operator, border_lu, border_pivots, vectors, numbers)
+        factors = (memo, lu, pivots, tangent)
+        found = (borders.left, borders.right, *of, scale, *linear, *laws, *load, *told, *filled)
+        ended, sampled = looked_at(u, *same, limits, *factors, *found)
+        if ended in (ANEW, LAST):
+            change = packed_changes(balance, values, name)
+            if change is None or not _at_hand(packed, len(change.pieces) > 0, len(change.steps) > 0):
+                return None
+            if memo[GIVEN] and memo[FACTORS]:
+                # the factors given are those of another point
+                lu, pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
+                factors = (memo, lu, pivots, tangent)
+            by_load = np.zeros(parts.shape[1:])
+            if loaded:
+                by_load -= balance.loads.value({**values, "omega": float(u[-2])}, size, (name,))
+            changed = change.pieces if len(change.pieces) else None
+            moved_steps = change.steps if len(change.steps) else None
+            changes = (changed, change.first, moved_steps, change.step_first, change.line)
+            only = packed.told and _only_direction(packed)
+            rest = (sampled if only else _NO_NODES, *changes, by_load, motions, table, parts, vectors)
+            given = (*factors, *of, *linear, *laws, *told, *rest, gx, rates, numbers)
+            ended = differentiated(ended == LAST, u, *same, *given)
+        if ended == MOVED:
+            continue
+        if ended == SOLVED:
+            break
+        if ended == UNSOLVED:
+            raise not_converged(curve, guess, float(memo[ERROR]), int(memo[ITERATION]))
+        return None
+    x, omega = u[:-2].reshape(parts.shape[1:]), float(u[-2])
+    state = BalanceState(balance, balance.linear, x, omega, values)
+    state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
+    state.__dict__["jacobian" if mean else "half_jacobian"] = operator
+    if packed.told:
+        state.__dict__["_told_nodes"] = int(packed.step_owner[-1]), sampled
+    way, sign, by_kappa = numbers.tolist()
+    g = complex(float(vectors[0, m]) * omega**2)
+    right, left, factor = (
+        vectors[0, :m],
+        vectors[1, :m],
+        Factor(border_lu.T, border_pivots, False) if memo[BORDERED] else None,
+    )
+    by_omega, by_name, _ = (-rates).tolist()
+    return Corrected(
+        u,
+        state,
+        float(memo[ERROR]),
+        Bordered(state, own.kind, 0.0, g, right, left, scale, borders, factor),
+        (-gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, -1j * by_kappa),
+        Factor(lu.T, pivots, False),
+        int(memo[ITERATION]),
+        way,
+        float(memo[RATE]),
+        tangent,
+        sign,
+    )
+
+
+def _only_direction(packed: PackedLaws) -> bool:
+    """Whether all arctan steps act along one direction."""
+    last = int(packed.step_owner[-1])
+    return len(packed.steps) == packed.step_first[last + 1] - packed.step_first[last]
+
+
+__all__ = ["applies", "corrected"]
