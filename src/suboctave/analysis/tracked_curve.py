@@ -105,7 +105,8 @@ class TrackedEvaluation:
             found: Array = bordered_transposed(self.jacobian, row, weights)
             return found
         others = np.array([state.residual_by(name) for name in names[1:]])
-        return bordered_by_rows(
+        found = np.empty((len(weights), len(weights)))
+        bordered_by_rows(
             state.spectra_table,
             balance.moving,
             state.rate,
@@ -119,7 +120,9 @@ class TrackedEvaluation:
             self.curve.force,
             row,
             weights,
+            found,
         )
+        return found
 
     def takes_over(self, other: Evaluation) -> bool:
         """See `Evaluation`."""
@@ -293,9 +296,11 @@ class TrackedCurve:
 
     def transfer(self, u: Array, origin: Curve) -> Array:
         """See `Curve.transfer`."""
+        if origin is self:
+            return u
         assert isinstance(origin, TrackedCurve)
-        basis = origin.balance.basis
-        if origin is self or basis == self.balance.basis:
+        basis, own = origin.balance.basis, self.balance.basis
+        if basis is own or basis == own:
             return u
         n = origin.balance.dimension
         x = u[:n].reshape(basis.size, -1)

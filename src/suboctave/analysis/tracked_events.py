@@ -301,7 +301,7 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             start = replace(start, arclength=sample.point.arclength)
             near = TrackedSample(start)
             test = found.test.within(near, near)
-            sample = zero_along(start, test.value, newton, _BESIDE, found.slope)
+            sample = zero_along(start, test.value, newton, _BESIDE, found.slope, factor=start.factor)
         except ConvergenceError as failure:
             warnings.append(
                 f"{found.test.kind} near {curve.where(sample.point.u)} was located with "

@@ -219,14 +219,11 @@ def differentiated(
     for r in range(gx.shape[0]):
         for i in range(size):
             gx[r, i] = 0.0
-    found = gradient_and_matrix(
+    gradient_and_matrix(
         left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
         step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, omega / nu,
-        multiples, x, spectra[0], spectra[1], by_load, unit, force, row, weights, gx, rates,
+        multiples, x, spectra[0], spectra[1], by_load, unit, force, row, weights, gx, rates, lu,
     )  # fmt: skip
-    for i in range(lu.shape[0]):
-        for j in range(lu.shape[1]):
-            lu[i, j] = found[i, j]
     if factorise(lu, pivots):
         return OTHER
     memo[FACTORS], memo[WAY] = 1.0, 0.0

@@ -35,7 +35,7 @@ _DIFFERENTIATED: set[tuple[bool, ...]] = set()
 
 @kernel()
 def bordered_by_rows(
-    table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, others, rows, force, row, weights
+    table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, others, rows, force, row, weights, out
 ):
     """Transpose of `[R_u; force G_u; row]`, columns of the first two over `weights`, for u = (X, extra, omega, others).
 
@@ -49,13 +49,14 @@ def bordered_by_rows(
         Derivatives of the scalar equations by u, and their unit.
     row
         The last row.
+    out
+        Filled, (N, N) for N entries of u.
     """
     n, last, count = x.shape[0] * x.shape[1], weights.shape[0] - 1, others.shape[0]
     extended = np.zeros((n, n + 1))
     # not a literal, for which the Jacobian would be compiled once more
     mean = n > 0
     jacobian(extended, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x)
-    out = np.empty((last + 1, last + 1))
     for j in range(last + 1):
         scale = 1.0 / weights[j]
         for i in range(n):
@@ -71,7 +72,6 @@ def bordered_by_rows(
         for r in range(rows.shape[0]):
             out[j, n + r] = rows[r, j] * force * scale
         out[j, last] = row[j]
-    return out
 
 
 @kernel()
@@ -113,7 +113,7 @@ def gradient_and_matrix(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
     step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, rate,
     multiples, x,
-    force_by, stiffness_by, other, unit, force, row, weights, gx, rates,
+    force_by, stiffness_by, other, unit, force, row, weights, gx, rates, out,
 ):  # fmt: skip
     """`bordered_by_rows` for u = (X, omega, a parameter) with the gradient of g.
 
@@ -127,8 +127,9 @@ def gradient_and_matrix(
         R differentiated by the parameter without that, (2 H + 1, n).
     unit, force
         Units of g, and of its row.
-    gx, rates
-        Filled: minus the gradient by X, zeros before; that by omega, by the parameter, by kappa (imaginary part), (3,).
+    gx, rates, out
+        Filled: minus the gradient by X, zeros before; that by omega, by the parameter, by kappa (imaginary part), (3,);
+        the matrix.
     """
     rates[0], rates[2] = noted_gradient(
         left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
@@ -143,9 +144,9 @@ def gradient_and_matrix(
     rows = np.empty((1, n + 2))
     rows[0, :n] = gx.ravel()
     rows[0, n], rows[0, n + 1] = rates[0], rates[1]
-    return bordered_by_rows(
+    bordered_by_rows(
         table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, other.ravel().reshape((1, n)), rows,
-        -force / unit, row, weights,
+        -force / unit, row, weights, out,
     )  # fmt: skip
 
 
@@ -234,7 +235,8 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
     whole = (linear.matrices, state.spectra_table, balance.moving, state.rate, basis.multiples, state.x)
     changed = (force_by, stiffness_by, other)
     units = (equations.of.unit, evaluation.curve.force, row, weights)
-    found: Array = gradient_and_matrix(*(*form, *whole, *changed, *units, gx, rates))
+    found = np.empty((len(weights), len(weights)))
+    gradient_and_matrix(*(*form, *whole, *changed, *units, gx, rates, found))
     by_omega, by_name, by_kappa = (-rates).tolist()
     equations.__dict__["gradient"] = -gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, 1j * by_kappa
     return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -35,6 +36,9 @@ _NOTHING = 1e-9
 BEGINNING = 1e-5
 #: way along a curve, in scaled arclength, that a zero may still be off by the last secant, and the first secant's least
 _AT_ZERO, _SECANT = 1e-10, 1e-6
+#: way along the tangent that leads no further off the curve than rounding, and its product with the secant's length
+#: from which on what the secant leaves is less than that
+_STRAIGHT, _SURE = 1e-7, 1e-13
 
 
 class TrackedSample:
@@ -254,10 +258,12 @@ def zero_along(
     reach: float,
     slope: float = 0.0,
     iterations: int = 12,
+    factor: Factor | None = None,
 ) -> TrackedSample:
     """The zero of a function along a curve near one of its points, by secants in arclength.
 
-    `slope`: about the derivative of the function by arclength, 0 if that is not known.
+    `slope`: about the derivative of the function by arclength, 0 if that is not known; `factor`: that of the start,
+    if it was solved with about its tangent.
 
     Raises
     ------
@@ -273,7 +279,6 @@ def zero_along(
     s, old = math.copysign(min(max(abs(step), _SECANT), 0.02 * reach), step), 0.0
     guess = start.u + s * row / weights
     before = start.u
-    factor: Factor | None = None
     for _ in range(iterations):
         solved = correct(curve, guess, row, weights, newton, factor)
         factor = solved.factor
@@ -284,12 +289,25 @@ def zero_along(
         change = value * (s - old) / (value - value_old) if value != 0.0 else 0.0
         if abs(change) < _AT_ZERO:
             return sample
+        if abs(change) < _STRAIGHT and abs(change * (s - old)) < _SURE:
+            last = _beside(sample.point, -change, newton)
+            if last is not None:
+                return last
         # on the straight line through the last two, in the plane that belongs to the next
         guess = solved.u - change * (solved.u - before) / (s - old)
         s, old, value_old, before = s - change, s, value, solved.u
         if abs(s) > reach:
             break
     raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")
+
+
+def _beside(point: CurvePoint, way: float, newton: NewtonOptions) -> TrackedSample | None:
+    """The point so little further along a curve that its tangent leads there; None if it is no solution."""
+    u = point.u + way * point.tangent
+    evaluation = point.curve.evaluate(u)
+    if evaluation.error > newton.tolerance:
+        return None
+    return TrackedSample(replace(point, u=u, evaluation=evaluation, arclength=point.arclength + way))
 
 
 __all__ = ["BEGINNING", "TrackedSample", "nearest_point", "null_row", "same_discretisation", "zero_along"]

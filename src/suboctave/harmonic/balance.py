@@ -219,7 +219,7 @@ class HarmonicBalance:
         """Load coefficients P, shape (2 H + 1, size)."""
         if values is self.values and "omega" not in self.load_names:
             return self._own_load
-        key = tuple(omega if n == "omega" else values[n] for n in self._load_order)
+        key = tuple([omega if n == "omega" else values[n] for n in self._load_order])
         if self._load_cache is None or self._load_cache[0] != key:
             self._load_cache = (key, self.loads.value({**values, "omega": omega}, self.size))
         return self._load_cache[1]

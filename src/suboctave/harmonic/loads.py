@@ -22,6 +22,8 @@ class LoadSpectrum:
         self.basis = basis
         self.size = len(shapes[0]) if shapes else 0
         self.components = list(zip(system.load_components(), shapes, strict=True))
+        #: of those with a constant phase
+        self._units = [_unit(c, {}) if c.phase.constant else None for c, _ in self.components]
         for component, _ in self.components:
             if component.harmonic * basis.nu > basis.harmonics:
                 raise InputError(
@@ -34,9 +36,9 @@ class LoadSpectrum:
     def value(self, values: Mapping[str, float], size: int, names: tuple[str, ...] = ()) -> Array:
         """Coefficients (2 H + 1, size), differentiated by each of `names` (at most two; "omega" is one of them)."""
         result = np.zeros((self.basis.size, size))
-        for component, shape in self.components:
+        for (component, shape), unit in zip(self.components, self._units, strict=True):
             if not names:
-                wave = _wave(component, values)
+                wave = component.amplitude.value(values) * (_unit(component, values) if unit is None else unit)
             else:
                 touched = component.amplitude.names | component.phase.names
                 if not touched.issuperset(names):
@@ -53,17 +55,15 @@ class LoadSpectrum:
         return result
 
 
-def _wave(component, values: Mapping[str, float]) -> complex:
-    return component.amplitude.value(values) * complex(*_unit(component.phase.value(values)))
-
-
-def _unit(angle: float) -> tuple[float, float]:
-    return math.cos(angle), math.sin(angle)
+def _unit(component, values: Mapping[str, float]) -> complex:
+    """`exp(i phase)`."""
+    angle = component.phase.value(values)
+    return complex(math.cos(angle), math.sin(angle))
 
 
 def _wave_derivative(component, values: Mapping[str, float], names: tuple[str, ...]) -> complex:
     """Derivative of `a exp(i phase)` by one or two names (product and chain rule)."""
-    unit = complex(*_unit(component.phase.value(values)))
+    unit = _unit(component, values)
     a = component.amplitude
 
     def d(coefficient, *by: str) -> float:
