@@ -37,7 +37,6 @@ from suboctave.compiled import ready
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import NewtonOptions, not_converged
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.changes import packed_changes
 from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian, told_steps
 from suboctave.harmonic.group_force import PackedLaws
 from suboctave.harmonic.group_kernels import add_along, add_pieces
@@ -131,36 +130,41 @@ def corrected(
     border_lu, border_pivots = np.empty((m + 1, m + 1)), np.empty(m + 1, dtype=np.int32)
     sizes, gx, rates = np.empty(4), np.empty((2 * high + 1, size)), np.empty(3)
     limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
-    same = (guess, row, weights)
+    same, weight = (guess, row, weights), balance.scales()[1]
     of = (own.unit, curve.force, mean, frequencies, basis.nu, balance.moving)
     linear = (basis.multiples, balance.linear.matrices)
-    loaded = name in balance.load_names
+    along, nodes = balance.laws_along(name), balance.packed_laws(balance.values)[1]
+    if along is None:
+        return None
+    loaded, rate = name in balance.load_names, balance.load_rate(name)
     while True:
         values = {**balance.values, name: float(u[-1])}
-        packed, nodes = balance.packed_laws(values)
-        if packed.sampled and not packed.told:
-            return None
+        packed = along.at(values)
         if not _at_hand(packed, False, False):
             return None
         told = told_steps(packed) if packed.told else (None,) * 7
         pieces = packed.pieces if len(packed.pieces) else None
         laws = (*balance.directions, pieces, packed.first, packed.polynomial, balance.grid, nodes)
-        load = (balance.load(values, float(u[-2])), balance.scales()[1])
+        if rate is None or not loaded:
+            load = balance.load(values if loaded else balance.values, float(u[-2]))
+        else:
+            load = balance.load(balance.values, 0.0) + (values[name] - balance.values[name]) * rate
         filled = (blocks, table, motions, parts, sizes, operator, border_lu, border_pivots, vectors, numbers)
         factors = (memo, lu, pivots, tangent)
-        found = (borders.left, borders.right, *of, scale, *linear, *laws, *load, *told, *filled)
+        found = (borders.left, borders.right, *of, scale, *linear, *laws, load, weight, *told, *filled)
         ended, sampled = looked_at(u, *same, limits, *factors, *found)
         if ended in (ANEW, LAST):
-            change = packed_changes(balance, values, name)
+            change = along.changes(values)
             if change is None or not _at_hand(packed, len(change.pieces) > 0, len(change.steps) > 0):
                 return None
             if memo[GIVEN] and memo[FACTORS]:
                 # the factors given are those of another point
                 lu, pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
                 factors = (memo, lu, pivots, tangent)
-            by_load = np.zeros(parts.shape[1:])
-            if loaded:
-                by_load -= balance.loads.value({**values, "omega": float(u[-2])}, size, (name,))
+            if rate is None:
+                by_load = -balance.loads.value({**values, "omega": float(u[-2])}, size, (name,))
+            else:
+                by_load = -rate
             changed = change.pieces if len(change.pieces) else None
             moved_steps = change.steps if len(change.steps) else None
             changes = (changed, change.first, moved_steps, change.step_first, change.line)

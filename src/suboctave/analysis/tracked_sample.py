@@ -303,7 +303,11 @@ def zero_along(
 
 def _beside(point: CurvePoint, way: float, newton: NewtonOptions) -> TrackedSample | None:
     """The point so little further along a curve that its tangent leads there; None if it is no solution."""
-    u = point.u + way * point.tangent
+    factor, evaluation = point.factor, point.evaluation
+    if factor is None or factor.singular:
+        return None
+    missing: np.ndarray = factor.solve(np.append(evaluation.residual, 0.0)) / point.weights
+    u = point.u - missing + way * point.tangent
     evaluation = point.curve.evaluate(u)
     if evaluation.error > newton.tolerance:
         return None

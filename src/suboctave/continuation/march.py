@@ -79,13 +79,15 @@ class _Place:
         w, own = new.weights, self.point
         step = kernels.distance(new.u, point.u, w)
         index = new.curve.parameter
-        # all images have the same parameters
-        here, reach = new.u[index], 1.5 * step / w[index]
-        if abs(here - own.parameter) > reach:
-            return None
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
         images = self._images[1]
+        here, reach = new.u[index], 1.5 * step / w[index]
+        for image in images:
+            if abs(here - image[index]) <= reach:
+                break
+        else:
+            return None
         heading = new.curve.transfer(own.tangent, own.curve)
         for image, leaving in zip(images, new.curve.images(heading), strict=True):
             from_point, to_new = w * (image - point.u), w * (new.u - image)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.changing_laws import ChangingLaws
 from suboctave.harmonic.group_force import Group, GroupLaw, PackedLaws
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
@@ -113,6 +114,8 @@ class HarmonicBalance:
         self.dimension = self.size * basis.count
         self.loads = LoadSpectrum(self.system, basis, self._load_shapes)
         self._load_cache: tuple[tuple, Array] | None = None
+        self._load_rates: dict[str, Array | None] = {}
+        self._laws_along: dict[str, ChangingLaws | None] = {}
         self._coefficients: (
             tuple[Mapping[str, float], tuple, tuple[list[Array], list[Sampling], list[GroupLaw]]] | None
         ) = None
@@ -224,6 +227,12 @@ class HarmonicBalance:
             self._load_cache = (key, self.loads.value({**values, "omega": omega}, self.size))
         return self._load_cache[1]
 
+    def load_rate(self, name: str) -> Array | None:
+        """P differentiated by a parameter, shape (2 H + 1, size), None if it depends on parameters or omega."""
+        if name not in self._load_rates:
+            self._load_rates[name] = self.loads.constant_rate(name, self.size)
+        return self._load_rates[name]
+
     def coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
         """Coefficient values of every element, what it tells of its law at them, and that sorted by groups."""
         if values is self.values:
@@ -263,6 +272,12 @@ class HarmonicBalance:
             found = PackedLaws.of(laws)
             self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
         return self._packed[1]
+
+    def laws_along(self, name: str) -> ChangingLaws | None:
+        """The laws as a parameter changes, None where they are not packed with what it does to them."""
+        if name not in self._laws_along:
+            self._laws_along[name] = ChangingLaws.of(self, name)
+        return self._laws_along[name]
 
     def changing(self, name: str) -> list[tuple[int, dict[int, Array | None]]]:
         """The directions along which a parameter changes forces, with the elements that have it in a coefficient; their

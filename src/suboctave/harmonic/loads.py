@@ -54,6 +54,15 @@ class LoadSpectrum:
                     result[2 * k] -= wave.imag * shape
         return result
 
+    def constant_rate(self, name: str, size: int) -> Array | None:
+        """The derivative by a parameter (2 H + 1, size), None if it depends on parameters or omega."""
+        for component, _ in self.components:
+            turned = name in component.phase.names
+            touched = name in component.amplitude.names
+            if turned or (touched and not (component.phase.constant and component.amplitude.derivative(name).constant)):
+                return None
+        return self.value({}, size, (name,))
+
 
 def _unit(component, values: Mapping[str, float]) -> complex:
     """`exp(i phase)`."""
@@ -74,7 +83,7 @@ def _wave_derivative(component, values: Mapping[str, float], names: tuple[str, .
     phi = component.phase
     if len(names) == 1:
         (x,) = names
-        return unit * (d(a, x) + 1j * a.value(values) * d(phi, x))
+        return unit * (d(a, x) + (1j * a.value(values) * d(phi, x) if x in phi.names else 0.0))
     x, y = names
     total = d(a, x, y) + 1j * a.value(values) * d(phi, x, y) - a.value(values) * d(phi, x) * d(phi, y)
     total += sum(1j * d(a, p) * d(phi, q) for p, q in itertools.permutations((x, y)))
