@@ -56,7 +56,7 @@ EVERY += [(case, names[0], 0.0) for case, (*_, names) in CASES.items()]
 @cache
 def located(case):
     make, bounds, kind, _ = CASES[case]
-    return so.frequency_response(make(), bounds).bifurcations[kind][0]
+    return so.frequency_response(make(), bounds, 15).bifurcations[kind][0]
 
 
 @cache
@@ -77,7 +77,7 @@ def places(case, name):
         so.track(item, name, (0.9 * value, 1.1 * value))
     finally:
         patch.undo()
-    return met[2 :: max(1, len(met) // 4)]
+    return met[2 :: max(1, len(met) // 3)]
 
 
 def generally(monkeypatch):

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.harmonic import law_changes
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.changes import changes_by
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, form_rates, operator
+from suboctave.harmonic.quadrature import rule_tables
 from suboctave.harmonic.third import third_derivative
 
 NAMES = ("k", "gap", "s", "load")
@@ -20,7 +23,7 @@ def state(request):
         so.ElasticStop(dof=(0, 1), stiffness="k", gap="gap", side="right", regularization="s"),
         so.ElasticStop(dof=(0, 1), stiffness="2*k", gap=-0.5, side="left", regularization=30.0),
         so.ElasticStop(dof=1, stiffness="k", gap="2*gap", side="right", regularization="s"),
-        so.PolynomialSpring(dof=(0, 1), coefficients={3: "k*gap"}),
+        so.PolynomialSpring(dof=(0, 1), coefficients={3: "15*gap**2"}),
         so.Freeplay(dof=0, stiffness="k", gap="gap", regularization="s"),
         so.ElasticStop(dof=0, stiffness="k", gap="2*gap", side="right"),
         so.ElasticStop(dof=(0, 1), stiffness="k*gap", gap="-gap", side="left"),
@@ -52,6 +55,34 @@ def _difference(state, name, value, h=1e-5):
 def test_residual_by_parameters(state, name):
     expected = _difference(state, name, lambda moved: moved.residual.copy())
     assert state.residual_by(name) == pytest.approx(expected, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["k", "s", "load"])
+def test_packed_as_one_parameter_changes(state, name):
+    """The laws are those of the whole set of values, bit by bit, and change by as much as they do."""
+    balance = state.balance
+    along = balance.laws_along(name)
+    for factor in (1.3, 0.8, 1.0):
+        values = {**state.values, name: factor * state.values[name]}
+        packed, expected = along.at(values), balance.packed_laws(values)[0]
+        for one, other in zip(packed, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+        changes, there = along.changes(values), balance.at(state.x, state.omega, values)
+        spectra = np.zeros((2, len(balance.groups), balance.top + 1), dtype=complex)
+        law_changes.add_changes(
+            there.motions, changes.pieces, changes.first, changes.steps, changes.step_first, changes.line,
+            balance.grid, np.empty((4, 0)), *packed.places, packed.step_first, *rule_tables(), *spectra,
+        )  # fmt: skip
+        known = {id(group): change for group, change in changes_by(there, name)}
+        for g, group in enumerate(balance.groups):
+            change = known.get(id(group))
+            for one, of in zip(spectra[:, g], ("force", "stiffness"), strict=True):
+                other = np.zeros(balance.top + 1) if change is None else getattr(change, of)
+                np.testing.assert_allclose(one, other, atol=1e-12 * max(1.0, np.abs(other).max()))
+
+
+def test_a_parameter_of_a_polynomial_is_not_packed(state):
+    assert state.balance.laws_along("gap") is None
 
 
 @pytest.mark.parametrize("kind", [Kind.INTEGER, Kind.HALF])

@@ -93,7 +93,7 @@ def test_coverage_on_random_systems(random_motions, distances, method):
 def test_a_few_random_systems(random_motions, distances):
     """A small share of the slow test above."""
     covered = {method: [] for method in METHODS}
-    for item in random_motions(3, 8):
+    for item in random_motions(3, 5):
         for method in METHODS:
             result = so.stability(item.orbit, method)
             if result.applicable:

@@ -60,7 +60,7 @@ def test_growth_of_many_linear_degrees_of_freedom():
     system = so.System(np.eye(n), damping, np.diag(np.arange(1.0, n + 1)), loads=LOADS, parameters={"p": 0.1})
     a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(np.arange(1.0, n + 1)), -damping]])
     expected = np.sort(np.linalg.eigvals(a).real)[::-1]
-    found = so.lyapunov_exponents(system, omega=2.3, periods=100, transient=30, trajectories=8)
+    found = so.lyapunov_exponents(system, omega=2.3, periods=100, transient=30, trajectories=2)
     # expm(a T) has a condition of 1e54: a matrix over a whole period could not show the smallest ones
     assert np.linalg.cond(expm(a * 2.0 * np.pi / 2.3)) > 1e16
     assert np.abs(found.exponents - expected).max() < 1e-4

@@ -1,0 +1,165 @@
+"""Laws known in closed form as one parameter changes: what elements tell at its values, packed for compiled code.
+
+Only elements that have the parameter in a coefficient are asked again. `group_force.PackedLaws` of whole sets of
+parameter values costs several times as much, and solving for one point asks for some four of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.changes import change_in_pieces, told_change
+from suboctave.harmonic.group_force import PackedLaws
+from suboctave.harmonic.rates import coefficient_rates
+from suboctave.model.element import Element
+from suboctave.model.sampling import PiecewiseLinear, Sampling, SharpSampling
+
+if TYPE_CHECKING:
+    from suboctave.harmonic.balance import HarmonicBalance
+
+__all__ = ["ChangingLaws", "PackedChanges"]
+
+_NO_PIECES, _NO_STEPS = np.zeros((0, 5)), np.zeros((0, 6))
+
+
+class PackedChanges(NamedTuple):
+    """What a parameter does to laws that are known in closed form, direction by direction, as arrays.
+
+    pieces, first
+        Pieces as `law_changes.change_of_pieces` wants them, (P, 5); where each direction's begin, (G + 1,).
+    steps, step_first
+        Steps as `law_changes.change_of_steps` wants them, (S, 6); where each direction's begin, (G + 1,).
+    line
+        Rates of constant and slope of the laws that the steps belong to, (G, 2).
+    """
+
+    pieces: Array
+    first: NDArray[np.int64]
+    steps: Array
+    step_first: NDArray[np.int64]
+    line: Array
+
+
+@dataclass(eq=False)
+class _Changing:
+    """An element with the parameter: the element, its direction, rates of its coefficients (None if they change), where
+    its pieces or steps begin among all, which of the direction's told laws it is; what it has told last.
+    """
+
+    element: Element
+    direction: int
+    rates: Array | None
+    at: int
+    place: int
+    numbers: Array
+    kind: Sampling
+
+
+class ChangingLaws:
+    """The laws of all directions at values of one parameter, and how they change with it there."""
+
+    def __init__(
+        self, balance: HarmonicBalance, name: str, changing: list[_Changing], lines: list[list[tuple[float, float]]]
+    ) -> None:
+        self.name = name
+        self._changing = changing
+        #: constant and slope of the told laws of every direction
+        self._lines = lines
+        self._base = balance.packed_laws(balance.values)[0]
+        count = len(balance.groups)
+        sharp = [isinstance(item.kind, SharpSampling) for item in changing]
+        self._steps, self._pieces = any(sharp), not all(sharp)
+        ends, step_ends = np.zeros((2, count + 1), dtype=np.int64)
+        for item in changing:
+            own, many = item.kind, item.direction + 1
+            if isinstance(own, PiecewiseLinear):
+                ends[many:] += len(own.pieces)
+            elif isinstance(own, SharpSampling):
+                step_ends[many:] += len(own.points)
+        self._ends, self._step_ends = ends, step_ends
+        self._none = np.zeros((count, 2))
+
+    @classmethod
+    def of(cls, balance: HarmonicBalance, name: str) -> ChangingLaws | None:
+        """None where laws are not known in closed form, or the parameter changes one that is no piece or step."""
+        packed = balance.packed_laws(balance.values)[0]
+        if packed.sampled and not packed.told:
+            return None
+        numbers, kinds, _ = balance.coefficients(balance.values)
+        touched = dict(balance.changing(name))
+        changing, lines = [], []
+        pieces = steps = 0
+        for g, group in enumerate(balance.groups):
+            own = touched.get(g, {})
+            told: list[tuple[float, float]] = []
+            for i in group.members:
+                kind = kinds[i]
+                if isinstance(kind, SharpSampling):
+                    at, steps, place = steps, steps + len(kind.points), len(told)
+                    told.append((kind.constant, kind.slope))
+                elif isinstance(kind, PiecewiseLinear):
+                    at, pieces, place = pieces, pieces + len(kind.pieces), 0
+                elif i in own:
+                    return None
+                if i in own:
+                    changing.append(_Changing(balance.elements[i], g, own[i], at, place, numbers[i], kind))
+            lines.append(told)
+        return cls(balance, name, changing, lines)
+
+    def at(self, values: Mapping[str, float]) -> PackedLaws:
+        """The laws at parameter values of which only this one differs from the balance's."""
+        base = self._base
+        if not self._changing:
+            return base
+        pieces = base.pieces.copy() if self._pieces else base.pieces
+        steps, line, places = base.steps, base.line, base.places
+        if self._steps:
+            steps, line = steps.copy(), line.copy()
+        for item in self._changing:
+            c = item.numbers = item.element.coefficient_values(values)
+            kind = item.kind = item.element.sampling(c)
+            at = item.at
+            if isinstance(kind, PiecewiseLinear):
+                own = c.tolist()
+                for piece in kind.pieces:
+                    pieces[at, 0], pieces[at, 1] = own[piece.stiffness], own[piece.gap]
+                    at += 1
+            elif isinstance(kind, SharpSampling) and kind.steps is not None:
+                for row in zip(kind.points, kind.widths, kind.steps, strict=True):
+                    steps[at] = row
+                    at += 1
+                lines = self._lines[item.direction]
+                lines[item.place] = kind.constant, kind.slope
+                line[item.direction] = sum([own[0] for own in lines]), sum([own[1] for own in lines])
+        if self._steps:
+            places = (steps[:, 0].copy(), steps[:, 1].copy())
+        return PackedLaws(
+            pieces, base.owner, base.first, base.polynomial, steps, base.step_owner, line, base.step_first, places,
+            base.sampled, base.told,
+        )  # fmt: skip
+
+    def changes(self, values: Mapping[str, float]) -> PackedChanges | None:
+        """How they change there, after `at`; None where an element does not tell that."""
+        pieces: list[tuple[float, ...]] = []
+        steps: list[tuple[float, ...]] = []
+        line = np.zeros_like(self._none) if self._steps else self._none
+        for item in self._changing:
+            rates = item.rates
+            if rates is None:
+                rates = coefficient_rates(item.element, values, {self.name: 1.0})
+            if isinstance(item.kind, PiecewiseLinear):
+                pieces += change_in_pieces(item.kind, item.numbers, rates)
+                continue
+            told = told_change(item.element, item.kind, item.numbers, rates)
+            if told is None:
+                return None
+            steps += told[0]
+            line[item.direction] += told[1]
+        packed = np.array(pieces) if pieces else _NO_PIECES
+        return PackedChanges(packed, self._ends, np.array(steps) if steps else _NO_STEPS, self._step_ends, line)
