@@ -18,6 +18,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 from unittest.mock import patch
 
@@ -25,8 +26,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
+from suboctave.analysis import tracked_newton
 from suboctave.analysis.tracked_branch import TrackedBranch
-from suboctave.analysis.tracked_curve import TrackedEvaluation
+from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.compiled import compile_at_once
 
 REPEATS = 7
@@ -60,20 +62,22 @@ def seconds(work: Callable[[], object]) -> float:
 def counted(work: Callable[[], object]) -> Counter[str]:
     """How often the augmented equations and their Jacobian are evaluated."""
     counts: Counter[str] = Counter()
-    whole, rows = TrackedEvaluation.__init__, TrackedEvaluation.bordered_transposed
 
-    def begin(self: TrackedEvaluation, *args: Any) -> None:
-        counts["evaluations"] += 1
-        whole(self, *args)
+    def counting(kind: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        def called(*args: Any) -> Any:
+            counts[kind] += 1
+            return function(*args)
 
-    def differentiate(self: TrackedEvaluation, *args: Any) -> np.ndarray:
-        counts["jacobians"] += 1
-        return rows(self, *args)
+        return called
 
-    with (
-        patch.object(TrackedEvaluation, "__init__", begin),
-        patch.object(TrackedEvaluation, "bordered_transposed", differentiate),
-    ):
+    with ExitStack() as stack:
+        for kind, owner, name in (
+            ("evaluations", tracked_newton, "looked_at"),
+            ("evaluations", TrackedCurve, "evaluate"),
+            ("jacobians", tracked_newton, "differentiated"),
+            ("jacobians", TrackedEvaluation, "bordered_transposed"),
+        ):
+            stack.enter_context(patch.object(owner, name, counting(kind, getattr(owner, name))))
         work()
     return counts
 

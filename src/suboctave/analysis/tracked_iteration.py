@@ -68,7 +68,7 @@ def directed(lu, pivots, weights, tangent):
         tangent[i] = unit[i]
 
 
-@kernel()
+@kernel(alone=True)
 def looked_at(
     u, guess, row, weights, limits, memo, lu, pivots, tangent, left_border, right_border, unit, force, mean,
     frequencies, nu, moving, scale, multiples, matrices, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
@@ -115,10 +115,7 @@ def looked_at(
     if not (math.isfinite(total) and omega > 0.0):
         return OTHER, sampled
     x = u[:n].reshape((parts.shape[1], parts.shape[2]))
-    for part in range(table.shape[0]):
-        for g in range(table.shape[1]):
-            for q in range(table.shape[2]):
-                table[part, g, q] = 0.0
+    table.fill(0.0)
     if points is None:
         finite = evaluate(
             x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
@@ -132,9 +129,7 @@ def looked_at(
     if not finite:
         return OTHER, sampled
     m = scale.shape[0]
-    for i in range(m):
-        for j in range(m):
-            operator[i, j] = 0.0
+    operator.fill(0.0)
     jacobian(operator, table, moving, omega / nu, mean, starts, dofs, shape, matrices, frequencies, omega, x)
     right, left = vectors[0], vectors[1]
     # after a short step the factors at hand tell g and its vectors in less time than new ones, of a large matrix
@@ -181,7 +176,7 @@ def looked_at(
     return (UNSOLVED if away else MOVED), sampled
 
 
-@kernel()
+@kernel(alone=True)
 def differentiated(
     last, u, guess, row, weights, memo, lu, pivots, tangent, unit, force, mean, frequencies, nu, moving, multiples,
     matrices, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps, step_first, line,
@@ -216,9 +211,7 @@ def differentiated(
         motions, changed, changed_first, moved_steps, moved_first, moved_line, grid, noted, points, widths, step_first,
         rule_nodes, rule_weights, spectra[0], spectra[1],
     )  # fmt: skip
-    for r in range(gx.shape[0]):
-        for i in range(size):
-            gx[r, i] = 0.0
+    gx.fill(0.0)
     gradient_and_matrix(
         left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
         step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, omega / nu,
