@@ -11,7 +11,7 @@ from suboctave.bifurcation.augmented import BranchPointUnfolded, GrazingContactE
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.normal_form_real import Expansion
-from suboctave.continuation.linear import Factor
+from suboctave.continuation.linear import Factor, LeadingBlock
 from suboctave.harmonic.perturbation import Kind
 
 SMOOTH = so.System(
@@ -113,6 +113,7 @@ def test_cubic_coefficient_of_the_general_way(system):
     curve, u = curve_at(system, ("omega", "p"), "PD")
     state = curve.evaluate(u).state
     own = Expansion.of(state, Kind.HALF, null_vectors(state, Kind.HALF), "omega")
-    solve = Factor.of(state.jacobian).solve
-    expected = own.cubic(solve(-0.5 * own.squared()))[0]
-    assert cubic_coefficient(state, own.phi, own.psi, own.by_motion, solve) == pytest.approx(expected, rel=1e-9)
+    block = LeadingBlock(Factor.of(state.jacobian), len(state.jacobian))
+    expected = own.cubic(block.solve(-0.5 * own.squared()))[0]
+    found = cubic_coefficient(state, own.phi, own.psi, own.by_motion, block, np.ones(block.size))
+    assert found == pytest.approx(expected, rel=1e-9)

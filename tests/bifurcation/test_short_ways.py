@@ -5,9 +5,9 @@ import pytest
 
 import suboctave as so
 from suboctave import CubicSpring, ElasticStop, HarmonicLoad, System
+from suboctave.bifurcation import cubic
 from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.normal_form_real import Expansion
 from suboctave.continuation import march
 from suboctave.continuation.linear import Factor, LeadingBlock
@@ -38,13 +38,19 @@ def state(request):
     return balance.settle(x, 0.9).at(x, 0.9)
 
 
-def test_the_short_way_is_the_general_one(state):
+@pytest.mark.parametrize("at_once", [True, False])
+def test_the_short_ways_are_the_general_one(monkeypatch, state, at_once):
+    monkeypatch.setattr(cubic, "at_hand", lambda *_: at_once)
+    monkeypatch.setattr(cubic, "ready", lambda _: at_once)
     b = bordered(state, Kind.HALF, null_vectors(state, Kind.HALF))
     by_motion = -b.gradient(())[0].reshape(state.x.shape)
     solve = Factor.of(state.jacobian).solve
     general = Expansion(state, Kind.HALF, b.right, b.left, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
     expected, size = general.cubic(solve(-0.5 * general.squared()))
-    assert cubic_coefficient(state, b.right, b.left, by_motion, solve) == pytest.approx(expected, abs=1e-12 * size)
+    weights = np.linspace(1.0, 2.0, len(state.jacobian))
+    block = LeadingBlock(Factor.of(state.jacobian / weights), len(weights))
+    found = cubic.cubic_coefficient(state, b.right, b.left, by_motion, block, weights)
+    assert found == pytest.approx(expected, abs=1e-12 * size)
 
 
 @pytest.mark.parametrize("more", [0, 1, 2, 3])

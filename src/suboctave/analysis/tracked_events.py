@@ -293,6 +293,9 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
         finer = curve.with_basis(basis)
         u = finer.transfer(sample.point.u, curve)
         try:
+            # the harmonics that come in begin at what the motion so far excites
+            fuller, coefficients = sample.state.completed_x
+            u[: finer.balance.dimension] = finer.balance.packed(fuller.resized(coefficients, basis))
             x, _, omega, values = finer.split(u)
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
             along = finer.transfer(sample.point.tangent, curve)

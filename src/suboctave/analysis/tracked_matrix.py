@@ -158,7 +158,7 @@ def evaluate_at_once(evaluation: TrackedEvaluation) -> None:
     balance, basis, linear, kind = state.balance, state.basis, state.linear, own.of.kind
     if basis.kept is not None or balance.own or not isinstance(linear, StructuralMatrices):
         return
-    packed, nodes = balance.packed_laws(state.values)
+    packed, nodes = state.packed
     if packed.sampled and not packed.told:
         return
     # what it calls is compiled one by one, not all at one go
@@ -209,7 +209,7 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
     plain = names[0] == "omega" and name not in balance.matrix_names and balance.steady and applies(state, ())
     if not plain or not isinstance(linear, StructuralMatrices):
         return None
-    packed, nodes = balance.packed_laws(state.values)
+    packed, nodes = state.packed
     asked = packed.sampled, packed.told, len(packed.pieces) > 0, packed.polynomial.shape[1] > 2
     if asked not in _DIFFERENTIATED:
         called = closed_parts(packed)

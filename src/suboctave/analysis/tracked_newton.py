@@ -181,7 +181,9 @@ def corrected(
         return None
     x, omega = u[:-2].reshape(parts.shape[1:]), float(u[-2])
     state = BalanceState(balance, balance.linear, x, omega, values)
-    state.__dict__.update(_evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[])
+    state.__dict__.update(
+        _evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[], packed=(packed, nodes)
+    )
     state.__dict__["jacobian" if mean else "half_jacobian"] = operator
     if packed.told:
         state.__dict__["_told_nodes"] = int(packed.step_owner[-1]), sampled

@@ -117,7 +117,7 @@ class TrackedSample:
         b, by_x = self.equations.bordered, self.equations.gradient[0].real
         by_motion = -by_x.reshape(self.state.x.shape)
         weights = self.point.weights[: self.state.x.size]
-        return cubic_coefficient(self.state, b.right, b.left, by_motion, lambda rhs: self._plain.solve(rhs) / weights)
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._plain, weights)
 
     @lazy
     def coefficient(self) -> float:

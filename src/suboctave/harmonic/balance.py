@@ -273,6 +273,10 @@ class HarmonicBalance:
             self._packed = (laws, (found, found.nodes(self.basis.harmonics, self.top)))
         return self._packed[1]
 
+    def remember(self, i: int, values: Mapping[str, float], numbers: Array, kind: Sampling) -> None:
+        """Keep what an element has told at parameter values, lest it be asked again there."""
+        self._laws[i] = tuple([values[name] for name in self._names[i]]), numbers, kind
+
     def laws_along(self, name: str) -> ChangingLaws | None:
         """The laws as a parameter changes, None where they are not packed with what it does to them."""
         if name not in self._laws_along:

@@ -48,11 +48,12 @@ class PackedChanges(NamedTuple):
 
 @dataclass(eq=False)
 class _Changing:
-    """An element with the parameter: the element, its direction, rates of its coefficients (None if they change), where
-    its pieces or steps begin among all, which of the direction's told laws it is; what it has told last.
+    """An element with the parameter: it and its number, its direction, rates of its coefficients (None if they change),
+    where its pieces or steps begin among all, which of the direction's told laws it is; what it has told last.
     """
 
     element: Element
+    number: int
     direction: int
     rates: Array | None
     at: int
@@ -62,12 +63,16 @@ class _Changing:
 
 
 class ChangingLaws:
-    """The laws of all directions at values of one parameter, and how they change with it there."""
+    """The laws of all directions at values of one parameter, and how they change with it there.
+
+    The balance remembers what the elements have told last, for those who ask for whole laws at a point that is solved.
+    """
 
     def __init__(
         self, balance: HarmonicBalance, name: str, changing: list[_Changing], lines: list[list[tuple[float, float]]]
     ) -> None:
         self.name = name
+        self._balance = balance
         self._changing = changing
         #: constant and slope of the told laws of every direction
         self._lines = lines
@@ -108,7 +113,7 @@ class ChangingLaws:
                 elif i in own:
                     return None
                 if i in own:
-                    changing.append(_Changing(balance.elements[i], g, own[i], at, place, numbers[i], kind))
+                    changing.append(_Changing(balance.elements[i], i, g, own[i], at, place, numbers[i], kind))
             lines.append(told)
         return cls(balance, name, changing, lines)
 
@@ -124,6 +129,7 @@ class ChangingLaws:
         for item in self._changing:
             c = item.numbers = item.element.coefficient_values(values)
             kind = item.kind = item.element.sampling(c)
+            self._balance.remember(item.number, values, c, kind)
             at = item.at
             if isinstance(kind, PiecewiseLinear):
                 own = c.tolist()

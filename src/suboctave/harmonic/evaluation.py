@@ -253,7 +253,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     """
     balance, basis, linear = state.balance, state.basis, state.linear
     count, size = len(balance.groups), balance.size
-    packed, nodes = balance.packed_laws(state.values)
+    packed, nodes = state.packed
     table = np.zeros((3, count, balance.top + 1), dtype=complex)
     if packed.sampled and not packed.told:
         laws = balance.coefficients(state.values)[2]

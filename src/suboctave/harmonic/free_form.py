@@ -142,7 +142,7 @@ def free_gradient(
     balance, linear = state.balance, state.linear
     if balance.own or balance.any_moving or not isinstance(linear, StructuralMatrices):
         return None
-    packed, nodes = balance.packed_laws(state.values)
+    packed, nodes = state.packed
     called = closed_parts(packed)
     if called is None:
         return None

@@ -285,7 +285,7 @@ def real_gradient(state: BalanceState, mean: bool, left: Array, right: Array) ->
     v = np.ascontiguousarray(right).reshape(-1, balance.size)
     gx = np.zeros((basis.size, balance.size))
     multiples = basis.multiples if mean else basis.half_multiples
-    packed, nodes = balance.packed_laws(state.values)
+    packed, nodes = state.packed
     called = closed_parts(packed)
     if called is not None and "closed_bends" not in state.__dict__:
         laws, steps = closed_laws(balance, packed, nodes)

@@ -18,7 +18,7 @@ from suboctave.harmonic import evaluation, group_kernels, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
 from suboctave.harmonic.changes import changes_by
 from suboctave.harmonic.closed_bends import ClosedBends, closed_bends
-from suboctave.harmonic.group_force import Group, curvature_of
+from suboctave.harmonic.group_force import Group, PackedLaws, curvature_of
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.local_force import Curvature, LocalMotion
 from suboctave.harmonic.neglected import completed_coefficients, excited
@@ -63,6 +63,11 @@ class BalanceState:
         if isinstance(self.linear, StructuralMatrices):
             return None
         return self.linear.compliance(self.frequencies)
+
+    @lazy
+    def packed(self) -> tuple[PackedLaws, Array]:
+        """The laws along all directions as arrays, and points on the circle for their polynomials, (2, N)."""
+        return self.balance.packed_laws(self.values)
 
     @lazy
     def motions(self) -> ComplexArray:

@@ -88,7 +88,7 @@ class ClosedSingle:
 
     def __init__(self, state: BalanceState, silent: bool, largest: float) -> None:
         self.state, self.silent, self.largest = state, silent, largest
-        self.laws = laws = state.balance.packed_laws(state.values)[0]
+        self.laws = laws = state.packed[0]
         degree = max(laws.polynomial.shape[1] - 2, 1 if len(laws.steps) else 0)
         self.varying, self.degree = degree > 0, degree
         self.passed: tuple[Any, Any, Any] = (*laws.places, laws.step_first) if len(laws.steps) else (None, None, None)
@@ -100,7 +100,7 @@ class ClosedSingle:
         balance = state.balance
         if balance.size > 1 or balance.basis.kept is not None or balance.own:
             return False
-        laws = balance.packed_laws(state.values)[0]
+        laws = state.packed[0]
         return isinstance(state.linear, StructuralMatrices) and (laws.told or not laws.sampled)
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:

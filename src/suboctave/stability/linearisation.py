@@ -52,7 +52,7 @@ class Linearisation:
         self.acting = self.directions[: len(laws)] + own.left
         self.moving = True in balance.moving or any(nodal.own.moving for nodal in state.nodal)
         laws = laws + own.laws
-        self._laws = PackedLaws.of(laws) if own.laws else balance.packed_laws(state.values)[0]
+        self._laws = PackedLaws.of(laws) if own.laws else state.packed[0]
         degree, finest = max(own.degree, self._laws.polynomial.shape[1] - 2), own.finest
         self.blind = own.blind
         for law in laws:
