@@ -64,10 +64,11 @@ def test_packed_as_one_parameter_changes(state, name):
     along = balance.laws_along(name)
     for factor in (1.3, 0.8, 1.0):
         values = {**state.values, name: factor * state.values[name]}
-        packed, expected = along.at(values), balance.packed_laws(values)[0]
+        told, expected = along.at(values), balance.packed_laws(values)[0]
+        packed = told.packed
         for one, other in zip(packed, expected, strict=True):
             np.testing.assert_array_equal(one, other)
-        changes, there = along.changes(values), balance.at(state.x, state.omega, values)
+        changes, there = along.changes(values, told), balance.at(state.x, state.omega, values)
         spectra = np.zeros((2, len(balance.groups), balance.top + 1), dtype=complex)
         law_changes.add_changes(
             there.motions, changes.pieces, changes.first, changes.steps, changes.step_first, changes.line,

@@ -120,15 +120,6 @@ def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
     assert so.stability(orbit, "koopman-hill").applicable
 
 
-def test_hill_checks_itself(fifty):
-    """Exactly 2 n eigenvalues in the strip, reported on the result."""
-    for draw in fifty[::7]:
-        checks = so.stability(draw.orbit, "hill").checks
-        assert checks["inside the strip"] == checks["expected"] == len(draw.exact)
-        assert checks["gap"] >= 0.99 / len(draw.exact)
-        assert checks["Liouville"] < 1e-6
-
-
 def test_a_strip_that_holds_another_number_is_no_result(monkeypatch):
     """A spurious eigenvalue inside the strip is found out."""
     from suboctave.stability import hill

@@ -53,6 +53,15 @@ def test_truncations_cancel_in_hills_method(fifty, distances):
     assert np.mean(errors) < 0.05 * np.mean(truncated)
 
 
+def test_hill_checks_itself(fifty):
+    """Exactly 2 n eigenvalues in the strip, reported on the result."""
+    for draw in fifty[::7]:
+        checks = so.stability(draw.orbit, "hill").checks
+        assert checks["inside the strip"] == checks["expected"] == len(draw.exact)
+        assert checks["gap"] >= 0.99 / len(draw.exact)
+        assert checks["Liouville"] < 1e-6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 @pytest.mark.parametrize("harmonics", [15, 31])

@@ -121,6 +121,7 @@ class TrackedEvaluation:
             row,
             weights,
             found,
+            np.empty((state.x.size, state.x.size + 1)),
         )
         return found
 

@@ -25,8 +25,8 @@ from suboctave.harmonic.real_form import linear_rates
 SOLVED, LAST, UNSOLVED, OTHER, MOVED, ANEW = 0, 1, 2, 3, 4, 5
 #: what an iteration passes on to the next: error, number of the iteration, length of the last step, rate, error before,
 #: length of the first step, way from where the factors are those of, whether there are any, whether they are of
-#: another solution, whether those of the operator with its borders are of this iterate
-ERROR, ITERATION, PREVIOUS, RATE, BEFORE, FIRST, WAY, FACTORS, GIVEN, BORDERED = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+#: another solution
+ERROR, ITERATION, PREVIOUS, RATE, BEFORE, FIRST, WAY, FACTORS, GIVEN = 0, 1, 2, 3, 4, 5, 6, 7, 8
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -84,7 +84,7 @@ def looked_at(
     limits
         Tolerance, correction and iterations of `NewtonOptions`, `spare`, least size of forces, (5,).
     memo
-        What an iteration passes on to the next, (10,).
+        What an iteration passes on to the next, (9,).
     lu, pivots
         Factors of the matrix that `differentiated` makes.
     left_border, right_border, unit, force
@@ -145,7 +145,6 @@ def looked_at(
         operator, scale, left_border, right_border, omega * omega, border_lu, border_pivots, right, left
     ):
         return OTHER, sampled
-    memo[BORDERED] = 1.0 if anew else 0.0
     for i in range(m):
         right[i] *= scale[i]
         left[i] *= scale[i]
@@ -181,7 +180,7 @@ def differentiated(
     last, u, guess, row, weights, memo, lu, pivots, tangent, unit, force, mean, frequencies, nu, moving, multiples,
     matrices, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps, step_first, line,
     rule_nodes, rule_weights, noted, changed, changed_first, moved_steps, moved_first, moved_line, by_load, motions,
-    table, parts, vectors, gx, rates, numbers,
+    table, parts, vectors, gx, rates, numbers, extended,
 ):  # fmt: skip
     """New factors at an iterate that has been looked at; a correction with them or, at the last, the tangent.
 
@@ -199,6 +198,9 @@ def differentiated(
         Filled: minus the gradient of g by X (2 H + 1, n); minus that by omega, by the parameter, by kappa (imaginary
         part), (3,).
 
+    extended
+        Overwritten, (N - 2, N - 1) for N entries of u.
+
     The rest as in `looked_at`; returns what the iterate is.
     """
     m, n, size = vectors.shape[1] - 1, parts.shape[1] * parts.shape[2], parts.shape[2]
@@ -215,7 +217,7 @@ def differentiated(
     gradient_and_matrix(
         left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
         step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, omega / nu,
-        multiples, x, spectra[0], spectra[1], by_load, unit, force, row, weights, gx, rates, lu,
+        multiples, x, spectra[0], spectra[1], by_load, unit, force, row, weights, gx, rates, lu, extended,
     )  # fmt: skip
     if factorise(lu, pivots):
         return OTHER

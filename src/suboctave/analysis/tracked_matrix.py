@@ -35,8 +35,9 @@ _DIFFERENTIATED: set[tuple[bool, ...]] = set()
 
 @kernel()
 def bordered_by_rows(
-    table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, others, rows, force, row, weights, out
-):
+    table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, others, rows, force, row, weights, out,
+    extended,
+):  # fmt: skip
     """Transpose of `[R_u; force G_u; row]`, columns of the first two over `weights`, for u = (X, extra, omega, others).
 
     Parameters
@@ -49,11 +50,11 @@ def bordered_by_rows(
         Derivatives of the scalar equations by u, and their unit.
     row
         The last row.
-    out
-        Filled, (N, N) for N entries of u.
+    out, extended
+        Filled, (N, N) for N entries of u; overwritten, (n, n + 1) for n equations R.
     """
     n, last, count = x.shape[0] * x.shape[1], weights.shape[0] - 1, others.shape[0]
-    extended = np.zeros((n, n + 1))
+    extended.fill(0.0)
     # not a literal, for which the Jacobian would be compiled once more
     mean = n > 0
     jacobian(extended, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x)
@@ -113,7 +114,7 @@ def gradient_and_matrix(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
     step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, rate,
     multiples, x,
-    force_by, stiffness_by, other, unit, force, row, weights, gx, rates, out,
+    force_by, stiffness_by, other, unit, force, row, weights, gx, rates, out, extended,
 ):  # fmt: skip
     """`bordered_by_rows` for u = (X, omega, a parameter) with the gradient of g.
 
@@ -130,6 +131,8 @@ def gradient_and_matrix(
     gx, rates, out
         Filled: minus the gradient by X, zeros before; that by omega, by the parameter, by kappa (imaginary part), (3,);
         the matrix.
+    extended
+        As in `bordered_by_rows`.
     """
     rates[0], rates[2] = noted_gradient(
         left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
@@ -146,7 +149,7 @@ def gradient_and_matrix(
     rows[0, n], rows[0, n + 1] = rates[0], rates[1]
     bordered_by_rows(
         table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x, other.ravel().reshape((1, n)), rows,
-        -force / unit, row, weights, out,
+        -force / unit, row, weights, out, extended,
     )  # fmt: skip
 
 
@@ -235,8 +238,8 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
     whole = (linear.matrices, state.spectra_table, balance.moving, state.rate, basis.multiples, state.x)
     changed = (force_by, stiffness_by, other)
     units = (equations.of.unit, evaluation.curve.force, row, weights)
-    found = np.empty((len(weights), len(weights)))
-    gradient_and_matrix(*(*form, *whole, *changed, *units, gx, rates, found))
+    found, extended = np.empty((len(weights), len(weights))), np.empty((len(weights) - 2, len(weights) - 1))
+    gradient_and_matrix(*(*form, *whole, *changed, *units, gx, rates, found, extended))
     by_omega, by_name, by_kappa = (-rates).tolist()
     equations.__dict__["gradient"] = -gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, 1j * by_kappa
     return found

@@ -7,6 +7,7 @@ what they do. Only what the laws and the load are at an iterate's parameter is a
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +15,6 @@ import numpy as np
 
 from suboctave.analysis.tracked_iteration import (
     ANEW,
-    BORDERED,
     ERROR,
     FACTORS,
     GIVEN,
@@ -51,6 +51,9 @@ if TYPE_CHECKING:
 
 #: the kinds of laws for which all kernels that are called are compiled
 _COMPILED: set[tuple[bool, ...]] = set()
+#: scratch matrices of a thread, of up to as many rows
+_OWN = threading.local()
+_KEPT = 500
 _NO_NODES = np.empty((4, 0))
 
 
@@ -117,7 +120,7 @@ def corrected(
     n, high, size, groups, m = len(guess), basis.harmonics, balance.size, len(balance.groups), len(borders.right)
     frequencies, scale = (basis.multiples if mean else basis.half_multiples), balance.row_weights(m)
     u, tangent, numbers = guess.copy(), np.empty(n), np.empty(3)
-    memo = np.zeros(10)
+    memo = np.zeros(9)
     memo[PREVIOUS] = np.inf
     if known is None:
         lu, pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
@@ -126,8 +129,8 @@ def corrected(
         memo[WAY], memo[FACTORS], memo[GIVEN] = np.inf, 1.0, 1.0
     blocks, motions = np.empty((high + 1, size, size), dtype=complex), np.empty((groups, high + 1), dtype=complex)
     table, parts = np.empty((3, groups, balance.top + 1), dtype=complex), np.empty((3, 2 * high + 1, size))
-    operator, vectors = np.empty((m, m)), np.empty((2, m + 1))
-    border_lu, border_pivots = np.empty((m + 1, m + 1)), np.empty(m + 1, dtype=np.int32)
+    operator, border_lu, extended = _scratch(m, n)
+    vectors, border_pivots = np.empty((2, m + 1)), np.empty(m + 1, dtype=np.int32)
     sizes, gx, rates = np.empty(4), np.empty((2 * high + 1, size)), np.empty(3)
     limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
     same, weight = (guess, row, weights), balance.scales()[1]
@@ -139,7 +142,8 @@ def corrected(
     loaded, rate = name in balance.load_names, balance.load_rate(name)
     while True:
         values = {**balance.values, name: float(u[-1])}
-        packed = along.at(values)
+        laws_there = along.at(values)
+        packed = laws_there.packed
         if not _at_hand(packed, False, False):
             return None
         told = told_steps(packed) if packed.told else (None,) * 7
@@ -154,7 +158,7 @@ def corrected(
         found = (borders.left, borders.right, *of, scale, *linear, *laws, load, weight, *told, *filled)
         ended, sampled = looked_at(u, *same, limits, *factors, *found)
         if ended in (ANEW, LAST):
-            change = along.changes(values)
+            change = along.changes(values, laws_there)
             if change is None or not _at_hand(packed, len(change.pieces) > 0, len(change.steps) > 0):
                 return None
             if memo[GIVEN] and memo[FACTORS]:
@@ -170,7 +174,7 @@ def corrected(
             changes = (changed, change.first, moved_steps, change.step_first, change.line)
             only = packed.told and _only_direction(packed)
             rest = (sampled if only else _NO_NODES, *changes, by_load, motions, table, parts, vectors)
-            given = (*factors, *of, *linear, *laws, *told, *rest, gx, rates, numbers)
+            given = (*factors, *of, *linear, *laws, *told, *rest, gx, rates, numbers, extended)
             ended = differentiated(ended == LAST, u, *same, *given)
         if ended == MOVED:
             continue
@@ -184,22 +188,17 @@ def corrected(
     state.__dict__.update(
         _evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[], packed=(packed, nodes)
     )
-    state.__dict__["jacobian" if mean else "half_jacobian"] = operator
     if packed.told:
         state.__dict__["_told_nodes"] = int(packed.step_owner[-1]), sampled
     way, sign, by_kappa = numbers.tolist()
     g = complex(float(vectors[0, m]) * omega**2)
-    right, left, factor = (
-        vectors[0, :m],
-        vectors[1, :m],
-        Factor(border_lu.T, border_pivots, False) if memo[BORDERED] else None,
-    )
+    right, left = vectors[0, :m], vectors[1, :m]
     by_omega, by_name, _ = (-rates).tolist()
     return Corrected(
         u,
         state,
         float(memo[ERROR]),
-        Bordered(state, own.kind, 0.0, g, right, left, scale, borders, factor),
+        Bordered(state, own.kind, 0.0, g, right, left, scale, borders, None),
         (-gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, -1j * by_kappa),
         Factor(lu.T, pivots, False),
         int(memo[ITERATION]),
@@ -208,6 +207,20 @@ def corrected(
         tangent,
         sign,
     )
+
+
+def _scratch(m: int, n: int) -> tuple[Array, Array, Array]:
+    """Matrices that no point keeps: an operator (M, M), its factors with borders, `[R_X R_omega]`.
+
+    Memory of some 100 KB would come from the system anew each time.
+    """
+    known: tuple[tuple[int, int], tuple[Array, Array, Array]] | None = _OWN.__dict__.get("matrices")
+    if known is not None and known[0] == (m, n):
+        return known[1]
+    found = np.empty((m, m)), np.empty((m + 1, m + 1)), np.empty((n - 2, n - 1))
+    if n <= _KEPT:
+        _OWN.matrices = (m, n), found
+    return found
 
 
 def _only_direction(packed: PackedLaws) -> bool:

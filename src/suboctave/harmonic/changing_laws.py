@@ -23,7 +23,7 @@ from suboctave.model.sampling import PiecewiseLinear, Sampling, SharpSampling
 if TYPE_CHECKING:
     from suboctave.harmonic.balance import HarmonicBalance
 
-__all__ = ["ChangingLaws", "PackedChanges"]
+__all__ = ["ChangingLaws", "PackedChanges", "ToldLaws"]
 
 _NO_PIECES, _NO_STEPS = np.zeros((0, 5)), np.zeros((0, 6))
 
@@ -46,10 +46,17 @@ class PackedChanges(NamedTuple):
     line: Array
 
 
-@dataclass(eq=False)
+class ToldLaws(NamedTuple):
+    """The laws at one value of the parameter, and coefficients and laws of the elements that have it."""
+
+    packed: PackedLaws
+    elements: list[tuple[Array, Sampling]]
+
+
+@dataclass(frozen=True, eq=False)
 class _Changing:
     """An element with the parameter: it and its number, its direction, rates of its coefficients (None if they change),
-    where its pieces or steps begin among all, which of the direction's told laws it is; what it has told last.
+    where its pieces or steps begin among all, which of the direction's told laws it is.
     """
 
     element: Element
@@ -58,8 +65,6 @@ class _Changing:
     rates: Array | None
     at: int
     place: int
-    numbers: Array
-    kind: Sampling
 
 
 class ChangingLaws:
@@ -69,7 +74,12 @@ class ChangingLaws:
     """
 
     def __init__(
-        self, balance: HarmonicBalance, name: str, changing: list[_Changing], lines: list[list[tuple[float, float]]]
+        self,
+        balance: HarmonicBalance,
+        name: str,
+        changing: list[_Changing],
+        kinds: list[Sampling],
+        lines: list[list[tuple[float, float]]],
     ) -> None:
         self.name = name
         self._balance = balance
@@ -78,16 +88,18 @@ class ChangingLaws:
         self._lines = lines
         self._base = balance.packed_laws(balance.values)[0]
         count = len(balance.groups)
-        sharp = [isinstance(item.kind, SharpSampling) for item in changing]
+        sharp = [isinstance(kind, SharpSampling) for kind in kinds]
         self._steps, self._pieces = any(sharp), not all(sharp)
         ends, step_ends = np.zeros((2, count + 1), dtype=np.int64)
-        for item in changing:
-            own, many = item.kind, item.direction + 1
+        for item, own in zip(changing, kinds, strict=True):
+            many = item.direction + 1
             if isinstance(own, PiecewiseLinear):
                 ends[many:] += len(own.pieces)
             elif isinstance(own, SharpSampling):
                 step_ends[many:] += len(own.points)
         self._ends, self._step_ends = ends, step_ends
+        #: the directions whose line changes
+        self._directions = sorted({item.direction for item, one in zip(changing, sharp, strict=True) if one})
         self._none = np.zeros((count, 2))
 
     @classmethod
@@ -96,7 +108,7 @@ class ChangingLaws:
         packed = balance.packed_laws(balance.values)[0]
         if packed.sampled and not packed.told:
             return None
-        numbers, kinds, _ = balance.coefficients(balance.values)
+        _, kinds, _ = balance.coefficients(balance.values)
         touched = dict(balance.changing(name))
         changing, lines = [], []
         pieces = steps = 0
@@ -113,22 +125,24 @@ class ChangingLaws:
                 elif i in own:
                     return None
                 if i in own:
-                    changing.append(_Changing(balance.elements[i], i, g, own[i], at, place, numbers[i], kind))
+                    changing.append(_Changing(balance.elements[i], i, g, own[i], at, place))
             lines.append(told)
-        return cls(balance, name, changing, lines)
+        return cls(balance, name, changing, [kinds[item.number] for item in changing], lines)
 
-    def at(self, values: Mapping[str, float]) -> PackedLaws:
+    def at(self, values: Mapping[str, float]) -> ToldLaws:
         """The laws at parameter values of which only this one differs from the balance's."""
         base = self._base
         if not self._changing:
-            return base
+            return ToldLaws(base, [])
         pieces = base.pieces.copy() if self._pieces else base.pieces
         steps, line, places = base.steps, base.line, base.places
         if self._steps:
             steps, line = steps.copy(), line.copy()
+        lines, told = self._lines, []
         for item in self._changing:
-            c = item.numbers = item.element.coefficient_values(values)
-            kind = item.kind = item.element.sampling(c)
+            c = item.element.coefficient_values(values)
+            kind = item.element.sampling(c)
+            told.append((c, kind))
             self._balance.remember(item.number, values, c, kind)
             at = item.at
             if isinstance(kind, PiecewiseLinear):
@@ -140,32 +154,35 @@ class ChangingLaws:
                 for row in zip(kind.points, kind.widths, kind.steps, strict=True):
                     steps[at] = row
                     at += 1
-                lines = self._lines[item.direction]
-                lines[item.place] = kind.constant, kind.slope
-                line[item.direction] = sum([own[0] for own in lines]), sum([own[1] for own in lines])
+                if lines is self._lines:
+                    lines = [own.copy() for own in lines]
+                lines[item.direction][item.place] = kind.constant, kind.slope
         if self._steps:
             places = (steps[:, 0].copy(), steps[:, 1].copy())
-        return PackedLaws(
+            for g in self._directions:
+                line[g] = sum([own[0] for own in lines[g]]), sum([own[1] for own in lines[g]])
+        packed = PackedLaws(
             pieces, base.owner, base.first, base.polynomial, steps, base.step_owner, line, base.step_first, places,
             base.sampled, base.told,
         )  # fmt: skip
+        return ToldLaws(packed, told)
 
-    def changes(self, values: Mapping[str, float]) -> PackedChanges | None:
-        """How they change there, after `at`; None where an element does not tell that."""
+    def changes(self, values: Mapping[str, float], told: ToldLaws) -> PackedChanges | None:
+        """How they change there; None where an element does not tell that. `told`: what `at` has given."""
         pieces: list[tuple[float, ...]] = []
         steps: list[tuple[float, ...]] = []
         line = np.zeros_like(self._none) if self._steps else self._none
-        for item in self._changing:
+        for item, (c, kind) in zip(self._changing, told.elements, strict=True):
             rates = item.rates
             if rates is None:
                 rates = coefficient_rates(item.element, values, {self.name: 1.0})
-            if isinstance(item.kind, PiecewiseLinear):
-                pieces += change_in_pieces(item.kind, item.numbers, rates)
+            if isinstance(kind, PiecewiseLinear):
+                pieces += change_in_pieces(kind, c, rates)
                 continue
-            told = told_change(item.element, item.kind, item.numbers, rates)
-            if told is None:
+            found = told_change(item.element, kind, c, rates)
+            if found is None:
                 return None
-            steps += told[0]
-            line[item.direction] += told[1]
+            steps += found[0]
+            line[item.direction] += found[1]
         packed = np.array(pieces) if pieces else _NO_PIECES
         return PackedChanges(packed, self._ends, np.array(steps) if steps else _NO_STEPS, self._step_ends, line)
