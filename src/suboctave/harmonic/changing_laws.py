@@ -151,8 +151,8 @@ class ChangingLaws:
                     pieces[at, 0], pieces[at, 1] = own[piece.stiffness], own[piece.gap]
                     at += 1
             elif isinstance(kind, SharpSampling) and kind.steps is not None:
-                for row in zip(kind.points, kind.widths, kind.steps, strict=True):
-                    steps[at] = row
+                for point, width, step in zip(kind.points, kind.widths, kind.steps, strict=True):
+                    steps[at, 0], steps[at, 1], steps[at, 2] = point, width, step
                     at += 1
                 if lines is self._lines:
                     lines = [own.copy() for own in lines]
@@ -160,7 +160,7 @@ class ChangingLaws:
         if self._steps:
             places = (steps[:, 0].copy(), steps[:, 1].copy())
             for g in self._directions:
-                line[g] = sum([own[0] for own in lines[g]]), sum([own[1] for own in lines[g]])
+                line[g, 0], line[g, 1] = sum([own[0] for own in lines[g]]), sum([own[1] for own in lines[g]])
         packed = PackedLaws(
             pieces, base.owner, base.first, base.polynomial, steps, base.step_owner, line, base.step_first, places,
             base.sampled, base.told,
@@ -171,7 +171,7 @@ class ChangingLaws:
         """How they change there; None where an element does not tell that. `told`: what `at` has given."""
         pieces: list[tuple[float, ...]] = []
         steps: list[tuple[float, ...]] = []
-        line = np.zeros_like(self._none) if self._steps else self._none
+        line = self._none.copy() if self._steps else self._none
         for item, (c, kind) in zip(self._changing, told.elements, strict=True):
             rates = item.rates
             if rates is None:
@@ -183,6 +183,8 @@ class ChangingLaws:
             if found is None:
                 return None
             steps += found[0]
-            line[item.direction] += found[1]
+            constant, slope = found[1]
+            line[item.direction, 0] += constant
+            line[item.direction, 1] += slope
         packed = np.array(pieces) if pieces else _NO_PIECES
         return PackedChanges(packed, self._ends, np.array(steps) if steps else _NO_STEPS, self._step_ends, line)

@@ -150,10 +150,14 @@ class ElasticStop(Element):
         """See `Element.told_change`."""
         if not self.regularised:
             return None
-        sign, (by_stiffness, gap, sharpness) = self._sign, rates.tolist()
-        k, b, s, _, at_rest, by_gap, by_sharpness = self._numbers(c)
-        constant = by_stiffness * (at_rest - 0.5 * sign * b)
-        constant += k * (gap * (by_gap - 0.5 * sign) + sharpness * by_sharpness)
+        sign, (by_stiffness, gap, sharpness), (k, b, s) = self._sign, rates.tolist(), c.tolist()
+        constant = 0.0
+        if by_stiffness:
+            constant += by_stiffness * (self._at_rest(b, s) - 0.5 * sign * b)
+        if gap:
+            constant += k * gap * (self._at_rest_by_gap(b, s) - 0.5 * sign)
+        if sharpness:
+            constant += k * sharpness * self._at_rest_by_sharpness(b, s)
         return SharpSampling((gap,), (-sharpness / s**2,), constant, 0.5 * by_stiffness, (sign * by_stiffness,))
 
     def _numbers(self, c: Array) -> tuple[float, ...]:
@@ -161,9 +165,8 @@ class ElasticStop(Element):
         the derivatives by gap and sharpness per unit of stiffness.
         """
         k, b, s = c.tolist()
-        sign = self._sign
-        by_gap = sign * (0.5 - math.atan(s * b) / math.pi) - (1.0 if sign * b < 0.0 else 0.0)
-        return k, b, s, sign, self._at_rest(b, s), by_gap, -sign * float(_phi_s(-b, s))
+        at_rest = (self._at_rest(b, s), self._at_rest_by_gap(b, s), self._at_rest_by_sharpness(b, s))
+        return k, b, s, self._sign, *at_rest
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
@@ -187,6 +190,15 @@ class ElasticStop(Element):
         """The constant in brackets: what makes the force at `u = 0` that of the exact law."""
         sign = self._sign
         return sign * max(-sign * b, 0.0) - sign * _phi(-b, s)
+
+    def _at_rest_by_gap(self, b: float, s: float) -> float:
+        """Its derivative by the gap."""
+        sign = self._sign
+        return sign * (0.5 - math.atan(s * b) / math.pi) - (1.0 if sign * b < 0.0 else 0.0)
+
+    def _at_rest_by_sharpness(self, b: float, s: float) -> float:
+        """Its derivative by the sharpness."""
+        return -self._sign * math.log1p((s * b) ** 2) / (2.0 * math.pi * s**2)
 
     def _by_gap(self, y: Array, b: float, s: float) -> Array:
         """Derivative of the force per unit of stiffness with respect to the gap."""
