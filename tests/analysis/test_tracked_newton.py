@@ -10,6 +10,7 @@ import pytest
 import suboctave as so
 from suboctave.analysis import tracked_curve, tracked_newton
 from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_iteration import FIRST, ITERATION, PREVIOUS, RATE, stepped
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
@@ -150,6 +151,18 @@ def test_what_does_not_converge_is_said(monkeypatch):
             said.append(str(caught.value))
     assert said[0] == said[1]
     assert "after 2 iterations" in said[0]
+
+
+def test_corrections_that_come_to_nothing_are_seen():
+    """Two in succession that hardly shrink, or one that grows far beyond the first."""
+    for rate, length, ends in ((0.9, 0.9, True), (0.9, 0.7, False), (0.5, 0.9, False), (0.1, 2.5, True)):
+        memo = np.zeros(9)
+        memo[PREVIOUS], memo[RATE], memo[ITERATION], memo[FIRST] = 1.0, rate, 2, 1.0
+        u, row = np.zeros(3), np.array([0.0, 0.0, 1.0])
+        lu, pivots = np.eye(3), np.arange(3, dtype=np.int32)
+        assert stepped(u, u.copy(), row, np.ones(3), np.array([length]), 0.0, lu, pivots, memo) == ends
+        assert u == pytest.approx([-length, 0.0, 0.0])
+        assert memo[RATE] == pytest.approx(length)
 
 
 def test_a_frequency_that_is_not_positive_is_left_to_the_general_way():

@@ -290,6 +290,18 @@ def test_newton_gives_up_with_the_place(guess, message):
         correct(circle(), np.array(guess), row, np.ones(2), NEWTON)
 
 
+def test_newton_that_goes_to_and_fro_is_given_up_at_once():
+    """`sgn(x) sqrt|x|`: every correction leads from x to -x. Slower than quadratic is not nowhere: a double root."""
+    row = np.array([0.0, 1.0])
+    curve = Plane(lambda x, p: math.copysign(math.sqrt(abs(x)), x), lambda x, p: (0.5 / math.sqrt(abs(x)), 0.0))
+    with pytest.raises(ConvergenceError, match="after 2 iterations"):
+        correct(curve, np.array([0.3, 0.0]), row, np.ones(2), NEWTON)
+    assert len(curve.calls) == 3
+    double = Plane(lambda x, p: x**2, lambda x, p: (2.0 * x, 0.0))
+    solved = correct(double, np.array([0.3, 0.0]), row, np.ones(2), NewtonOptions(iterations=40))
+    assert abs(solved.u[0]) < 1e-5
+
+
 @pytest.mark.parametrize("kind", [float, complex])
 def test_factor_solves_and_knows_the_determinant(kind):
     rng = np.random.default_rng(0)

@@ -20,7 +20,7 @@ from suboctave.continuation.kernels import (
     right_hand_side,
 )
 from suboctave.continuation.lapack import factorise, solve_factorised
-from suboctave.continuation.newton import SHORT
+from suboctave.continuation.newton import SHORT, STALLED
 from suboctave.harmonic.evaluation import evaluate_anew, jacobian
 
 #: how a correction ended: solved; given up without convergence; something the general way knows more about
@@ -151,8 +151,9 @@ def corrected(
         if iteration == 0:
             start = size
         else:
+            rate = contraction
             contraction = size / previous if previous > 0.0 else 0.0
-            if contraction > 2.0 and size > start:
+            if (contraction > 2.0 and size > start) or min(rate, contraction) > STALLED:
                 return UNSOLVED
         previous = size
     numbers[2] = distance(u, guess, weights)

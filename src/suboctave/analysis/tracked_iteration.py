@@ -15,7 +15,7 @@ from suboctave.bifurcation.bordered_kernels import LARGE, border, border_again
 from suboctave.compiled import kernel
 from suboctave.continuation.kernels import determinant_sign, distance, moved, normalised, right_hand_side
 from suboctave.continuation.lapack import factorise, solve_factorised
-from suboctave.continuation.newton import SHORT
+from suboctave.continuation.newton import SHORT, STALLED
 from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian
 from suboctave.harmonic.law_changes import add_changes
 from suboctave.harmonic.real_form import linear_rates
@@ -32,7 +32,7 @@ _TINY = float(np.finfo(float).tiny)
 
 @kernel()
 def stepped(u, guess, row, weights, residual, value, lu, pivots, memo):
-    """One correction with the factors at hand, u in its place; returns whether the iteration goes away.
+    """One correction with the factors at hand, u in its place; returns whether the iteration goes away, or nowhere.
 
     residual, value: R, and g in its unit.
     """
@@ -46,14 +46,15 @@ def stepped(u, guess, row, weights, residual, value, lu, pivots, memo):
     further, size = moved(u, step, weights, 1.0)
     for i in range(n):
         u[i] = further[i]
-    previous = memo[PREVIOUS]
+    previous, rate = memo[PREVIOUS], memo[RATE]
     if memo[ITERATION] == 0:
         memo[FIRST] = size
     else:
         memo[RATE] = size / previous if previous > 0.0 else 0.0
     memo[PREVIOUS], memo[BEFORE] = size, memo[ERROR]
     memo[WAY] += size
-    return memo[ITERATION] > 0 and memo[RATE] > 2.0 and size > memo[FIRST]
+    away = memo[ITERATION] > 0 and memo[RATE] > 2.0 and size > memo[FIRST]
+    return away or min(rate, memo[RATE]) > STALLED
 
 
 @kernel()

@@ -20,6 +20,9 @@ from suboctave.errors import ConvergenceError, InputError
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 SHORT = 1e-3
+#: rate at which corrections shrink, twice in succession, that comes to nothing: at a corner of the equations Newton's
+#: method goes to and fro between its sides
+STALLED = 0.8
 
 
 @dataclass(frozen=True)
@@ -148,8 +151,10 @@ def correct(
         if iteration == 0:
             first = size
         else:
+            rate = contraction
             contraction = size / previous if previous > 0.0 else 0.0
-            if contraction > 2.0 and size > first and not options.damped:
+            away = contraction > 2.0 and size > first
+            if (away or min(rate, contraction) > STALLED) and not options.damped:
                 break
         previous = size if share == 1.0 else np.inf
     raise not_converged(curve, guess, error, iteration)
