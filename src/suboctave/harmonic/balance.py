@@ -246,18 +246,16 @@ class HarmonicBalance:
         return found
 
     def _sorted_coefficients(self, values: Mapping[str, float]) -> tuple[list[Array], list[Sampling], list[GroupLaw]]:
-        laws = self._laws
+        numbers, kinds = [], []
         for i, names in enumerate(self._names):
-            known = laws.get(i)
-            if known is not None and not names:
-                continue
+            known = self._laws.get(i)
             key = tuple([values[name] for name in names])
             if known is None or known[0] != key:
                 element = self.system.elements[i]
                 own = element.coefficient_values(values)
-                laws[i] = key, own, element.sampling(own)
-        every = [laws[i] for i in range(len(self._names))]
-        numbers, kinds = [law[1] for law in every], [law[2] for law in every]
+                known = self._laws[i] = key, own, element.sampling(own)
+            numbers.append(known[1])
+            kinds.append(known[2])
         return numbers, kinds, [GroupLaw.of(group, numbers, kinds) for group in self.groups]
 
     @lazy
