@@ -142,7 +142,9 @@ class _Patient(_Kernel):
                 _ledger.fresh = False
                 return compiled(self)(*args)
             spent = 0.0
-        if self._due(spent) or sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE:
+        # those that take seconds to compile leave long loops to others
+        large = not self.alone and sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE
+        if self._due(spent) or large:
             self.compile(tuple(self.typeof_pyval(a) for a in args))
             return compiled(self)(*args)
         before, _ledger.nested = _ledger.nested, 0.0

@@ -109,7 +109,7 @@ def corrected(
         if not (math.isfinite(total) and omega > 0.0):
             return OTHER
         x = u[: n - 1].reshape(parts.shape[1], parts.shape[2])
-        finite = evaluate_anew(
+        finite, _sampled = evaluate_anew(
             x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
             weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
         )  # fmt: skip

@@ -16,7 +16,7 @@ from suboctave.compiled import kernel
 from suboctave.continuation.kernels import determinant_sign, distance, moved, normalised, right_hand_side
 from suboctave.continuation.lapack import factorise, solve_factorised
 from suboctave.continuation.newton import SHORT, STALLED
-from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian
+from suboctave.harmonic.evaluation import evaluate_anew, jacobian
 from suboctave.harmonic.law_changes import add_changes
 from suboctave.harmonic.real_form import linear_rates
 
@@ -109,24 +109,16 @@ def looked_at(
     """
     n = parts.shape[1] * parts.shape[2]
     omega = u[n]
-    sampled = np.empty((4, 0))
     total = 0.0
     for i in range(u.shape[0]):
         total += u[i] * u[i]
     if not (math.isfinite(total) and omega > 0.0):
-        return OTHER, sampled
+        return OTHER, np.empty((4, 0))
     x = u[:n].reshape((parts.shape[1], parts.shape[2]))
-    table.fill(0.0)
-    if points is None:
-        finite = evaluate(
-            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-            weight, table, motions, parts, sizes,
-        )  # fmt: skip
-    else:
-        finite, sampled = evaluate_noting(
-            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-            weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-        )  # fmt: skip
+    finite, sampled = evaluate_anew(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+    )  # fmt: skip
     if not finite:
         return OTHER, sampled
     m = scale.shape[0]

@@ -18,7 +18,7 @@ from suboctave.bifurcation.bordered_kernels import border_at
 from suboctave.compiled import kernel, ready
 from suboctave.continuation.linear import Factor
 from suboctave.harmonic.changes import changes_by
-from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian
+from suboctave.harmonic.evaluation import evaluate, evaluate_anew, evaluate_told, jacobian
 from suboctave.harmonic.group_kernels import add_along, add_pieces
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind
@@ -87,17 +87,10 @@ def evaluate_and_border(
     x, ..., sizes: as in `evaluation.evaluate_told`, `points` and what follows None without steps. moving, ..., pivots:
     as in `bordered_kernels.border_at`. vectors (2, N + 1): filled with v and u, without the weights, g / size last.
     """
-    sampled = np.empty((4, 0))
-    if points is None:
-        finite = evaluate(
-            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-            weight, table, motions, parts, sizes,
-        )  # fmt: skip
-    else:
-        finite, sampled = evaluate_noting(
-            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-            weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-        )  # fmt: skip
+    finite, sampled = evaluate_anew(
+        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
+        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
+    )  # fmt: skip
     v, u = vectors[0], vectors[1]
     singular = border_at(
         table, moving, rate, mean, starts, dofs, shape, matrices, frequencies, omega, x, scale, left, right, size,
@@ -109,7 +102,7 @@ def evaluate_and_border(
     return finite, singular, sampled
 
 
-@kernel()
+@kernel(alone=True)
 def gradient_and_matrix(
     left, right, mean, motions, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points, widths, steps,
     step_first, line, rule_nodes, rule_weights, noted, top, frequencies, omega, matrices, table, moving, rate,
@@ -167,8 +160,8 @@ def evaluate_at_once(evaluation: TrackedEvaluation) -> None:
     # what it calls is compiled one by one, not all at one go
     asked = packed.told, len(packed.pieces) > 0
     if asked not in _EVALUATED:
-        called = (evaluate_noting, packed.told), (add_pieces, len(packed.pieces))
-        if not all(map(ready, [evaluate, border_at, *(part for part, needed in called if needed)])):
+        called = [evaluate_told if packed.told else evaluate, border_at, *([add_pieces] if asked[1] else [])]
+        if not all(map(ready, called)):
             return
         _EVALUATED.add(asked)
     high, size, count, mean = basis.harmonics, balance.size, len(balance.groups), kind is Kind.INTEGER
@@ -216,7 +209,7 @@ def matrix_at_once(evaluation: TrackedEvaluation, row: Array, weights: Array) ->
     asked = packed.sampled, packed.told, len(packed.pieces) > 0, packed.polynomial.shape[1] > 2
     if asked not in _DIFFERENTIATED:
         called = closed_parts(packed)
-        own: list[Callable[..., Any]] = [noted_gradient, toeplitz_part, add_along, bordered_by_rows]
+        own: list[Callable[..., Any]] = [noted_gradient, bordered_by_rows]
         if called is None or not all(map(ready, called + own)):
             return None
         _DIFFERENTIATED.add(asked)

@@ -8,8 +8,7 @@ what they do. Only what the laws and the load are at an iterate's parameter is a
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -29,47 +28,24 @@ from suboctave.analysis.tracked_iteration import (
     differentiated,
     looked_at,
 )
-from suboctave.analysis.tracked_matrix import bordered_by_rows
 from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import Bordered
-from suboctave.bifurcation.bordered_kernels import border
-from suboctave.compiled import ready
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import NewtonOptions, not_converged
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.evaluation import evaluate, evaluate_noting, jacobian, told_steps
+from suboctave.harmonic.evaluation import told_steps
 from suboctave.harmonic.group_force import PackedLaws
-from suboctave.harmonic.group_kernels import add_along, add_pieces
-from suboctave.harmonic.law_changes import change_of_pieces, change_of_steps
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.real_form import closed_parts, noted_gradient, toeplitz_part
 from suboctave.harmonic.state import BalanceState
 
 if TYPE_CHECKING:
     from suboctave.analysis.tracked_curve import TrackedCurve
 
-#: the kinds of laws for which all kernels that are called are compiled
-_COMPILED: set[tuple[bool, ...]] = set()
 #: scratch matrices of a thread, of up to as many rows
 _OWN = threading.local()
 _KEPT = 500
 _NO_NODES = np.empty((4, 0))
-
-
-def _at_hand(packed: PackedLaws, pieces: bool, steps: bool) -> bool:
-    """Whether all kernels that are called are compiled: one by one, not all at one go."""
-    asked = packed.sampled, packed.told, len(packed.pieces) > 0, packed.polynomial.shape[1] > 2, pieces, steps
-    if asked not in _COMPILED:
-        called = closed_parts(packed)
-        own: list[Callable[..., Any]] = [evaluate, jacobian, border, noted_gradient, toeplitz_part, add_along]
-        kinds = (evaluate_noting, packed.told), (add_pieces, len(packed.pieces))
-        changes = (change_of_pieces, pieces), (change_of_steps, steps)
-        own += [bordered_by_rows, *(part for part, needed in kinds + changes if needed)]
-        if called is None or not all(map(ready, called + own)):
-            return False
-        _COMPILED.add(asked)
-    return True
 
 
 def applies(curve: TrackedCurve) -> bool:
@@ -144,8 +120,6 @@ def corrected(
         values = {**balance.values, name: float(u[-1])}
         laws_there = along.at(values)
         packed = laws_there.packed
-        if not _at_hand(packed, False, False):
-            return None
         told = told_steps(packed) if packed.told else (None,) * 7
         pieces = packed.pieces if len(packed.pieces) else None
         laws = (*balance.directions, pieces, packed.first, packed.polynomial, balance.grid, nodes)
@@ -159,7 +133,7 @@ def corrected(
         ended, sampled = looked_at(u, *same, limits, *factors, *found)
         if ended in (ANEW, LAST):
             change = along.changes(values, laws_there)
-            if change is None or not _at_hand(packed, len(change.pieces) > 0, len(change.steps) > 0):
+            if change is None:
                 return None
             if memo[GIVEN] and memo[FACTORS]:
                 # the factors given are those of another point

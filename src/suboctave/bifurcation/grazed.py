@@ -89,7 +89,7 @@ def grazed(
         if not math.isfinite(total):
             return OTHER
         x = u[:n].reshape(parts.shape[1], size)
-        finite = evaluate_anew(
+        finite, _sampled = evaluate_anew(
             x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
             weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
         )  # fmt: skip

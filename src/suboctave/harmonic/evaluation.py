@@ -115,12 +115,22 @@ def add_told(c, points, widths, steps, line, grid, rule_nodes, rule_weights, for
 
 
 @kernel()
-def evaluate_noting(
+def evaluate_told(
     x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
     points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
 ):  # fmt: skip
-    """`evaluate_told`, which returns besides the nodes of the last direction that has steps, as `sharp_nodes` gives
-    them.
+    """`evaluate` with laws that have arctan steps; the table's spectra are zero before. Returns besides the nodes of
+    the last direction that has steps, as `sharp_nodes` gives them.
+
+    Parameters
+    ----------
+    points, widths, steps, step_first
+        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
+        each direction's begin, (G + 1,).
+    line
+        Constant and slope of the laws that they belong to, (G, 2).
+    rule_nodes, rule_weights
+        `sharp_nodes.tables()`.
     """
     along_directions(x, starts, dofs, shape, motions)
     sampled = np.empty((4, 0))
@@ -139,44 +149,20 @@ def evaluate_noting(
 
 
 @kernel()
-def evaluate_told(
-    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
-    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-):  # fmt: skip
-    """`evaluate` with laws that have arctan steps; the table's spectra are zero before.
-
-    Parameters
-    ----------
-    points, widths, steps, step_first
-        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
-        each direction's begin, (G + 1,).
-    line
-        Constant and slope of the laws that they belong to, (G, 2).
-    rule_nodes, rule_weights
-        `sharp_nodes.tables()`.
-    """
-    finite, _sampled = evaluate_noting(
-        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-    )  # fmt: skip
-    return finite
-
-
-@kernel()
 def evaluate_anew(
     x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
     points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
 ):  # fmt: skip
-    """`evaluate`, or `evaluate_told` where there are `points`, into a table that holds anything before."""
-    for part in range(table.shape[0]):
-        for g in range(table.shape[1]):
-            for q in range(table.shape[2]):
-                table[part, g, q] = 0.0
+    """`evaluate`, or `evaluate_told` where there are `points`, into a table that holds anything before; returns
+    whether the forces are finite, and the nodes of the last direction with steps, (4, 0) without any.
+    """
+    table.fill(0.0)
     if points is None:
-        return evaluate(
+        finite = evaluate(
             x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
             weight, table, motions, parts, sizes,
         )  # fmt: skip
+        return finite, np.empty((4, 0))
     return evaluate_told(
         x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
         weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
@@ -293,7 +279,7 @@ def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
     filled = (table, motions, parts, sizes)
     known = state.__dict__
     if packed.told:
-        finite, sampled = evaluate_noting(*(*given, *told_steps(packed), *filled))
+        finite, sampled = evaluate_told(*(*given, *told_steps(packed), *filled))
         known["_told_nodes"] = int(packed.step_owner[-1]), sampled
     else:
         finite = evaluate(*given, *filled)
