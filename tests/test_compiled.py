@@ -150,3 +150,11 @@ def test_a_failure_is_passed_on(made):
     total = made()
     with pytest.raises(TypeError):
         total(np.array([None]))
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_large_arguments_have_a_kernel_compiled_at_once_unless_that_takes_seconds(made, alone):
+    total = made(f"alone={alone}")
+    compiled.computation_begins()
+    total(np.ones(compiled.LARGE + 1))
+    assert bool(total.signatures) != alone

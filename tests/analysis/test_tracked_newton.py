@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from functools import cache
 
 import numpy as np
@@ -184,3 +186,36 @@ def test_whole_curves_agree(monkeypatch):
     for a, b in zip(one.points, other.points, strict=True):
         assert a.orbit.omega == pytest.approx(b.orbit.omega, abs=1e-9)
         assert a.coefficient == pytest.approx(b.coefficient, rel=1e-6)
+
+
+ORDINARY = """
+import suboctave as so
+from suboctave.analysis import response, tracked_newton
+calls = dict.fromkeys(("corrected", "looked_at", "differentiated"), 0)
+
+def counting(module, name):
+    own = getattr(module, name)
+    def counted(*args):
+        calls[name] += 1
+        return own(*args)
+    setattr(module, name, counted)
+
+counting(response, "corrected"), counting(tracked_newton, "looked_at"), counting(tracked_newton, "differentiated")
+system = so.library.reference_oscillator(p=0.55, j=0.05, **LAW)
+item = so.frequency_response(system, (4.5, 1.3), 15).bifurcations["PD"][0]
+so.track(item, "Kc", (4.0, 9.0))
+print(*calls.values())
+"""
+
+
+@pytest.mark.parametrize("law", [{}, {"regularization": 3000.0}])
+def test_ordinary_processes_use_compiled_searches(law):
+    """Where not everything is compiled when it is called, but has been by an earlier process: this one."""
+    system = so.library.reference_oscillator(p=0.55, j=0.05, **law)
+    so.track(so.frequency_response(system, (4.5, 1.3), 15).bifurcations["PD"][0], "Kc", (4.0, 9.0))
+    done = subprocess.run(
+        [sys.executable, "-c", ORDINARY.replace("LAW", repr(law))], capture_output=True, text=True, check=True
+    )
+    responses, looks, matrices = map(int, done.stdout.split())
+    assert responses > 10
+    assert looks > matrices > 10

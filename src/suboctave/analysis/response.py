@@ -201,13 +201,7 @@ class ResponseCurve:
         spare: float,
         factor: Factor | None = None,
     ) -> Solved | None:
-        """`newton.correct` in one compiled call; None where that does not go.
-
-        Raises
-        ------
-        ConvergenceError
-            If the iterations do not contract or run out.
-        """
+        """See `Curve`: `newton.correct` in one compiled call."""
         known, balance = self._known, self.balance
         # what it calls is compiled one by one, not all at one go
         if factor is not None or known is None or not all(map(ready, known[1])):

@@ -220,13 +220,7 @@ class TrackedCurve:
         spare: float,
         known: Factor | None = None,
     ) -> Solved | None:
-        """`newton.correct` in few compiled calls; None where that does not go.
-
-        Raises
-        ------
-        ConvergenceError
-            If the iterations do not contract or run out.
-        """
+        """See `Curve`: `newton.correct` in few compiled calls."""
         if not tracked_newton.applies(self):
             return None
         found = tracked_newton.corrected(self, guess, row, weights, options, spare, known)

@@ -224,6 +224,3 @@ def differentiated(
     away = stepped(u, guess, row, weights, parts[2].ravel(), value * force, lu, pivots, memo)
     memo[ITERATION] += 1
     return UNSOLVED if away else MOVED
-
-
-__all__ = ["ANEW", "LAST", "MOVED", "SOLVED", "UNSOLVED", "differentiated", "looked_at"]

@@ -41,7 +41,7 @@ class Curve(Protocol):
     to.
 
     It may have a method `corrected(guess, row, weights, options, spare, known)` too, which does what `newton.correct`
-    does at once, or returns None.
+    does at once and raises what that does, or returns None where it does not go.
     """
 
     @property

@@ -115,3 +115,9 @@ class StructuralMatrices:
 def _dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, frequency: Array, order: int) -> ComplexArray:
     blocks: ComplexArray = group_kernels.dynamic_stiffness(mass, damping, stiffness, frequency, order)
     return blocks
+
+
+def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
+    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
+    result: Array = group_kernels.apply_blocks(np.ascontiguousarray(blocks, dtype=complex), np.ascontiguousarray(x))
+    return result

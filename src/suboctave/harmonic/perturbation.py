@@ -22,9 +22,10 @@ import numpy as np
 from suboctave.harmonic import free_form, kernels, nodal_second, real_form
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.changes import changes_by
+from suboctave.harmonic.linear_part import apply_blocks
 from suboctave.harmonic.local_force import CoefficientChange, Curvature
 from suboctave.harmonic.second import Direction, second_derivative
-from suboctave.harmonic.state import BalanceState, apply_blocks
+from suboctave.harmonic.state import BalanceState
 
 
 class Kind(Enum):

@@ -19,7 +19,7 @@ from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectru
 from suboctave.harmonic.changes import changes_by
 from suboctave.harmonic.closed_bends import ClosedBends, closed_bends
 from suboctave.harmonic.group_force import Group, PackedLaws, curvature_of
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices, apply_blocks
 from suboctave.harmonic.local_force import Curvature, LocalMotion
 from suboctave.harmonic.neglected import completed_coefficients, excited
 from suboctave.harmonic.nodal import NodalForce, add_tangent, nodal_forces
@@ -395,9 +395,3 @@ def length(vector: Array) -> float:
     """Euclidean norm of all entries."""
     flat = vector.ravel()
     return math.sqrt(flat.dot(flat))
-
-
-def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
-    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
-    result: Array = group_kernels.apply_blocks(np.ascontiguousarray(blocks, dtype=complex), np.ascontiguousarray(x))
-    return result
