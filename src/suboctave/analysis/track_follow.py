@@ -17,7 +17,7 @@ from suboctave.analysis.tracked_events import Found, events_between, extreme_of,
 from suboctave.analysis.tracked_hidden import HiddenPairs
 from suboctave.analysis.tracked_located import as_event
 from suboctave.analysis.tracked_pairs import PairWatch
-from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.analysis.tracked_sample import TrackedSample
 from suboctave.analysis.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
@@ -158,7 +158,7 @@ class _Tracker:
             return None
         if self.march.closed:
             new = self._closing(self.previous, new)
-        a = same_discretisation(self.previous, new, settings.newton)
+        a = self.previous
         end = end_between(a, new, settings.newton)
         if end is not None:
             self._take_end(a, end)

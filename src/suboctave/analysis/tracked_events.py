@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from scipy.optimize import brentq
 
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_sample import BEGINNING, TrackedSample, nearest_point, zero_along
+from suboctave.analysis.tracked_sample import BEGINNING, TrackedSample, nearest_point, same_discretisation, zero_along
 from suboctave.analysis.tracked_tests import CurveTest, Cusp, Extremum
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -51,7 +52,11 @@ class Found:
 def events_between(
     a: TrackedSample, b: TrackedSample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
 ) -> list[Found]:
-    """Every event between two neighbours in the same discretisation, in the order met."""
+    """Every event between two neighbours, in the order met.
+
+    The first one's tests count in the discretisation it was found in, as on the step before: what changes sign there
+    is not lost, nor found twice, if that of the second one's moves it across.
+    """
     found: list[Found] = []
     for test in tests:
         try:
@@ -67,7 +72,15 @@ def events_between(
 def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: NewtonOptions) -> Found | None:
     """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
     own = test.within(low, high)
-    stretch = _Stretch(low, high, own, newton)
+    same = same_discretisation(low, high, newton)
+    stretch = _Stretch(same, high, own if same is low else own.within(same, high), newton)
+    own = stretch.test
+    if same is not low and stretch.values[0.0] * stretch.values[1.0] > 0.0:
+        # in this discretisation it lies before the first
+        way = high.point.arclength - low.point.arclength
+        slope = (stretch.values[1.0] - stretch.values[0.0]) / way
+        sample = zero_along(same.point, own.value, newton, way, slope)
+        return Found(own, sample, extreme_of(test, low), None, slope) if own.genuine(sample) else None
     # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
     close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
     sample, slope = stretch.about(_ROUGH if close else 0.0)
@@ -197,7 +210,9 @@ class _Stretch:
         self.spare = BEGINNING
         # components of a tangent change evenly; others may be large at one end
         even = isinstance(self.test, Extremum)
-        self.value(self._turn() if even or first == last else first / (first - last))
+        scaled = _even(first, last)
+        start, stop = scaled(first), scaled(last)
+        self.value(self._turn() if even or start == stop else start / (start - stop))
         size = max if even else min
         little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
         share = self._root(resolved or _RESOLVED, little)
@@ -243,20 +258,16 @@ class _Stretch:
     def _root(self, resolved: float, little: float = 0.0) -> float:
         """The share at which the test vanishes, or its modulus is below `little`, by Brent's method.
 
-        Of functions that are large at one end its logarithm is taken there, lest their secants stay at the other.
+        Secants are those of `_even`.
         """
         for low, high in itertools.pairwise(sorted(self.values)):
             first, last = self.values[low], self.values[high]
             if first * last > 0.0:
                 continue
-            least, most = sorted((abs(first), abs(last)))
-            unit = least if _LARGE * least < most else 0.0
 
-            def value(share: float, unit: float = unit) -> float:
+            def value(share: float, scaled: Callable[[float], float] = _even(first, last)) -> float:
                 found = self.value(share)
-                if abs(found) <= little:
-                    return 0.0
-                return math.asinh(found / unit) if unit else found
+                return 0.0 if abs(found) <= little else scaled(found)
 
             return float(brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
         raise ConvergenceError("the test does not change sign")
@@ -265,6 +276,16 @@ class _Stretch:
         """The point at a share."""
         self.value(share)
         return self.samples[share]
+
+
+def _even(first: float, last: float) -> Callable[[float], float]:
+    """What a test's values are taken as between two ends: as they are, or, where those at one end are large, about as
+    their logarithm, lest secants stay at the other.
+    """
+    least, most = sorted((abs(first), abs(last)))
+    if not 0.0 < _LARGE * least < most:
+        return float
+    return lambda value: math.asinh(value / least)
 
 
 def _finer(sample: TrackedSample) -> HarmonicBasis | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from suboctave.analysis.tracked_events import Found, located
 from suboctave.analysis.tracked_hidden import HiddenPairs
-from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
+from suboctave.analysis.tracked_sample import TrackedSample
 from suboctave.analysis.tracked_tests import PairCrossing
 from suboctave.continuation import NewtonOptions
 from suboctave.errors import ConvergenceError
@@ -67,7 +67,7 @@ class PairWatch:
             found += self._hidden.passed(b, warnings)
             if self.test.changed(a, b):
                 try:
-                    item = located(self.test, same_discretisation(a, b, self.newton), b, self.newton)
+                    item = located(self.test, a, b, self.newton)
                 except ConvergenceError as failure:
                     warnings.append(f"{self.test.kind} near {b.curve.where(b.point.u)}: {failure}")
                     continue

@@ -221,7 +221,7 @@ class PairCrossing(CurveTest):
         return _passing(a.others, b.others) is not None
 
     def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
-        """See `CurveTest.within`."""
+        """See `CurveTest.within`; the target stays where none passes."""
         pair = _passing(a.others, b.others)
         target = self.target if pair is None else (pair[0] + pair[1]) / abs(pair[0] + pair[1])
         assert target is not None
