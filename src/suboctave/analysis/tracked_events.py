@@ -264,8 +264,9 @@ class _Stretch:
             first, last = self.values[low], self.values[high]
             if first * last > 0.0:
                 continue
+            scaled = _even(first, last)
 
-            def value(share: float, scaled: Callable[[float], float] = _even(first, last)) -> float:
+            def value(share: float, scaled: Callable[[float], float] = scaled) -> float:
                 found = self.value(share)
                 return 0.0 if abs(found) <= little else scaled(found)
 
