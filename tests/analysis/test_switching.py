@@ -190,6 +190,26 @@ def test_both_ways_the_other_branch_closes_through_both_branch_points(symmetric)
     assert whole.audit.complete
 
 
+def test_mirror_images_have_bifurcations_of_their_own():
+    """Every event of one half of a closed branch of unsymmetric motions is on the other too, with the same amplitude."""
+    curve = so.frequency_response(so.library.duffing(c=0.1, F=30.0), (4.0, 0.5))
+    for start in curve.bifurcations["BP"][:3]:
+        loop = so.switch_branch(start)
+        assert "closed" in loop.ended
+        found = [b for b in loop.bifurcations if b.kind != "BP"]
+        half = len(found) // 2
+        assert half >= 4
+        assert [b.kind for b in loop.bifurcations].count("BP") == 2
+        for one, other in zip(found[:half], reversed(found[half:]), strict=True):
+            assert one.kind == other.kind
+            assert one.omega == pytest.approx(other.omega, rel=1e-9)
+            assert not one.orbit.matches(other.orbit, 1e-3)
+            # half a period later with the other sign
+            turned = one.orbit.amplitudes * -((-1.0) ** np.arange(one.orbit.basis.harmonics + 1))[:, None]
+            top = min(len(turned), len(other.orbit.amplitudes))
+            assert np.abs(turned[:top] - other.orbit.amplitudes[:top]).max() < 1e-5 * one.amplitude
+
+
 def test_going_on_from_a_branch_point_stays_on_its_own_branch(symmetric):
     """Not along an arbitrary mix of the two: the symmetric motions have no mean."""
     again = so.continue_branch(symmetric.bifurcations["BP"][0], "omega", (0.15, 3.5))

@@ -31,6 +31,10 @@ from suboctave.errors import ConvergenceError, InputError
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point
 _APART = 1e-5
+#: share of a motion's size by which one located twice may differ
+_SAME = 1e-4
+#: amplitude that `numpy.isclose` takes for none
+_NOTHING = 1e-8
 _NOT_FOUND = {
     "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
     "LP": "the branch turns back, but its limit point could not be located",
@@ -353,7 +357,10 @@ def same_event(a: Bifurcation, b: Bifurcation) -> bool:
     if a.kind != b.kind or (a.kind == "grazing" and _element(a) != _element(b)):
         return False
     same_place = np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9)
-    return bool(same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6))
+    if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
+        return False
+    # the mirror image of a motion has its amplitude; at rest there is nothing to compare
+    return max(a.amplitude, b.amplitude) <= _NOTHING or a.orbit.matches(b.orbit, _SAME)
 
 
 def _element(item: Bifurcation) -> int | None:

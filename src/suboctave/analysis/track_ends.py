@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -23,7 +24,7 @@ from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
 from suboctave.analysis.tracked_tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
-from suboctave.bifurcation.augmented import BranchPointUnfolded, SingularOperator
+from suboctave.bifurcation.augmented import Augmentation, BranchPointUnfolded, SingularOperator
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
@@ -32,6 +33,9 @@ from suboctave.harmonic.perturbation import Kind
 
 #: sub-harmonic share of the motion from which on the end of the curve is looked for, and which is none any more
 _FAINT, _NOTHING_LEFT = 3e-3, 1e-5
+#: speed in the plane of the parameters below which it is looked for as well, and distance there at which it is reached
+#: whatever the share: what more of the way a motion of little damping shows is less than residuals tell
+_STANDING, _REACHED = 1e-4, 2e-7
 #: way along the parent's curve, in scaled arclength, within which that end lies
 _BESIDE = 0.05
 #: the same along a curve of LP or PD for the end of an NS curve
@@ -56,9 +60,7 @@ class End:
 
     def way(self, a: TrackedSample) -> float:
         """Distance in the plane of the parameters from a point to the event, in scaled arclength."""
-        if self.event is None:
-            return 0.0
-        return float(np.linalg.norm(a.point.weights[-2:] * (self.event.sample.point.u[-2:] - a.point.u[-2:])))
+        return 0.0 if self.event is None else _apart(self.event.sample.point, a.point)
 
 
 def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
@@ -84,8 +86,9 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
     if b.curve.balance.basis.nu == 1:
         return None
     share = subharmonic_share(b.point)
-    parent = _on_the_parent(a, newton) if share <= _FAINT else None
-    if parent is not None:
+    faint = share <= _FAINT
+    parent = _on_the_parent(a, newton) if faint or (_stands(b) and share < subharmonic_share(a.point)) else None
+    if parent is not None and (faint or _apart(parent.sample.point, b.point) <= _REACHED):
         where = parent.sample.curve.where(parent.sample.point.u)
         reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
         return End(reason, parent, last=True)
@@ -95,6 +98,16 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def _apart(one: CurvePoint, other: CurvePoint) -> float:
+    """Distance in the plane of the parameters, in scaled arclength."""
+    return float(np.linalg.norm(other.weights[-2:] * (one.u[-2:] - other.u[-2:])))
+
+
+def _stands(b: TrackedSample) -> bool:
+    """Whether the parameters hardly change along a curve."""
+    return float(np.linalg.norm(b.point.weights[-2:] * b.point.tangent[-2:])) <= _STANDING
 
 
 def _symmetric(b: TrackedSample) -> bool:
@@ -115,15 +128,29 @@ def _split(b: TrackedSample) -> bool:
 
 
 def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
-    """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP or PD curve through it."""
-    order, operator = (2, Kind.HALF) if double else (1, Kind.INTEGER)
+    """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP, BP or PD curve through it."""
+    order = 2 if double else 1
     words = f"1:{order}"
     if a.curve.augmentation.turning:
         return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)}")
-    try:
-        found = _zero_beside(a, a.curve, a.state.x, operator, DoubleMultiplier(order), newton, _AROUND)
-    except ConvergenceError as failure:
-        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failure})")
+    balance, name = a.curve.balance, a.curve.names[0]
+    state = balance.at(a.state.x, a.state.omega, a.state.values)
+    # limit points of motions with a symmetry may be branch points, where the equations of limit points are singular
+    singled_out: list[Callable[[], Augmentation]] = [
+        lambda: SingularOperator.of(state, Kind.HALF if double else Kind.INTEGER)
+    ]
+    if not double:
+        singled_out.append(lambda: BranchPointUnfolded.of(state, name))
+    failures = []
+    for augmentation in singled_out:
+        try:
+            curve = replace(a.curve, augmentation=augmentation())
+            found = _zero_beside(a, curve, a.state.x, DoubleMultiplier(order), newton, _AROUND)
+            break
+        except ConvergenceError as failure:
+            failures.append(str(failure))
+    else:
+        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failures[0]})")
     where = found.sample.curve.where(found.sample.point.u)
     return End(f"the curve ends in a {words} resonance at {where}", found, last=True)
 
@@ -136,25 +163,18 @@ def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
     x = basis.even_part(a.state.x)
     try:
         balance = a.curve.balance.with_basis(basis.halved).settle(x, a.state.omega, a.state.values)
-        curve = replace(a.curve, balance=balance, cache={balance.basis: balance})
-        return _zero_beside(a, curve, x, Kind.HALF, GeneralisedDoubling(), newton, _BESIDE)
+        own = SingularOperator.of(balance.at(x, a.state.omega, a.state.values), Kind.HALF)
+        curve = replace(a.curve, balance=balance, augmentation=own, cache={balance.basis: balance})
+        return _zero_beside(a, curve, x, GeneralisedDoubling(), newton, _BESIDE)
     except ConvergenceError:
         return None
 
 
 def _zero_beside(
-    a: TrackedSample,
-    curve: TrackedCurve,
-    x: Array,
-    operator: Kind,
-    test: CurveTest,
-    newton: NewtonOptions,
-    reach: float,
+    a: TrackedSample, curve: TrackedCurve, x: Array, test: CurveTest, newton: NewtonOptions, reach: float
 ) -> Found:
     """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
-    state = curve.balance.at(x, a.state.omega, a.state.values)
-    curve = replace(curve, augmentation=SingularOperator.of(state, operator))
-    u = curve.join(x, np.zeros(0), a.point.u[-2:])
+    u = curve.join(x, np.zeros(curve.augmentation.extras), a.point.u[-2:])
     start = nearest_point(curve, u, curve.weights(u, curve.size(u)), newton)
     return Found(test, zero_along(start, test.value, newton, reach))
 

@@ -31,6 +31,8 @@ _JUMP = 1e-4
 _HALVED = 20
 #: corners after which no further one is passed
 _CORNERS = 5
+#: way before a corner, in scaled arclength, on which what turns there is not told from it
+_CORNER = 1e-5
 
 
 @dataclass
@@ -77,6 +79,8 @@ class _Tracker:
         pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
         self.pairs = PairWatch(pairs, settings.newton)
         self.corners = 0
+        #: the first point, headed as the curve leaves it
+        self.home: CurvePoint | None = None
 
     def run(self) -> TrackedTrace:
         trace = self.trace
@@ -88,7 +92,10 @@ class _Tracker:
                     break
                 stepping = self.settings.stepping
                 heading = math.copysign(1.0, beyond.tangent[-1])
-                self.march = March(beyond, heading, self.box.second, self.settings.newton, stepping, self._clear)
+                home = self.home
+                self.march = March(
+                    beyond, heading, self.box.second, self.settings.newton, stepping, self._clear, home=home
+                )
             trace.closed = self.march.closed
             self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
             trace.events.sort(key=lambda event: event.arclength)
@@ -136,7 +143,11 @@ class _Tracker:
                 event = as_event(found, self.settings.stability, self.settings.observe)
                 width = abs(float(beyond.u[i] - last.point.u[i]))
                 middle = 0.5 * (last.point.arclength + beyond.arclength)
-                self.trace.events.append(replace(event, isola="", uncertainty=width, arclength=middle))
+                item = replace(event, isola="", uncertainty=width, arclength=middle)
+                # what was found on the last steps into the corner is the corner
+                events = self.trace.events
+                events[:] = [e for e in events if middle - e.arclength > _CORNER or not _stands_for(item, e)]
+                events.append(item)
 
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
@@ -148,6 +159,7 @@ class _Tracker:
     def _accept(self, point: CurvePoint) -> str | None:
         """Take a point in; a sentence if the curve ends there or before it."""
         settings, new = self.settings, TrackedSample(point)
+        self.home = self.home or point
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
             for watch in (self.hidden, self.pairs):
@@ -263,6 +275,12 @@ class _Tracker:
         solved.u[index] = bound
         arclength = a.point.arclength + right * (b.point.arclength - a.point.arclength)
         return TrackedSample(make_point(solved, b.curve, b.point.tangent, arclength))
+
+
+def _stands_for(corner: TrackedEvent, other: TrackedEvent) -> bool:
+    """Whether an event beside a corner in which a parameter turns is that turn, or the cusp that a rounded law has."""
+    turn = other.kind == "extremum" and other.parameter_name == corner.parameter_name
+    return other.kind == "CP" or (turn and other.extreme == corner.extreme)
 
 
 def _drop_seam(events: list[TrackedEvent]) -> None:

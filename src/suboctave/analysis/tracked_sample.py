@@ -14,7 +14,12 @@ from functools import lru_cache
 import numpy as np
 
 from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
-from suboctave.bifurcation.augmented import GrazingEquations, SingularEquations, SingularOperator
+from suboctave.bifurcation.augmented import (
+    BranchPointEquations,
+    GrazingEquations,
+    SingularEquations,
+    SingularOperator,
+)
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.cubic import cubic_coefficient
 from suboctave.bifurcation.extremum import ExtremalEquations
@@ -39,6 +44,8 @@ _AT_ZERO, _SECANT = 1e-10, 1e-6
 #: way along the tangent that leads no further off the curve than rounding, and its product with the secant's length
 #: from which on what the secant leaves is less than that
 _STRAIGHT, _SURE = 1e-7, 1e-13
+#: shortest corrections towards a curve before a point of it is solved for
+_SHORTEST = 6
 
 
 class TrackedSample:
@@ -53,10 +60,10 @@ class TrackedSample:
         self.state: BalanceState = point.evaluation.state
 
     @property
-    def equations(self) -> SingularEquations:
+    def equations(self) -> SingularEquations | BranchPointEquations:
         """The scalar equations, where they are those of a singular operator."""
         equations = self.evaluation.equations.own
-        assert isinstance(equations, SingularEquations)
+        assert isinstance(equations, SingularEquations | BranchPointEquations)
         return equations
 
     @lazy
@@ -104,7 +111,7 @@ class TrackedSample:
 
     @lazy
     def twist(self) -> float:
-        """psi . (dJ_kappa/dkappa) phi of an LP or PD; 0 where it is rounding."""
+        """psi . (dJ_kappa/dkappa) phi of an LP, BP or PD; 0 where it is rounding."""
         equations = self.equations
         b = equations.bordered
         size = length(b.left / b.scale) * length(b.right / b.scale) * self.state.omega
@@ -229,6 +236,18 @@ def nearest_point(
         If Newton's method does not converge.
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
+    try:
+        return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
+    except ConvergenceError:
+        if along is not None:
+            raise
+    # the plane through the guess may miss a curve that turns sharply: the shortest corrections lead to it
+    for _ in range(_SHORTEST):
+        factor = Factor.of(np.vstack((curve.evaluate(u).jacobian / weights, row)))
+        if factor.singular:
+            break
+        u = u - factor.solve(np.append(curve.evaluate(u).residual, 0.0)) / weights
+        row = null_row(curve, u, weights)
     return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
 
 
@@ -278,21 +297,33 @@ def zero_along(
     # not so short that the secant would be one through rounding
     s, old = math.copysign(min(max(abs(step), _SECANT), 0.02 * reach), step), 0.0
     guess = start.u + s * row / weights
-    before = start.u
-    for _ in range(iterations):
-        solved = correct(curve, guess, row, weights, newton, factor)
+    before, last = start.u, None
+    for iteration in range(iterations):
+        try:
+            solved = correct(curve, guess, row, weights, newton, factor)
+        except ConvergenceError:
+            # a curve that turns sharply does not reach as far along one tangent
+            if last is not None:
+                return zero_along(last, function, newton, reach, slope, iterations - iteration)
+            if abs(s) < 10.0 * _SECANT:
+                raise
+            s *= 0.1
+            guess = start.u + s * row / weights
+            continue
         factor = solved.factor
-        sample = TrackedSample(make_point(solved, curve, start.tangent, start.arclength + s))
+        last = make_point(solved, curve, start.tangent, start.arclength + s)
+        sample = TrackedSample(last)
         value = function(sample)
         if value == value_old and value != 0.0:
             break
-        change = value * (s - old) / (value - value_old) if value != 0.0 else 0.0
+        slope = (value - value_old) / (s - old)
+        change = value / slope if value != 0.0 else 0.0
         if abs(change) < _AT_ZERO:
             return sample
         if abs(change) < _STRAIGHT and abs(change * (s - old)) < _SURE:
-            last = _beside(sample.point, -change, newton)
-            if last is not None:
-                return last
+            found = _beside(last, -change, newton)
+            if found is not None:
+                return found
         # on the straight line through the last two, in the plane that belongs to the next
         guess = solved.u - change * (solved.u - before) / (s - old)
         s, old, value_old, before = s - change, s, value, solved.u

@@ -24,7 +24,7 @@ from suboctave.errors import ConvergenceError, InputError
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
 #: points from which on a march watches whether it goes round and round without passing its start
-_LONG = 256
+_LONG = 32
 #: how often a step is halved towards the bound that it passes; Newton's method does the rest
 _HALVED = 20
 #: share of a step over which derivatives count as the same
@@ -128,6 +128,8 @@ class March:
         shorter than `min_step` already).
     arrive
         Called with two neighbours; where the curve meets another one between them and ends there, it says so.
+    home
+        A point already passed, in the direction of its tangent, at which the curve is closed; default: the start.
     """
 
     def __init__(
@@ -139,6 +141,7 @@ class March:
         stepping: SteppingOptions,
         inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None,
         arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None,
+        home: CurvePoint | None = None,
     ) -> None:
         self.start = start
         self.bounds = bounds
@@ -146,6 +149,7 @@ class March:
         self.stepping = stepping
         self.inspect = inspect
         self.arrive = arrive
+        self.home = home
         self.closed = False
         self.ended = "not started"
         self._direction = direction
@@ -154,7 +158,7 @@ class March:
         """Points in order, the start first."""
         options = self.stepping
         point = self._set_out()
-        home = _Place(point)
+        home = _Place(self.home or point)
         mark: _Place | None = None
         marked = 0
         yield point

@@ -1,0 +1,70 @@
+"""Where tracked curves end: closed behind corners, at the parent's period doublings, in 1:1 resonances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+
+
+def test_a_curve_that_closes_behind_corners_is_run_through_once():
+    """Limit points between two preloaded stops: rounded they close with two cusps, exact with two corners instead."""
+    found = {}
+    for law in ({}, {"regularization": 3000.0}):
+        stops = [
+            so.ElasticStop(0, 4.0, "g", side="right", **law),
+            so.ElasticStop(0, 2.0, -1.0, side="left", **law),
+        ]
+        system = so.System(1.0, 0.06, 1.0, stops, [so.HarmonicLoad(0, 0.4)], {"g": -0.5})
+        limit_points = so.frequency_response(system, (1.2, 1.8)).bifurcations["LP"]
+        first = min(limit_points, key=lambda b: abs(b.omega - 1.465))
+        curve = so.track(first, "g", (-1.0, 0.9), omega=(0.36, 4.95))
+        assert curve.closed
+        assert len(curve) < 100
+        found[bool(law)] = curve
+    crossed = np.diff(np.sign(found[False].parameter("g") + 0.6)) != 0
+    assert crossed.sum() == 2
+    cusps = [(e.omega, e.parameter("g")) for e in found[True].bifurcations if e.kind == "CP"]
+    corners = [(e.omega, e.parameter("g")) for e in found[False].bifurcations]
+    assert len(cusps) == 2
+    assert len(corners) == 4
+    for omega, gap in cusps:
+        beside = [c for c in corners if abs(c[0] - omega) < 5e-3 and abs(c[1] - gap) < 5e-3]
+        assert len(beside) == 2
+
+
+@pytest.mark.parametrize("damping", [1e-2, 1e-3, 1e-4])
+def test_doubled_limit_points_of_little_damping_end_where_they_leave_the_parent(damping):
+    """At the tip of a narrow tongue residuals tell limit points and period doublings apart for a small part of the way.
+
+    With damping and load smaller alike, the tip moves to F = 5 damping at omega = 2, the end with the square.
+    """
+    spring = so.PolynomialSpring(0, {2: 0.6, 3: 0.5})
+    system = so.System(1.0, damping, 1.0, [spring], [so.HarmonicLoad(0, "F")], {"F": 10.0 * damping})
+    doubling = so.frequency_response(system, (1.5, 2.6)).bifurcations["PD"][0]
+    limit_point = so.switch_branch(doubling).bifurcations["LP"][0]
+    curve = so.track(limit_point, "F", (damping, 100.0 * damping), omega=(1.3, 3.0))
+    assert [e.kind for e in curve.bifurcations] == ["GPD"]
+    (end,) = curve.bifurcations
+    assert (end.omega - 2.0) / damping**2 == pytest.approx(9.4, abs=0.4)
+    assert end.parameter("F") / damping - 5.0 == pytest.approx(270.0 * damping**2, rel=0.1)
+    assert "in a GPD" in curve.ended
+    assert len(curve) < 150
+
+
+@pytest.mark.parametrize("options", [{}, {"max_step": 0.02}])
+@pytest.mark.parametrize("low", [0.45, 0.4])
+def test_torus_curves_end_in_resonances_of_symmetric_motions(low, options):
+    """Forced van der Pol oscillator: at both ends kappa vanishes, once on a curve of branch points.
+
+    (0.50031, 1.0589) by shooting: the multipliers are on the unit circle up to F = 1.0585, with angles that vanish like
+    a square root in F.
+    """
+    system = so.System.from_equations("x'' - mu*(1 - x**2)*x' + x = F*cos(omega*t)", {"mu": 0.2, "F": 0.3})
+    torus = so.frequency_response(system, (0.5, 2.0)).bifurcations["NS"][0]
+    curve = so.track(torus, "F", (0.02, 3.0), omega=(low, 2.2), **options)
+    ends = [(e.omega, e.parameter("F")) for e in curve.bifurcations if e.kind == "R1"]
+    assert ends[0] == pytest.approx((0.949342, 0.192401), abs=2e-6)
+    assert ends[1] == pytest.approx((0.500306, 1.058939), abs=2e-5)
+    assert [e.kind for e in curve.bifurcations] == ["R1", "R4", "R3", "R3", "R4", "R1"]
