@@ -191,7 +191,7 @@ def test_both_ways_the_other_branch_closes_through_both_branch_points(symmetric)
 
 
 def test_mirror_images_have_bifurcations_of_their_own():
-    """Every event of one half of a closed branch of unsymmetric motions is on the other too, with the same amplitude."""
+    """Every event of one half of a closed branch of unsymmetric motions is on the other too, as large."""
     curve = so.frequency_response(so.library.duffing(c=0.1, F=30.0), (4.0, 0.5))
     for start in curve.bifurcations["BP"][:3]:
         loop = so.switch_branch(start)

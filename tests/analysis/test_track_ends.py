@@ -1,4 +1,7 @@
-"""Where tracked curves end: closed behind corners, at the parent's period doublings, in 1:1 resonances."""
+"""Where tracked curves end: closed behind corners, at the parent's period doublings, in 1:1 resonances.
+
+And curves that begin where the equations have a size of zero: at rest, on the unit circle.
+"""
 
 from __future__ import annotations
 
@@ -68,3 +71,50 @@ def test_torus_curves_end_in_resonances_of_symmetric_motions(low, options):
     assert ends[0] == pytest.approx((0.949342, 0.192401), abs=2e-6)
     assert ends[1] == pytest.approx((0.500306, 1.058939), abs=2e-5)
     assert [e.kind for e in curve.bifurcations] == ["R1", "R4", "R3", "R3", "R4", "R1"]
+
+
+def test_branch_points_of_rest_are_tracked():
+    """No forces balance there: the unfolding has the size of those that a motion would need."""
+    system = so.library.mathieu_duffing(eps=0.6)
+    first = so.frequency_response(system, (0.4, 3.0)).bifurcations["BP"][0]
+    curve = so.track(first, "eps", (0.05, 1.0))
+    (tip,) = curve.bifurcations
+    assert tip.remark().startswith("minimum of eps")
+    assert curve.amplitude.max() == 0.0
+    eps = curve.parameter("eps")
+    crossings = np.flatnonzero(np.diff(np.sign(eps - 0.65)))
+    assert len(crossings) == 2
+    beside = so.frequency_response(system.with_parameters({"eps": 0.65}), (0.85, 1.1)).bifurcations["BP"]
+    found = sorted(
+        np.interp(0.65, sorted(eps[i : i + 2]), curve.omega[i : i + 2][np.argsort(eps[i : i + 2])]) for i in crossings
+    )
+    assert found == pytest.approx(sorted(b.omega for b in beside), abs=2e-4)
+
+
+def test_a_branch_from_a_torus_point_finds_it():
+    """With one degree of freedom the product of the multipliers is one there, as without damping."""
+    system = so.System.from_equations(
+        "x'' - mu*(1 - x**2)*x' + x + a*x**3 = F*cos(omega*t)", {"mu": 0.5, "a": 0.2, "F": 0.6}
+    )
+    torus = so.frequency_response(system, (0.5, 2.0)).bifurcations["NS"][0]
+    curve = so.track(torus, "F", (0.3, 1.0), omega=(0.45, 2.2))
+    found = 0
+    inside = curve.orbits[1:-1]
+    for orbit in inside:
+        branch = so.continue_branch(orbit, "omega", (0.985 * orbit.omega, 1.015 * orbit.omega))
+        found += [b.kind for b in branch.bifurcations].count("NS")
+        assert not any("undamped" in words for words in branch.warnings)
+    assert found == len(inside)
+
+
+def test_multipliers_contradict_a_double_one():
+    """Constant damping keeps the product of the multipliers below one: a Helmholtz oscillator has no 1:1 resonance.
+
+    Close to its homoclinic motions few harmonics say otherwise.
+    """
+    spring = so.PolynomialSpring(0, {2: -1.0})
+    system = so.System(1.0, 0.1, 1.0, [spring], [so.HarmonicLoad(0, "F")], {"F": 0.05})
+    limit_point = so.frequency_response(system, (0.3, 2.2)).bifurcations["LP"][1]
+    curve = so.track(limit_point, "F", (0.005, 0.2), omega=(0.15, 3.3))
+    assert [e.kind for e in curve.bifurcations] == ["CP"]
+    assert any("R1" in words and "too few harmonics" in words for words in curve.warnings)

@@ -173,6 +173,17 @@ def test_branch_points_of_a_symmetric_system(duffing):
         assert b.criticality == "supercritical"
 
 
+def test_a_pitchfork_is_one_from_either_branch():
+    """At rest nothing but rounding breaks the symmetry, on the branch that leaves rest as on rest itself."""
+    rest = so.frequency_response(so.library.mathieu_duffing(eps=0.6), (0.4, 1.5))
+    branch = so.switch_branch(rest.bifurcations["BP"][0])
+    for one in rest.bifurcations["BP"]:
+        (other,) = (b for b in branch.bifurcations["BP"] if abs(b.omega - one.omega) < 1e-7)
+        assert other.normal_form.shape == one.normal_form.shape == "pitchfork"
+        assert other.criticality == one.criticality
+        assert other.normal_form["curvature"] == pytest.approx(one.normal_form["curvature"], rel=1e-6)
+
+
 def test_folds_bend_as_foretold(duffing):
     for b in duffing.bifurcations["LP"]:
         assert b.normal_form["curvature"] == pytest.approx(own_curvature(b, 1e-4), rel=1e-4)

@@ -303,7 +303,8 @@ class _Follower:
         if known is not None and known[0] is kind and known[1] is a and known[2] is b:
             return known[3]
         must_solve = kind is BRANCH_POINT
-        found = locate(kind, a, b, self.settings.newton, self._sample, guess_at, 9 if must_solve else 34)
+        begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
+        found = locate(kind, a, b, self.settings.newton, self._sample, guess_at, 9 if must_solve else 34, begins)
         if must_solve and found is not None and found.solution is None:
             found = None
         self._last_located = (kind, a, b, found)

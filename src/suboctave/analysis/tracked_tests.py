@@ -139,6 +139,17 @@ class DoubleMultiplier(CurveTest):
         """See `CurveTest.value`."""
         return sample.twist
 
+    def genuine(self, sample: TrackedSample) -> bool:
+        """See `CurveTest.genuine`; raises ConvergenceError where the multipliers contradict."""
+        critical = 1.0 if self.order == 1 else -1.0
+        apart = np.sort(np.abs(sample.evaluation.floquet.multipliers - critical))
+        if apart[1] > _RESONANT:
+            raise ConvergenceError(
+                f"the equations have a double multiplier {critical:+.0f} there, the monodromy matrix has none "
+                f"(the second lies {apart[1]:.2g} away): too few harmonics are kept"
+            )
+        return True
+
 
 @dataclass(frozen=True)
 class Resonance(CurveTest):

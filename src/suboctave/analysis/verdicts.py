@@ -166,7 +166,8 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
         a, b = points[max(first - 1, 0)], points[min(last + 1, len(points) - 1)]
         result = points[first].floquet
         ends = _value(a, name), _value(b, name)
-        if result.undamped:
+        # at a point where a pair lies on the circle the product may be one by chance
+        if all(point.floquet.undamped for point in (a, points[first], b)):
             notes.append(
                 f"between {name} = {ends[0]:.9g} and {ends[1]:.9g} the motion is undamped: its multipliers stay on the "
                 "unit circle, and nothing settles which side of it they are on"

@@ -221,17 +221,22 @@ class BranchPointUnfolded(Augmentation):
     @classmethod
     def of(cls, state: BalanceState, parameter: str) -> BranchPointUnfolded:
         """With the null vectors at a motion."""
-        return cls(null_vectors(state, Kind.INTEGER), parameter, state.force_scale(), cls._units(state, parameter))
+        return cls(null_vectors(state, Kind.INTEGER), parameter, cls._force(state), cls._units(state, parameter))
 
     @staticmethod
     def _units(state: BalanceState, parameter: str) -> tuple[float, float]:
         value = state.omega if parameter == "omega" else abs(state.values[parameter])
-        return state.omega**2, state.force_scale() / (value or 1.0)
+        return state.omega**2, BranchPointUnfolded._force(state) / (value or 1.0)
+
+    @staticmethod
+    def _force(state: BalanceState) -> float:
+        """Size of the forces; at rest, where there are none, that of a motion of unit size."""
+        return state.force_scale() or state.omega**2
 
     def renewed(self, state: BalanceState, borders: NullVectors) -> BranchPointUnfolded:
         """The same at another motion, with its null vectors."""
         units = self._units(state, self.parameter)
-        return replace(self, borders=borders, force=state.force_scale(), units=units)
+        return replace(self, borders=borders, force=self._force(state), units=units)
 
     name = "BP"
     extras = 1

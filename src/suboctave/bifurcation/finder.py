@@ -23,6 +23,8 @@ from suboctave.errors import ConvergenceError
 
 #: fractions of a step by which rounding may carry a solution beyond its ends
 _SLACK = 1e-7
+#: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics
+_BEFORE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ def locate(
     make_sample: Callable[[CurvePoint], Sample],
     make_guess: Callable[[Array, CurvePoint, float], Guess],
     bisections: int = 34,
+    begins: bool = False,
 ) -> Located | None:
     """Locate a bifurcation of a kind whose test changed between two neighbours.
 
@@ -57,6 +60,8 @@ def locate(
         Turns a vector u in the discretisation of a curve point, and kappa, into a start of the bordered system.
     bisections
         Halvings after which the bracket is taken for the answer.
+    begins
+        Whether the curve begins with the first neighbour: what lies right before it then belongs to no other step.
 
     Returns
     -------
@@ -72,8 +77,10 @@ def locate(
             found = _try(kind, at_low, at_high, share, nearer, make_guess)
             # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
             # here
-            if found is not None and -_SLACK <= low + found[1] * (high - low) <= 1.0 + _SLACK:
-                return Located(kind, low + found[1] * (high - low), nearer, found[0], 0.0)
+            if found is not None:
+                place = low + found[1] * (high - low)
+                if -(_BEFORE if begins else _SLACK) <= place <= 1.0 + _SLACK:
+                    return Located(kind, max(place, 0.0), nearer, found[0], 0.0)
         middle = None
         for part in (0.5, 0.4, 0.65):
             try:

@@ -198,9 +198,9 @@ class NeimarkSacker(BifurcationKind):
             return None
         out, partner = min(((m, p) for m in candidates for p in partners), key=lambda pair: abs(pair[0] - pair[1]))
         with np.errstate(divide="ignore"):
-            product = float(np.log(np.abs(outside.floquet.multipliers)).sum())
-        if abs(product) < measures.UNDAMPED:
-            # pairs stay on the circle and rounding alone carries them across
+            products = [float(np.log(np.abs(sample.floquet.multipliers)).sum()) for sample in (a, b)]
+        if max(map(abs, products)) < measures.UNDAMPED:
+            # pairs stay on the circle and rounding alone carries them across; one point alone may lie where a pair does
             return None
         return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))
 

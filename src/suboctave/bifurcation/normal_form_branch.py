@@ -11,6 +11,7 @@ c3 as at a period doubling. A symmetry of the system is the reason as a rule.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,7 @@ from suboctave.harmonic.second import Direction, second_derivative
 from suboctave.harmonic.state import BalanceState
 from suboctave.harmonic.waves import Waves
 
-#: share of its terms' moduli below which c counts as zero: a branch point is located to about 1e-8 of its symmetry
+#: share of its terms' size below which c counts as zero: a branch point is located to about 1e-8 of its symmetry
 _SYMMETRIC = 1e-6
 
 
@@ -54,7 +55,11 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     c = float(own.psi @ squared)
     c3, cubic_size = own.cubic(solve(-0.5 * squared))
     coefficients = {"a": a, "b": b, "c": c, "g": own.g, "c3": c3, "curvature": -c3 / b if b else float("nan")}
-    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": _quadratic_size(own)}, own.g_size)
+    # or a share of what c3 amounts to where the branches are as far apart as the parameter is from zero: at rest, which
+    # is located as well as rounding allows, c may have no other size
+    parameter = abs(state.omega if name == "omega" else state.values[name])
+    quadratic = max(_quadratic_size(own), math.sqrt(abs(c3 * b) * parameter))
+    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": quadratic}, own.g_size)
 
 
 def labelled(form: NormalForm, found: Terms) -> NormalForm:
