@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from suboctave.pictures import style
 from suboctave.pictures.periods import curve_styles, period_of, several_periods
 from suboctave.pictures.strokes import line, repeated
+from suboctave.pictures.view import observed
 from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
@@ -68,18 +69,19 @@ def figure_data(curves: Mapping[str, xarray.Dataset], horizontal: str, name: str
     for index, (label, dataset) in enumerate(curves.items()):
         edge = styles[index].colour if told else style.INK
         data += _markers(dataset, horizontal, html.escape(label), edge, several)
-    first = next(iter(curves.values()))
     across = "forcing frequency ω" if horizontal == "omega" else html.escape(horizontal)
-    return {"data": data, "layout": layout_of(across, None, first), "name": name}
+    return {"data": data, "layout": layout_of(across, None, tuple(curves.values())), "name": name}
 
 
-def layout_of(across: str, upwards: str | None, dataset: xarray.Dataset | None = None) -> dict[str, Any]:
-    """The layout of a frame; with a `dataset` and nothing else said, its amplitude upwards."""
+def layout_of(across: str, upwards: str | None, datasets: Sequence[xarray.Dataset] = ()) -> dict[str, Any]:
+    """The layout of a frame; with `datasets` and nothing else said, their amplitude upwards."""
     upright: dict[str, Any] = {**AXIS, "title": {"text": upwards}}
-    if dataset is not None:
-        one = int(dataset.attrs.get("dofs", 1)) == 1
-        x = "x" if one else f"x<sub>{int(dataset.attrs.get('observed_dof', 0))}</sub>"
-        upright |= {"title": {"text": f"amplitude max |{x}|"}, "rangemode": "tozero"}
+    if datasets:
+        dofs = observed(datasets)
+        one = int(datasets[0].attrs.get("dofs", 1)) == 1
+        x = "x<sub>i</sub>" if len(dofs) > 1 else "x" if one else f"x<sub>{dofs[0]}</sub>"
+        said = f", i = {', '.join(map(str, dofs))}" if len(dofs) > 1 else ""
+        upright |= {"title": {"text": f"amplitude max |{x}|{said}"}, "rangemode": "tozero"}
     return {
         "font": FONT,
         "margin": {"l": 64, "r": 12, "t": 34, "b": 52},

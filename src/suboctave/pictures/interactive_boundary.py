@@ -228,7 +228,7 @@ def space_data(curves: Mapping[str, xarray.Dataset], across: str, depth: str, na
         if curve is not None:
             data += _events_in_space(dataset, space, said)
     first = next(iter(curves.values()))
-    titles = (_spelt(across), _spelt(depth), layout_of("", "", first)["yaxis"]["title"]["text"])
+    titles = (_spelt(across), _spelt(depth), layout_of("", "", (first,))["yaxis"]["title"]["text"])
     axis = {name: value for name, value in AXIS.items() if name in ("showline", "linecolor", "gridcolor", "zeroline")}
     scene = {
         f"{letter}axis": {**axis, "title": {"text": text if letter == "z" else html.escape(text)}}

@@ -145,7 +145,7 @@ def draw_response(
     for index in order:  # markers after all lines: none is crossed out by another curve
         edge = styles[index].colour if several or periods else style.INK
         legend |= _draw_events(axes, group[index], shown, horizontal, edge, look, several)
-    dress(axes, *shown.labels(group[0], horizontal), look)
+    dress(axes, *shown.labels(group[0], horizontal, group), look)
     return legend
 
 

@@ -138,8 +138,10 @@ class View:
                 chosen &= (column >= limits[0]) & (column <= limits[1])
         return chosen
 
-    def labels(self, dataset: xarray.Dataset, horizontal: str) -> tuple[str, str]:
-        """What the two axes say."""
+    def labels(
+        self, dataset: xarray.Dataset, horizontal: str, curves: Sequence[xarray.Dataset] = ()
+    ) -> tuple[str, str]:
+        """What the two axes say; `curves`: all that are drawn, which may observe different degrees of freedom."""
         if horizontal != "omega":
             across = horizontal
         elif self.frequency == "Hz":
@@ -148,15 +150,21 @@ class View:
             across = r"frequency ratio $\omega/\omega_0$"
         else:
             across = r"forcing frequency $\omega$" + (" (rad/s)" if self.frequency else "")
-        one = int(dataset.attrs.get("dofs", 1)) == 1
-        dof = dataset.attrs.get("observed_dof", 0) if self.dof is None else self.dof
-        upwards = QUANTITIES[self.quantity].format(
-            x="x" if one else f"x_{{{dof}}}", k=f"{self.harmonic or 1:g}", e=self.element
-        )
+        dofs = observed(curves or (dataset,)) if self.dof is None else [self.dof]
+        x = "x_i" if len(dofs) > 1 else "x" if int(dataset.attrs.get("dofs", 1)) == 1 else f"x_{{{dofs[0]}}}"
+        says = QUANTITIES[self.quantity]
+        upwards = says.format(x=x, k=f"{self.harmonic or 1:g}", e=self.element)
+        if len(dofs) > 1 and "{x}" in says:
+            upwards += f", $i$ = {', '.join(map(str, dofs))}"
         unit = "°" if self.quantity == "phase" and self.scale is None and self.unit is None else self.unit
         if unit:
             upwards += f" ({unit})"
         return self.xlabel or across, self.ylabel or upwards
+
+
+def observed(curves: Sequence[xarray.Dataset]) -> list[int]:
+    """The degrees of freedom that curves observe, each once, in the order of the curves."""
+    return list(dict.fromkeys(int(dataset.attrs.get("observed_dof", 0)) for dataset in curves))
 
 
 def _check_limits(name: str, limits: Any) -> None:

@@ -17,6 +17,7 @@ from suboctave.analysis.results import Result
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.store import files
+from suboctave.study.demo import significant
 from suboctave.study.file import Study, read_study
 from suboctave.study.keeping import recovered
 from suboctave.study.runner import JOURNAL, Finished, Outcome, run_study
@@ -238,7 +239,7 @@ def _show_journal(path: Path, as_json: bool) -> None:
     for item in found:
         if item.events:
             screen.print(f"{item.name}, so far", style="bold", markup=False)
-            lines = [[kind, f"{omega:.8f}", f"{amplitude:.7f}"] for kind, omega, amplitude in item.events]
+            lines = [[kind, significant(omega, 9), significant(amplitude, 7)] for kind, omega, amplitude in item.events]
             print_texts(screen, ("kind", "omega", "max |x|"), lines, left=("kind",))
     if torn:
         screen.print("its last record is torn and is left out", markup=False)

@@ -20,7 +20,18 @@ if TYPE_CHECKING:
 
     from suboctave.analysis import BifurcationDiagram, Branch
 
-__all__ = ["CASES", "OMEGA", "REGULARIZATION", "Case", "Curve", "compute", "draw", "event_lines", "sequel"]
+__all__ = [
+    "CASES",
+    "OMEGA",
+    "REGULARIZATION",
+    "Case",
+    "Curve",
+    "compute",
+    "draw",
+    "event_lines",
+    "sequel",
+    "significant",
+]
 
 OMEGA = (4.5, 1.25)
 REGULARIZATION = 3000.0
@@ -142,8 +153,8 @@ def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]
     return [
         (
             str(kind),
-            f"{omega:.8f}",
-            f"{amplitude:.7f}",
+            significant(omega, 9),
+            significant(amplitude, 7),
             _complex_text(complex(multiplier)),
             f"± {uncertainty:.0e}" if uncertainty else f"{residual:.0e}",
         )
@@ -151,9 +162,16 @@ def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]
     ]
 
 
+def significant(value: float, digits: int) -> str:
+    """A number with so many significant digits, whatever its unit makes of it."""
+    return f"{value:#.{digits}g}".rstrip(".")
+
+
 def _complex_text(value: complex) -> str:
     if value != value:  # not computed
         return "-"
+    large = abs(value) >= 1e3
     if abs(value.imag) < 5e-7 * abs(value):
-        return f"{value.real:+.6f}"
-    return f"{value.real:+.6f} ± {abs(value.imag):.6f}i"
+        return f"{value.real:+.6e}" if large else f"{value.real:+.6f}"
+    form = ".5e" if large else ".5f"
+    return f"{value.real:+{form}} ± {abs(value.imag):{form}}i"

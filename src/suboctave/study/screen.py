@@ -34,6 +34,8 @@ __all__ = [
 ]
 
 WIDTH = 80
+#: columns of the widest table that is not folded
+_WIDEST = 400
 #: bifurcations of a diagram up to which all of them are listed below its tree
 _LISTED = 40
 
@@ -88,17 +90,23 @@ def print_events(
 
 
 def print_texts(out: Console, names: Sequence[str], lines: Sequence[Sequence[str]], left: Sequence[str] = ()) -> None:
-    """A table of texts, numbers to the right."""
+    """A table of texts, numbers to the right; where it is wider than the console its lines are, but nothing is cut."""
     from rich import box
     from rich.table import Table as Grid
 
-    table = Grid(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0))
+    table = Grid(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in names:
         last = name in left and name == names[-1]
         table.add_column(name, justify="left" if name in left else "right", no_wrap=not last, overflow="ellipsis")
     for line in lines:
         table.add_row(*(_escaped(text) for text in line))
-    out.print(table)
+    own = out.width
+    try:
+        if names[-1] not in left:
+            out.width = max(own, out.measure(table, options=out.options.update(max_width=_WIDEST)).maximum)
+        out.print(table, crop=False)
+    finally:
+        out.width = own
 
 
 def print_result(out: Console, name: str, result: Result, note: str = "") -> None:
@@ -122,16 +130,27 @@ def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> Non
     out.print(f": {span}", markup=False)
     dataset = branch_dataset(branch)
     lines = [list(line) for line in event_lines(dataset)]
-    if branch.name != "omega":
-        met = sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda b: b.arclength)
-        for line, event in zip(lines, met, strict=True):
+    met = sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda b: b.arclength)
+    contacts = _contacts(branch)
+    for line, event in zip(lines, met, strict=True):
+        if branch.name != "omega":
             line[1] = f"{event.omega:.6g}"
             line.append(f"{event.parameter(branch.name):.8g}")
+        if event.contact is not None and event.kind == "grazing" and len(contacts) > 1:
+            line[0] += f" {contacts[event.contact.element][0]}"
     print_events(out, lines, branch.name, [str(word) for word in dataset["event_criticality"].to_numpy()])
+    for number, label in contacts.values() if len(contacts) > 1 else ():
+        out.print(f"grazing {number}: {label}", markup=False)
     unstable = int(np.count_nonzero(~branch.stable)) if len(branch) else 0
     out.print(f"{len(branch)} points, {unstable} unstable{note}; {branch.ended}.", markup=False)
     for warning in branch.warnings:
         out.print(f"note: {warning}", markup=False)
+
+
+def _contacts(branch: Branch) -> dict[int, tuple[int, str]]:
+    """The elements that graze along a branch, each with a number and its label."""
+    labels = {g.contact.element: g.contact.label for g in branch.grazings if g.contact is not None}
+    return {element: (number, labels[element]) for number, element in enumerate(sorted(labels), 1)}
 
 
 def print_diagram(out: Console, name: str, diagram: BifurcationDiagram, note: str = "") -> None:
