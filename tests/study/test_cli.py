@@ -82,7 +82,7 @@ def test_the_demo_prints_tables_of_80_columns_and_writes_figures(computed, tmp_p
     assert "gaps up to j = 0.17713" in printed.out
     assert "up to j = 0.57989" in printed.out
     assert len(re.findall(r"^ *PD +3\.99000000 +0\.2000000 +-1\.000000 +3e-13 *$", printed.out, re.MULTILINE)) == 3
-    assert len(re.findall(r"^ *NS .*\+0\.600000 ± 0\.800000i", printed.out, re.MULTILINE)) == 3
+    assert len(re.findall(r"^ *NS .*\+0\.60000 ± 0\.80000i", printed.out, re.MULTILINE)) == 3
     assert printed.out.count("200 points in 0.25 s; reached the end of the range at omega = 1.25.") == 3
     for name in ("weak_forcing.png", "strong_forcing.png", "cascade.png", "boundary.png", "isola.png"):
         assert (tmp_path / "new" / name).read_bytes().startswith(b"\x89PNG")

@@ -319,7 +319,7 @@ def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:
 def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:
     """Names such as "j = 0" from the parameters that are constant on each curve and differ between curves.
 
-    Where the period is to be told it comes first: "2T", "2T, j = 0".
+    Where the period is to be told it comes first: "2T", "2T, j = 0"; so does what a curve shows, where that differs.
     """
     constant: list[dict[str, float]] = []
     for dataset in datasets:
@@ -332,9 +332,12 @@ def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> 
         constant.append(values)
     shared = [name for name in constant[0] if all(name in values for values in constant)]
     differing = [name for name in shared if len({values[name] for values in constant}) > 1]
-    if not differing and not by_period:
+    dofs = [int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets]
+    if not differing and not by_period and len(set(dofs)) < 2:
         return [f"curve {index + 1}" for index in range(len(datasets))]
     told = [[f"{name} = {values[name]:g}" for name in differing] for values in constant]
+    if len(set(dofs)) > 1:
+        told = [[f"$x_{{{dof}}}$", *words] for dof, words in zip(dofs, told, strict=True)]
     if by_period:
         told = [[period_name(period_of(data)), *words] for data, words in zip(datasets, told, strict=True)]
     return [", ".join(words) for words in told]

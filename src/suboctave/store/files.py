@@ -39,7 +39,10 @@ def free_place(path: str | Path, overwrite: bool = False, suffixes: tuple[str, .
     if target.is_dir():
         raise InputError(f"{target} is a folder, not a file")
     if target.exists() and not overwrite:
-        raise InputError(f"{target} exists and is left as it is: choose another name, or overwrite it on purpose")
+        raise InputError(
+            f"{target} exists and is left as it is: choose another name, or overwrite it on purpose "
+            "(overwrite=True, --overwrite)"
+        )
     folder = target.parent
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder: make it, or write elsewhere")
