@@ -120,3 +120,11 @@ def test_provenance(rattling_curve):
     assert context["system"] is rattling_curve.system
     assert context["parameter"] == "omega"
     assert context["bounds"] == {"omega": (4.5, 1.3)}
+
+
+def test_motions_without_damping_are_not_counted_as_unstable():
+    branch = so.frequency_response(so.library.duffing(c=0.0, F=0.2), (0.6, 0.9))
+    assert branch.verdicts == f"0 unstable, {len(branch)} not settled"
+    assert f"{len(branch)} points ({branch.verdicts})" in repr(branch)
+    damped = so.frequency_response(so.library.duffing(c=0.05, F=0.2), (0.6, 2.0))
+    assert damped.verdicts == f"{int((~damped.stable).sum())} unstable"

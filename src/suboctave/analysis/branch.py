@@ -149,6 +149,14 @@ class Branch(BranchReadings):
         """Whether each motion is stable, shape (len,), bool."""
         return np.array([p.floquet.stable for p in self.points])
 
+    @property
+    def verdicts(self) -> str:
+        """How many motions are unstable, in words, and of how many that cannot be told: without damping."""
+        results = [p.floquet for p in self.points]
+        told = [r for r in results if r.decided or not r.undamped]
+        unstable, rest = sum(not r.stable for r in told), len(results) - len(told)
+        return f"{unstable} unstable" + (f", {rest} not settled" if rest else "")
+
     @cached_property
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers over the response period, by descending modulus, shape (len, 2 n)."""
@@ -290,10 +298,9 @@ class Branch(BranchReadings):
     def __repr__(self) -> str:
         values = self.parameter(self.name)
         span = f"{self.name} from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
-        unstable = int(np.count_nonzero(~self.stable)) if len(self) else 0
         kind = "Branch" if self.nu == 1 else f"Branch of {period_name(self.nu)} motions"
         leaves = "" if self.departs is None else f"leaves {self.departs}; "
-        text = f"{kind}: {len(self)} points ({unstable} unstable), {span}; {leaves}{self.ended}."
+        text = f"{kind}: {len(self)} points ({self.verdicts}), {span}; {leaves}{self.ended}."
         for warning in self.warnings:
             text += f"\n  note: {warning}"
         return text + "\n" + repr(self.bifurcations)

@@ -12,8 +12,6 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from suboctave.bifurcation import Bifurcation
 
 if TYPE_CHECKING:
@@ -43,10 +41,9 @@ def _drawn(node: DiagramBranch, first: str, rest: str, width: int) -> Iterator[s
     """The lines of a branch and those below it; the first begins with `first`, the others with `rest`."""
     branch = node.branch
     number = f"{node.number}  "
-    unstable = int(np.count_nonzero(~branch.stable)) if len(branch) else 0
     entries: list[DiagramBranch | tuple[Bifurcation, str]] = [*node.children, *node.failures]
     bar = "│".ljust(len(number)) if entries else " " * len(number)
-    said = f"{node.label}: {len(branch)} points, {unstable} unstable"
+    said = f"{node.label}: {len(branch)} points, {branch.verdicts}"
     yield from _wrapped(said, first + number, rest + bar, width)
     met = _met(branch.name, list(branch.bifurcations))
     if met:

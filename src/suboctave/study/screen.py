@@ -141,8 +141,7 @@ def print_branch(out: Console, name: str, branch: Branch, note: str = "") -> Non
     print_events(out, lines, branch.name, [str(word) for word in dataset["event_criticality"].to_numpy()])
     for number, label in contacts.values() if len(contacts) > 1 else ():
         out.print(f"grazing {number}: {label}", markup=False)
-    unstable = int(np.count_nonzero(~branch.stable)) if len(branch) else 0
-    out.print(f"{len(branch)} points, {unstable} unstable{note}; {branch.ended}.", markup=False)
+    out.print(f"{len(branch)} points, {branch.verdicts}{note}; {branch.ended}.", markup=False)
     for warning in branch.warnings:
         out.print(f"note: {warning}", markup=False)
 
