@@ -242,7 +242,7 @@ def test_long_lists_of_bifurcations_are_wrapped_and_criticality_is_told():
         for i in range(40)
     ]
     curve = _Curve(
-        name="omega", nu=1, closed=False, departs=None, arrives=None, bifurcations=items, stable=np.ones(9, dtype=bool)
+        name="omega", nu=1, closed=False, departs=None, arrives=None, bifurcations=items, verdicts="0 unstable"
     )
     lines = tree_text(so.BifurcationDiagram(DiagramBranch(curve)), 80).splitlines()
     assert max(map(len, lines)) <= 80
