@@ -118,3 +118,22 @@ def test_multipliers_contradict_a_double_one():
     curve = so.track(limit_point, "F", (0.005, 0.2), omega=(0.15, 3.3))
     assert [e.kind for e in curve.bifurcations] == ["CP"]
     assert any("R1" in words and "too few harmonics" in words for words in curve.warnings)
+
+
+def test_limit_points_end_where_their_motions_become_symmetric():
+    """Behind the end a tracker would drift along the branch points of the symmetric motions, from event to event."""
+    stops = [
+        so.ElasticStop(0, 5.0, gap, side=side, regularization=50.0) for gap, side in (("g", "right"), ("-g", "left"))
+    ]
+    system = so.System(1.0, 0.08, 1.0, stops, [so.HarmonicLoad(0, "F")], {"g": 1.0, "F": 3.0})
+    curve = so.frequency_response(system, (0.3, 1.0))
+    branch = so.switch_branch(curve.bifurcations["BP"][0])
+    limit_points = so.track(branch.bifurcations["LP"][0], "F", (0.3, 8.0), omega=(0.27, 5.5))
+    assert limit_points.ended.count("the motions become symmetric") == 2
+    assert len(limit_points) < 60
+    assert [e.kind for e in limit_points.bifurcations] == ["CP", "CP"]
+    # the branch points pass there
+    found = so.track(curve.bifurcations["BP"][0], "F", (2.0, 6.0), omega=(0.27, 5.5))
+    for orbit in (limit_points.orbits[0], limit_points.orbits[-1]):
+        apart = np.hypot(found.omega - orbit.omega, found.parameter("F") - orbit.values["F"])
+        assert apart.min() < 0.2

@@ -6,6 +6,8 @@
   either even or odd multiples of w0 beside kappa. The two of a pair are then of different kinds, and pass each other
   at w0/2 as if nothing were there: the curve goes on with kappa above it, and ends where that reaches w0.
 - BP: the unfolding is not zero any more: the symmetry that forces branch points is broken.
+- LP of motions without the half-wave symmetry that the system has: the even harmonics vanish, where the branch points
+  of the symmetric motions change between super- and subcritical. Along these every point solves the same equations.
 - LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
   the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
   tracker would slide on along them: J at the parent is block diagonal, J_0 and J_half.
@@ -30,6 +32,7 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.state import BalanceState
 
 #: sub-harmonic share of the motion from which on the end of the curve is looked for, and which is none any more
 _FAINT, _NOTHING_LEFT = 3e-3, 1e-5
@@ -46,6 +49,8 @@ _RESONANT = 2e-3
 _DOUBTFUL = 0.05
 #: share of a perturbation with waves of the other parity that is none
 _NO_PARITY = 1e-6
+#: residual of the odd harmonics alone, in units of the forces, up to which a system is symmetric
+_UNSYMMETRIC = 1e-4
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
 
@@ -84,7 +89,7 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
         if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)):
             return _resonance(a, double, newton)
     if b.curve.balance.basis.nu == 1:
-        return None
+        return _symmetry_gained(a, b)
     share = subharmonic_share(b.point)
     faint = share <= _FAINT
     parent = _on_the_parent(a, newton) if faint or (_stands(b) and share < subharmonic_share(a.point)) else None
@@ -98,6 +103,32 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
+    """The end of a curve of limit points whose motions become symmetric, x(t + T / 2) = -x(t)."""
+    if b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
+        return None
+    before, share = (_unsymmetric_share(sample.state) for sample in (a, b))
+    if share > _FAINT or share >= before or before <= _NO_PARITY:
+        return None
+    state, x = b.state, b.state.x.copy()
+    x[0], x[3::4], x[4::4] = 0.0, 0.0, 0.0
+    symmetric = state.balance.at(x, state.omega, state.values)
+    # without the symmetry a motion of odd harmonics is none
+    if symmetric.residual_size() > _UNSYMMETRIC * symmetric.force_scale():
+        return None
+    return End(
+        f"the motions become symmetric at {b.curve.where(b.point.u)}, x(t + T/2) = -x(t): what follows are branch "
+        "points of symmetric motions, which solve the same equations"
+    )
+
+
+def _unsymmetric_share(state: BalanceState) -> float:
+    """Share of mean and even harmonics in a motion."""
+    x = state.x * state.balance.scales()[0]
+    even = math.sqrt(float((x[0] ** 2).sum() + (x[3::4] ** 2).sum() + (x[4::4] ** 2).sum()))
+    return even / (float(np.linalg.norm(x)) or 1.0)
 
 
 def _apart(one: CurvePoint, other: CurvePoint) -> float:
