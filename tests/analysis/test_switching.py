@@ -292,3 +292,18 @@ def test_what_cannot_be_switched_at(weak):
         so.switch_branch(weak.bifurcations["PD"][0], side=2)
     with pytest.raises(InputError, match="outside the bounds"):
         so.switch_branch(weak.bifurcations["PD"][0], bounds=(1.0, 2.0))
+
+
+def test_the_beginning_of_a_closed_branch_is_no_limit_point():
+    """Where it passes its own beginning it turns back at the branch point."""
+    gaps = ((1.0, "right"), (-1.0, "left"))
+    stops = [so.ElasticStop(0, 5.0, gap, side=side, regularization=50.0) for gap, side in gaps]
+    system = so.System(1.0, 0.08, 1.0, stops, [so.HarmonicLoad(0, 3.0)])
+    symmetric = so.frequency_response(system, (0.3, 5.0))
+    loop = so.switch_branch(symmetric.bifurcations["BP"][0])
+    assert "closed" in loop.ended
+    assert loop.warnings == ()
+    # each on either half
+    found = sorted(b.omega for b in loop.bifurcations["LP"])
+    assert len(found) == 8
+    assert found[::2] == pytest.approx(found[1::2], abs=1e-8)

@@ -7,6 +7,7 @@ of the algebraic branching equation (`bifurcation.branching`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -39,6 +40,8 @@ __all__ = ["Inherited", "check_left", "leave_along", "switch_branch"]
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
+#: relative distance in the parameter within which a turn belongs to the branch point beside it
+_TURN = 1e-6
 
 _NO_OTHER = {
     "LP": "at a limit point the branch only turns back, and nothing leaves it",
@@ -260,8 +263,11 @@ def leave_along(
     forward = follow(one, 0.0, bounds, settings)
     forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
-        met = [b for b in forward.bifurcations if not same_event(b, here)]
+        turns = [b for b in forward.bifurcations if _is_turn(b, here)]
+        met = [b for b in forward.bifurcations if not same_event(b, here) and b not in turns]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
+        doubts = tuple(f"LP near {b.parameter_name} = {b.parameter(b.parameter_name):.6g} " for b in turns)
+        forward.warnings[:] = [words for words in forward.warnings if not (turns and words.startswith(doubts))]
         forward.settle_end(2.0 * _distance(one, u, curve))
         return forward
     back = follow(other, 0.0, bounds, settings)
@@ -271,6 +277,13 @@ def leave_along(
     at = sum(b.arclength < place for b in trace.bifurcations)
     trace.bifurcations.insert(at, replace(here, arclength=place))
     return trace
+
+
+def _is_turn(item: Bifurcation, here: Bifurcation) -> bool:
+    """Whether a limit point that could only be bracketed is where a branch turns back as it passes its branch point."""
+    name = here.parameter_name
+    near = math.isclose(item.parameter(name), here.parameter(name), rel_tol=_TURN)
+    return item.kind == "LP" and item.uncertainty > 0.0 and near and item.orbit.matches(here.orbit, math.sqrt(_TURN))
 
 
 def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
