@@ -57,6 +57,7 @@ def test_two_parameters(study_file):
         ('parameter = "F"', 'parameter = "G"', "unknown parameter 'G'"),
         ('parameter = "F"', 'parameter = ["F"]', "is one name, beside omega, or two"),
         ("bounds = [0.05, 0.5]", "bounds = [0.5, 0.5]", "two different finite ends"),
+        ("bounds = [0.05, 0.5]", "bounds = [0.05, 0.06]", "the bifurcations there have F = "),
         ('bifurcation = "LP", index = 1', "point = 3", "name a bifurcation"),
         ('bifurcation = "LP"', 'bifurcation = "CP"', "CP cannot be tracked"),
         ('parameter = "F"', 'parameter = "F"\nonto = "NS"', "LP is none"),

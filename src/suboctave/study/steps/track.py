@@ -49,7 +49,8 @@ class Track(CurveStep):
             yield ("bounds",), "needs a range [from, to] for each parameter"
         elif not wrong:
             for name, ends in zip(names, ranges, strict=True):
-                yield from tried("bounds", partial(check_bounds, around.system, name, ends))
+                mistaken = [*tried("bounds", partial(check_bounds, around.system, name, ends))]
+                yield from mistaken or self._check_inside(around, name, ends)
         if self.omega is not None:
             yield from tried("omega", lambda: check_range("omega", self.omega, positive=True))
         for name in names:
@@ -57,6 +58,13 @@ class Track(CurveStep):
                 yield ("parameters", name), "is a parameter that varies: its range is in bounds"
         if self.events:
             yield ("events",), "is no option of a curve of bifurcations: leave it out"
+
+    def _check_inside(self, around: Surroundings, name: str, ends: Any) -> Iterator[Complaint]:
+        """That the range of a parameter holds the value that it has along the curve where the bifurcation is."""
+        known = self.inherited(around)
+        value = None if known is None or name == known.free else known.values.get(name)
+        if value is not None and not min(ends) <= value <= max(ends):
+            yield ("bounds",), f"the bifurcations there have {name} = {value:g}: let the range hold it"
 
     def _check_start(self) -> Iterator[Complaint]:
         kind = None if self.motion is None else self.motion.bifurcation
