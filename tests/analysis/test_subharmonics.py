@@ -83,3 +83,13 @@ def test_wrong_input(oscillator, isola):
         so.periodic_orbit(oscillator, 5.0, [1.0])
     with pytest.raises(InputError, match="Seeds: phases"):
         so.Seeds(phases=0)
+
+
+@pytest.mark.parametrize(("omega", "asked"), [(1.0, 2), (1.0, 3), (1.0, 6)])
+def test_a_motion_that_repeats_earlier_has_its_own_period(omega, asked):
+    """Nothing but the load's motion is near: it is none of three periods because three were asked for."""
+    system = so.library.duffing(c=0.1, F=0.1)
+    orbit = so.periodic_orbit(system, omega, [0.1, 0.0], subharmonic=asked)
+    assert orbit.basis.nu == orbit.own_period == 1
+    same = so.periodic_orbit(system, omega, [0.1, 0.0])
+    assert orbit.amplitude() == pytest.approx(same.amplitude(), rel=1e-8)

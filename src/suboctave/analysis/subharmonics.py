@@ -212,7 +212,7 @@ def periodic_orbit(
     state
         Displacements and velocities at t = 0, shape (2 n,).
     subharmonic
-        Period of the motion in periods of the load.
+        Period of the motion in periods of the load; one that repeats earlier is returned with its own period.
     settle
         Periods of the motion that are integrated in time before, to come closer to an attracting one.
 
@@ -241,7 +241,10 @@ def periodic_orbit(
             trajectory = integrate(system, given, np.array([0.0, end]), float(omega), system.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
         point = start_point(curve, float(omega), given, newton or NewtonOptions())
-    return _orbit(point)
+    orbit = _orbit(point)
+    if orbit.own_period < order:
+        return periodic_orbit(system, omega, orbit.start(), orbit.own_period, harmonics, newton=newton)
+    return orbit
 
 
 def _orbit(point: CurvePoint) -> PeriodicOrbit:

@@ -17,6 +17,9 @@ from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.system import System
 
+#: share of a motion that its sub-harmonics may have where it repeats earlier
+_REPEATED = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
@@ -65,6 +68,14 @@ class PeriodicOrbit:
     def period(self) -> float:
         """Period of the motion, `2 pi nu / omega`."""
         return 2.0 * math.pi * self.basis.nu / self.omega
+
+    @property
+    def own_period(self) -> int:
+        """After how many load periods the motion first repeats; `basis.nu` unless its sub-harmonics vanish."""
+        nu, sizes = self.basis.nu, np.linalg.norm(self.amplitudes * self.balance.scales()[0], axis=1)
+        k = np.arange(len(sizes))
+        shares = ((d, float(np.linalg.norm(sizes[k % (nu // d) != 0]))) for d in range(1, nu) if nu % d == 0)
+        return next((d for d, rest in shares if rest <= _REPEATED * np.linalg.norm(sizes)), nu)
 
     def state(self) -> BalanceState:
         """The harmonic-balance equations evaluated at this orbit."""
