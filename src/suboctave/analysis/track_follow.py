@@ -133,7 +133,13 @@ class _Tracker:
         return point
 
     def _turn_at_corner(self, last: TrackedSample, beyond: CurvePoint) -> None:
-        """Parameters that run the other way behind a corner have an extremum in it, known as well as the corner is."""
+        """Parameters that run the other way behind a corner have an extremum in it, known as well as the corner is.
+
+        It stands for whatever turns on the last steps into it, where nothing tells one turn from another.
+        """
+        middle = 0.5 * (last.point.arclength + beyond.arclength)
+        events = self.trace.events
+        events[:] = [e for e in events if e.kind not in ("extremum", "CP") or middle - e.arclength > _CORNER]
         for test in self.tests:
             if not isinstance(test, Extremum):
                 continue
@@ -142,12 +148,7 @@ class _Tracker:
                 found = Found(test, last, extreme_of(test, last))
                 event = as_event(found, self.settings.stability, self.settings.observe)
                 width = abs(float(beyond.u[i] - last.point.u[i]))
-                middle = 0.5 * (last.point.arclength + beyond.arclength)
-                item = replace(event, isola="", uncertainty=width, arclength=middle)
-                # what was found on the last steps into the corner is the corner
-                events = self.trace.events
-                events[:] = [e for e in events if middle - e.arclength > _CORNER or not _stands_for(item, e)]
-                events.append(item)
+                events.append(replace(event, isola="", uncertainty=width, arclength=middle))
 
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
@@ -275,12 +276,6 @@ class _Tracker:
         solved.u[index] = bound
         arclength = a.point.arclength + right * (b.point.arclength - a.point.arclength)
         return TrackedSample(make_point(solved, b.curve, b.point.tangent, arclength))
-
-
-def _stands_for(corner: TrackedEvent, other: TrackedEvent) -> bool:
-    """Whether an event beside a corner in which a parameter turns is that turn, or the cusp that a rounded law has."""
-    turn = other.kind == "extremum" and other.parameter_name == corner.parameter_name
-    return other.kind == "CP" or (turn and other.extreme == corner.extreme)
 
 
 def _drop_seam(events: list[TrackedEvent]) -> None:
