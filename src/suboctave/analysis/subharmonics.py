@@ -241,10 +241,8 @@ def periodic_orbit(
             trajectory = integrate(system, given, np.array([0.0, end]), float(omega), system.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
         point = start_point(curve, float(omega), given, newton or NewtonOptions())
-    orbit = _orbit(point)
-    if orbit.own_period < order:
-        return periodic_orbit(system, omega, orbit.start(), orbit.own_period, harmonics, newton=newton)
-    return orbit
+    own = (orbit := _orbit(point)).own_period
+    return orbit if own == order else periodic_orbit(system, omega, orbit.start(), own, harmonics, newton=newton)
 
 
 def _orbit(point: CurvePoint) -> PeriodicOrbit:
