@@ -49,8 +49,8 @@ _RESONANT = 2e-3
 _DOUBTFUL = 0.05
 #: share of a perturbation with waves of the other parity that is none
 _NO_PARITY = 1e-6
-#: residual of the odd harmonics alone, in units of the forces, up to which a system is symmetric
-_UNSYMMETRIC = 1e-4
+#: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system at most
+_UNSYMMETRIC = 0.1
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
 
@@ -112,11 +112,12 @@ def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
     before, share = (_unsymmetric_share(sample.state) for sample in (a, b))
     if share > _FAINT or share >= before or before <= _NO_PARITY:
         return None
-    state, x = b.state, b.state.x.copy()
+    state, x = a.state, a.state.x.copy()
     x[0], x[3::4], x[4::4] = 0.0, 0.0, 0.0
     symmetric = state.balance.at(x, state.omega, state.values)
-    # without the symmetry a motion of odd harmonics is none
-    if symmetric.residual_size() > _UNSYMMETRIC * symmetric.force_scale():
+    # what is missing without the even harmonics is of their order where the system has no such symmetry, else of its
+    # square
+    if symmetric.residual_size() > _UNSYMMETRIC * before * symmetric.force_scale():
         return None
     return End(
         f"the motions become symmetric at {b.curve.where(b.point.u)}, x(t + T/2) = -x(t): what follows are branch "
