@@ -49,7 +49,7 @@ _RESONANT = 2e-3
 _DOUBTFUL = 0.05
 #: share of a perturbation with waves of the other parity that is none
 _NO_PARITY = 1e-6
-#: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system at most
+#: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system
 _UNSYMMETRIC = 0.1
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
