@@ -12,7 +12,7 @@ from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
-from suboctave.analysis.tracked_curve import TrackedCurve
+from suboctave.analysis.tracked_curve import LOOKED_AT, TrackedCurve
 from suboctave.analysis.tracked_events import Found, events_between, extreme_of, refined
 from suboctave.analysis.tracked_hidden import HiddenPairs
 from suboctave.analysis.tracked_located import as_event
@@ -33,6 +33,8 @@ _HALVED = 20
 _CORNERS = 5
 #: way before a corner, in scaled arclength, on which what turns there is not told from it
 _CORNER = 1e-5
+#: distance of the multipliers from the critical one at which a point is doubtful
+_DOUBTFUL = 0.05
 
 
 @dataclass
@@ -79,6 +81,9 @@ class _Tracker:
         pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
         self.pairs = PairWatch(pairs, settings.newton)
         self.corners = 0
+        #: how many points have known multipliers, and where none of these is the critical one
+        self.looked = 0
+        self.doubtful: list[str] = []
         #: the first point, headed as the curve leaves it
         self.home: CurvePoint | None = None
 
@@ -97,6 +102,7 @@ class _Tracker:
                     beyond, heading, self.box.second, self.settings.newton, stepping, self._clear, home=home
                 )
             trace.closed = self.march.closed
+            self._say_doubts()
             self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
             trace.events.sort(key=lambda event: event.arclength)
         except KeyboardInterrupt:
@@ -161,6 +167,9 @@ class _Tracker:
         """Take a point in; a sentence if the curve ends there or before it."""
         settings, new = self.settings, TrackedSample(point)
         self.home = self.home or point
+        if self.previous is not None:
+            # by now the choice of harmonics has asked for what it needs
+            self._note_doubt(self.previous)
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
             for watch in (self.hidden, self.pairs):
@@ -212,6 +221,23 @@ class _Tracker:
                 isola=sample.isola,
             )
         )
+
+    def _note_doubt(self, sample: TrackedSample) -> None:
+        """Whether the critical multiplier is one of the monodromy matrix, where that is known and now and then."""
+        evaluation = sample.evaluation
+        known = "floquet" in evaluation.__dict__ or sample.curve.steps % LOOKED_AT == 0
+        if known and evaluation.critical is not None:
+            self.looked += 1
+            if evaluation.doubt > _DOUBTFUL:
+                self.doubtful.append(sample.curve.where(sample.point.u))
+
+    def _say_doubts(self) -> None:
+        if self.doubtful:
+            self.trace.warnings.append(
+                f"at {len(self.doubtful)} of {self.looked} points whose multipliers were computed the critical one is "
+                f"missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, or "
+                "the motion is so unstable that its multipliers cannot be told"
+            )
 
     def _take_end(self, a: TrackedSample, end: End) -> None:
         settings, arclength = self.settings, a.point.arclength + end.way(a)

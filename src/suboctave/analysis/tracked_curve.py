@@ -34,7 +34,7 @@ from suboctave.stability import FloquetResult, floquet_multipliers
 #: distance of the critical multiplier from the unit circle up to which harmonics suffice
 _CRITICAL = 1e-3
 #: steps after which that is looked at again
-_LOOKED_AT = 5
+LOOKED_AT = 5
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -269,7 +269,7 @@ class TrackedCurve:
         state, present = evaluation.state, self.balance.basis
         basis = choose_harmonics(state, adaptive, self.tolerance)
         lower = basis.harmonics < present.harmonics
-        if basis.harmonics > present.harmonics or not (lower or self.steps % _LOOKED_AT == 0):
+        if basis.harmonics > present.harmonics or not (lower or self.steps % LOOKED_AT == 0):
             return basis
         if evaluation.doubt > _CRITICAL:
             return next_harmonics(state, adaptive)
@@ -334,4 +334,4 @@ def _turns(nu: int, harmonics: int) -> list[tuple[float, Array, Array]]:
     return [(turn, np.cos(angle), np.sin(angle)) for turn, angle in zip(turns, angles, strict=True)]
 
 
-__all__ = ["TrackedCurve", "TrackedEvaluation"]
+__all__ = ["LOOKED_AT", "TrackedCurve", "TrackedEvaluation"]
