@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.machinery
-import importlib.util
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-import types
 from functools import partial
 from pathlib import Path
 
@@ -372,32 +369,3 @@ def test_show_prints_results_studies_and_journals(study_file, suboctave):
     status, out, _ = suboctave("show", path.parent / "x.journal")
     assert status == 0
     assert "begun" in out
-
-
-def test_a_report_page_gets_the_curves(study_file, suboctave, monkeypatch):
-    report = types.ModuleType("suboctave.pictures.report")
-    report.__spec__ = importlib.machinery.ModuleSpec("suboctave.pictures.report", None)
-    got = {}
-
-    def write_report(results, path, *, title, overwrite=False):
-        got.update(names=list(results), title=title, overwrite=overwrite, omega=results["up"]["omega"].size)
-        Path(path).write_text("<html>")
-
-    report.write_report = write_report
-    monkeypatch.setitem(sys.modules, "suboctave.pictures.report", report)
-    path = study_file(DUFFING + '[outputs]\nhtml = "report.html"\n')
-    assert suboctave("run", path)[0] == 0
-    assert (path.parent / "study_results" / "report.html").read_text() == "<html>"
-    assert got["names"] == ["response", "up"]
-    assert (got["title"], got["overwrite"]) == ("Duffing", True)
-    assert got["omega"] > 3
-
-
-def test_a_report_page_is_refused_only_where_there_is_none(study_file, suboctave):
-    path = study_file(DUFFING + '[outputs]\nhtml = "report.html"\n')
-    status, _, err = suboctave("check", path)
-    if importlib.util.find_spec("suboctave.pictures.report") is None:
-        assert status == 2
-        assert "report pages" in err
-    else:
-        assert status == 0

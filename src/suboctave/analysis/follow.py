@@ -33,8 +33,8 @@ from suboctave.errors import ConvergenceError, InputError
 _APART = 1e-5
 #: share of a motion's size by which one located twice may differ
 _SAME = 1e-4
-#: amplitude that `numpy.isclose` takes for none
-_NOTHING = 1e-8
+#: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
+_NOTHING = 1e-12
 _NOT_FOUND = {
     "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
     "LP": "the branch turns back, but its limit point could not be located",

@@ -264,7 +264,7 @@ def leave_along(
     forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
         turns = [b for b in forward.bifurcations if _is_turn(b, here)]
-        met = [b for b in forward.bifurcations if not same_event(b, here) and b not in turns]
+        met = [b for b in forward.bifurcations if not (same_event(b, here) or _is_turn(b, here))]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
         doubts = tuple(f"LP near {b.parameter_name} = {b.parameter(b.parameter_name):.6g} " for b in turns)
         forward.warnings[:] = [words for words in forward.warnings if not (turns and words.startswith(doubts))]

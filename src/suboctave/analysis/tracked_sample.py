@@ -243,10 +243,11 @@ def nearest_point(
             raise
     # the plane through the guess may miss a curve that turns sharply: the shortest corrections lead to it
     for _ in range(_SHORTEST):
-        factor = Factor.of(np.vstack((curve.evaluate(u).jacobian / weights, row)))
+        evaluation = curve.evaluate(u)
+        factor = Factor.of(np.vstack((evaluation.jacobian / weights, row)))
         if factor.singular:
             break
-        u = u - factor.solve(np.append(curve.evaluate(u).residual, 0.0)) / weights
+        u = u - factor.solve(np.append(evaluation.residual, 0.0)) / weights
         row = null_row(curve, u, weights)
     return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
 
