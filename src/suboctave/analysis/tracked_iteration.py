@@ -1,7 +1,8 @@
 """Compiled: one iteration of Newton's method for a point of a curve of limit points or period doublings.
 
 Two kernels, between which and after which the laws and the load at the iterate's parameter are asked for: the equations
-at an iterate, which corrects it where the factors at hand will do, and new factors with the correction by them.
+at an iterate, which corrects it where the factors at hand will do, and new factors with the correction by them. A third
+one goes through all iterations where laws and load follow from numbers that are linear in the parameter.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from suboctave.continuation.lapack import factorise, solve_factorised
 from suboctave.continuation.newton import SHORT, STALLED
 from suboctave.harmonic.evaluation import evaluate_anew, jacobian
 from suboctave.harmonic.law_changes import add_changes
+from suboctave.harmonic.moving_laws import laws_at
 from suboctave.harmonic.real_form import linear_rates
 
 #: what an iterate is: solved, with factors at hand or not; given up; something that the general way knows more about;
@@ -25,8 +27,9 @@ from suboctave.harmonic.real_form import linear_rates
 SOLVED, LAST, UNSOLVED, OTHER, MOVED, ANEW = 0, 1, 2, 3, 4, 5
 #: what an iteration passes on to the next: error, number of the iteration, length of the last step, rate, error before,
 #: length of the first step, way from where the factors are those of, whether there are any, whether they are of
-#: another solution
-ERROR, ITERATION, PREVIOUS, RATE, BEFORE, FIRST, WAY, FACTORS, GIVEN = 0, 1, 2, 3, 4, 5, 6, 7, 8
+#: another solution; for those who count: evaluations, factorisations
+ERROR, ITERATION, PREVIOUS, RATE, BEFORE, FIRST, WAY, FACTORS, GIVEN, LOOKS, FACTORISED = range(11)
+MEMO = 11
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -85,7 +88,7 @@ def looked_at(
     limits
         Tolerance, correction and iterations of `NewtonOptions`, `spare`, least size of forces, (5,).
     memo
-        What an iteration passes on to the next, (9,).
+        What an iteration passes on to the next, (MEMO,).
     lu, pivots
         Factors of the matrix that `differentiated` makes.
     left_border, right_border, unit, force
@@ -109,6 +112,7 @@ def looked_at(
     """
     n = parts.shape[1] * parts.shape[2]
     omega = u[n]
+    memo[LOOKS] += 1
     total = 0.0
     for i in range(u.shape[0]):
         total += u[i] * u[i]
@@ -215,6 +219,7 @@ def differentiated(
     if factorise(lu, pivots):
         return OTHER
     memo[FACTORS], memo[WAY] = 1.0, 0.0
+    memo[FACTORISED] += 1
     if last:
         directed(lu, pivots, weights, tangent)
         numbers[1] = determinant_sign(lu, pivots)
@@ -224,3 +229,54 @@ def differentiated(
     away = stepped(u, guess, row, weights, parts[2].ravel(), value * force, lu, pivots, memo)
     memo[ITERATION] += 1
     return UNSOLVED if away else MOVED
+
+
+@kernel(alone=True)
+def iterated(
+    value, linear, rounded, rest, base_load, load_by, load_alone,
+    u, guess, row, weights, limits, memo, lu, pivots, tangent, left_border, right_border, unit, force, mean,
+    frequencies, nu, moving, scale, multiples, matrices, starts, dofs, shape, pieces, first, polynomial, grid, nodes,
+    load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, blocks, table, motions, parts,
+    sizes, operator, border_lu, border_pivots, vectors, numbers,
+    alone, changed, changed_first, moved_steps, moved_first, moved_line, gx, rates, extended,
+):  # fmt: skip
+    """Newton's method from beginning to end; returns SOLVED, UNSOLVED or OTHER, and the nodes as `looked_at`.
+
+    Parameters
+    ----------
+    value, linear, rounded, rest
+        As in `moving_laws.laws_at`, and the parameter's value where its elements' coefficients are told.
+    base_load, load_by, load_alone
+        The load at that value and its rate, (2 H + 1, n); the rate's negative, as `differentiated` wants it.
+    alone
+        Whether one direction has all arctan steps.
+
+    The rest as in `looked_at` and `differentiated`; what belongs to the parameter's value (pieces, load, points,
+    widths, steps, line, changed, moved_steps, moved_line) is filled.
+    """
+    last = u.shape[0] - 1
+    none = np.empty((4, 0))
+    while True:
+        by = u[last] - value
+        laws_at(by, linear, rounded, pieces, changed, steps, points, widths, line, rest, moved_steps, moved_line)
+        for i in range(load.shape[0]):
+            for j in range(load.shape[1]):
+                load[i, j] = base_load[i, j] + by * load_by[i, j]
+        ended, sampled = looked_at(
+            u, guess, row, weights, limits, memo, lu, pivots, tangent, left_border, right_border, unit, force, mean,
+            frequencies, nu, moving, scale, multiples, matrices, starts, dofs, shape, pieces, first, polynomial, grid,
+            nodes, load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, blocks, table,
+            motions, parts, sizes, operator, border_lu, border_pivots, vectors, numbers,
+        )  # fmt: skip
+        if ended == ANEW or ended == LAST:
+            load_alone[:] = -load_by
+            noted = sampled if alone else none
+            ended = differentiated(
+                ended == LAST, u, guess, row, weights, memo, lu, pivots, tangent, unit, force, mean, frequencies, nu,
+                moving, multiples, matrices, starts, dofs, shape, pieces, first, polynomial, grid, nodes, points,
+                widths, steps, step_first, line, rule_nodes, rule_weights, noted, changed,
+                changed_first, moved_steps, moved_first, moved_line, load_alone, motions, table, parts, vectors, gx,
+                rates, numbers, extended,
+            )  # fmt: skip
+        if ended != MOVED:
+            return ended, sampled

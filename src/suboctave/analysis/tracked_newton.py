@@ -1,14 +1,15 @@
-"""Newton's method for a point of a curve of limit points or period doublings, two compiled calls an iteration.
+"""Newton's method for a point of a curve of limit points or period doublings, in one compiled call.
 
 What `continuation.newton.correct` does step by step, for the common case: omega and one parameter of loads or laws are
 free, the structure has matrices of its own, and all laws are known in closed form. There the calls would cost more than
-what they do. Only what the laws and the load are at an iterate's parameter is asked for in between.
+what they do. Where coefficients of laws are not linear in the parameter, two calls an iteration: what the laws and the
+load are at an iterate's parameter is asked for in between.
 """
 
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from suboctave.analysis.tracked_iteration import (
     GIVEN,
     ITERATION,
     LAST,
+    MEMO,
     MOVED,
     PREVIOUS,
     RATE,
@@ -26,6 +28,7 @@ from suboctave.analysis.tracked_iteration import (
     UNSOLVED,
     WAY,
     differentiated,
+    iterated,
     looked_at,
 )
 from suboctave.bifurcation.augmented import SingularOperator
@@ -33,6 +36,7 @@ from suboctave.bifurcation.bordered import Bordered
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import NewtonOptions, not_converged
 from suboctave.harmonic.basis import Array
+from suboctave.harmonic.changing_laws import ChangingLaws, LinearLaws
 from suboctave.harmonic.evaluation import told_steps
 from suboctave.harmonic.group_force import PackedLaws
 from suboctave.harmonic.linear_part import StructuralMatrices
@@ -45,7 +49,7 @@ if TYPE_CHECKING:
 #: scratch matrices of a thread, of up to as many rows
 _OWN = threading.local()
 _KEPT = 500
-_NO_NODES = np.empty((4, 0))
+_NO_NODES, _NO_STEPS = np.empty((4, 0)), (None,) * 7
 
 
 def applies(curve: TrackedCurve) -> bool:
@@ -89,98 +93,161 @@ def corrected(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    balance, own, name = curve.balance, curve.augmentation, curve.names[1]
-    assert isinstance(own, SingularOperator)
-    assert isinstance(balance.linear, StructuralMatrices)
-    basis, mean, borders = balance.basis, own.kind is Kind.INTEGER, own.borders
-    n, high, size, groups, m = len(guess), basis.harmonics, balance.size, len(balance.groups), len(borders.right)
-    frequencies, scale = (basis.multiples if mean else basis.half_multiples), balance.row_weights(m)
-    u, tangent, numbers = guess.copy(), np.empty(n), np.empty(3)
-    memo = np.zeros(9)
-    memo[PREVIOUS] = np.inf
-    if known is None:
-        lu, pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
-    else:
-        lu, pivots = known.lu.T, known.pivots
-        memo[WAY], memo[FACTORS], memo[GIVEN] = np.inf, 1.0, 1.0
-    blocks, motions = np.empty((high + 1, size, size), dtype=complex), np.empty((groups, high + 1), dtype=complex)
-    table, parts = np.empty((3, groups, balance.top + 1), dtype=complex), np.empty((3, 2 * high + 1, size))
-    operator, border_lu, extended = _scratch(m, n)
-    vectors, border_pivots = np.empty((2, m + 1)), np.empty(m + 1, dtype=np.int32)
-    sizes, gx, rates = np.empty(4), np.empty((2 * high + 1, size)), np.empty(3)
-    limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
-    same, weight = (guess, row, weights), balance.scales()[1]
-    of = (own.unit, curve.force, mean, frequencies, basis.nu, balance.moving)
-    linear = (basis.multiples, balance.linear.matrices)
-    along, nodes = balance.laws_along(name), balance.packed_laws(balance.values)[1]
-    if along is None:
-        return None
-    loaded, rate = name in balance.load_names, balance.load_rate(name)
-    while True:
-        values = {**balance.values, name: float(u[-1])}
-        laws_there = along.at(values)
-        packed = laws_there.packed
-        told = told_steps(packed) if packed.told else (None,) * 7
-        pieces = packed.pieces if len(packed.pieces) else None
-        laws = (*balance.directions, pieces, packed.first, packed.polynomial, balance.grid, nodes)
-        if rate is None or not loaded:
-            load = balance.load(values if loaded else balance.values, float(u[-2]))
+    along = curve.balance.laws_along(curve.names[1])
+    return None if along is None else _Solve(curve, guess, row, weights, options, spare, known).run(along)
+
+
+class _Solve:
+    """One solution: what the kernels want, and their results."""
+
+    def __init__(
+        self,
+        curve: TrackedCurve,
+        guess: Array,
+        row: Array,
+        weights: Array,
+        options: NewtonOptions,
+        spare: float,
+        known: Factor | None,
+    ) -> None:
+        balance, own = curve.balance, curve.augmentation
+        assert isinstance(own, SingularOperator)
+        assert isinstance(balance.linear, StructuralMatrices)
+        basis, mean, borders = balance.basis, own.kind is Kind.INTEGER, own.borders
+        n, high, size, groups, m = len(guess), basis.harmonics, balance.size, len(balance.groups), len(borders.right)
+        self.curve, self.borders, self.kind = curve, borders, own.kind
+        self.guess, self.u, self.tangent, self.numbers = guess, guess.copy(), np.empty(n), np.empty(3)
+        self.memo = np.zeros(MEMO)
+        self.memo[PREVIOUS] = np.inf
+        if known is None:
+            self.lu, self.pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
         else:
-            load = balance.load(balance.values, 0.0) + (values[name] - balance.values[name]) * rate
-        filled = (blocks, table, motions, parts, sizes, operator, border_lu, border_pivots, vectors, numbers)
-        factors = (memo, lu, pivots, tangent)
-        found = (borders.left, borders.right, *of, scale, *linear, *laws, load, weight, *told, *filled)
-        ended, sampled = looked_at(u, *same, limits, *factors, *found)
-        if ended in (ANEW, LAST):
-            change = along.changes(values, laws_there)
-            if change is None:
-                return None
-            if memo[GIVEN] and memo[FACTORS]:
-                # the factors given are those of another point
-                lu, pivots = np.empty((n, n)), np.empty(n, dtype=np.int32)
-                factors = (memo, lu, pivots, tangent)
-            if rate is None:
-                by_load = -balance.loads.value({**values, "omega": float(u[-2])}, size, (name,))
-            else:
-                by_load = -rate
-            changed = change.pieces if len(change.pieces) else None
-            moved_steps = change.steps if len(change.steps) else None
-            changes = (changed, change.first, moved_steps, change.step_first, change.line)
-            only = packed.told and _only_direction(packed)
-            rest = (sampled if only else _NO_NODES, *changes, by_load, motions, table, parts, vectors)
-            given = (*factors, *of, *linear, *laws, *told, *rest, gx, rates, numbers, extended)
-            ended = differentiated(ended == LAST, u, *same, *given)
-        if ended == MOVED:
-            continue
-        if ended == SOLVED:
-            break
+            # those given stay those of the other point
+            self.lu, self.pivots = known.lu.T.copy(), known.pivots.copy()
+            self.memo[WAY], self.memo[FACTORS], self.memo[GIVEN] = np.inf, 1.0, 1.0
+        self.motions = np.empty((groups, high + 1), dtype=complex)
+        self.blocks = np.empty((high + 1, size, size), dtype=complex)
+        self.table, self.parts = np.empty((3, groups, balance.top + 1), dtype=complex), np.empty((3, 2 * high + 1, size))
+        operator, border_lu, self.extended = _scratch(m, n)
+        self.vectors, self.sizes = np.empty((2, m + 1)), np.empty(4)
+        self.gx, self.rates = np.empty((2 * high + 1, size)), np.empty(3)
+        self.scale, self.nodes = balance.row_weights(m), balance.packed_laws(balance.values)[1]
+        frequencies = basis.multiples if mean else basis.half_multiples
+        limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
+        # the arguments of the kernels, in their order
+        self.same = self.u, guess, row, weights
+        self.factors = self.memo, self.lu, self.pivots, self.tangent
+        self.limits, self.lines = limits, (borders.left, borders.right)
+        self.units = own.unit, curve.force, mean, frequencies, basis.nu, balance.moving
+        self.matrices = basis.multiples, balance.linear.matrices
+        self.filled = (
+            *(self.blocks, self.table, self.motions, self.parts, self.sizes),
+            *(operator, border_lu, np.empty(m + 1, dtype=np.int32), self.vectors, self.numbers),
+        )
+
+    def run(self, along: ChangingLaws) -> Corrected | None:
+        """The solution, None where laws are not what the kernels know."""
+        balance, name = self.curve.balance, self.curve.names[1]
+        rate = balance.load_rate(name)
+        linear = along.linear if rate is not None or name not in balance.load_names else None
+        found = self._asking(along, rate) if linear is None else self._at_once(along, linear, rate)
+        if found is None:
+            return None
+        ended, packed, sampled = found
         if ended == UNSOLVED:
-            raise not_converged(curve, guess, float(memo[ERROR]), int(memo[ITERATION]))
-        return None
-    x, omega = u[:-2].reshape(parts.shape[1:]), float(u[-2])
-    state = BalanceState(balance, balance.linear, x, omega, values)
-    state.__dict__.update(
-        _evaluated=(table, parts, sizes), motions=motions, blocks=blocks, nodal=[], packed=(packed, nodes)
-    )
-    if packed.told:
-        state.__dict__["_told_nodes"] = int(packed.step_owner[-1]), sampled
-    way, sign, by_kappa = numbers.tolist()
-    g = complex(float(vectors[0, m]) * omega**2)
-    right, left = vectors[0, :m], vectors[1, :m]
-    by_omega, by_name, _ = (-rates).tolist()
-    return Corrected(
-        u,
-        state,
-        float(memo[ERROR]),
-        Bordered(state, own.kind, 0.0, g, right, left, scale, borders, None),
-        (-gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, -1j * by_kappa),
-        Factor(lu.T, pivots, False),
-        int(memo[ITERATION]),
-        way,
-        float(memo[RATE]),
-        tangent,
-        sign,
-    )
+            raise not_converged(self.curve, self.guess, float(self.memo[ERROR]), int(self.memo[ITERATION]))
+        return self._made(packed, sampled) if ended == SOLVED else None
+
+    def _laws(self, packed: PackedLaws) -> tuple[Any, ...]:
+        """Laws as the kernels want them, and arctan steps."""
+        balance, pieces = self.curve.balance, packed.pieces if len(packed.pieces) else None
+        return *balance.directions, pieces, packed.first, packed.polynomial, balance.grid, self.nodes
+
+    def _at_once(
+        self, along: ChangingLaws, linear: LinearLaws, rate: Array | None
+    ) -> tuple[int, PackedLaws, Array]:
+        """All iterations in compiled code."""
+        balance = self.curve.balance
+        packed, changes = along.room(linear)
+        told = told_steps(packed) if packed.told else _NO_STEPS
+        load = balance.load(balance.values, 0.0)
+        load_by = np.zeros_like(load) if rate is None else rate
+        changed = changes.pieces if linear.linear is not None else None
+        steps = changes.steps if linear.rounded is not None else None
+        ended, sampled = iterated(
+            *(*linear, load, load_by, np.empty_like(load)),
+            *(*self.same, self.limits, *self.factors, *self.lines, *self.units, self.scale, *self.matrices),
+            *(*self._laws(packed), np.empty_like(load), balance.scales()[1], *told, *self.filled),
+            *(packed.told and _only_direction(packed), changed, changes.first, steps, changes.step_first, changes.line),
+            *(self.gx, self.rates, self.extended),
+        )
+        return ended, packed, sampled
+
+    def _asking(self, along: ChangingLaws, rate: Array | None) -> tuple[int, PackedLaws, Array] | None:
+        """The elements are asked for their laws at every iterate."""
+        balance, name = self.curve.balance, self.curve.names[1]
+        loaded = name in balance.load_names
+        while True:
+            values, omega = self._values(), float(self.u[-2])
+            there = along.at(values)
+            packed = there.packed
+            told, laws = told_steps(packed) if packed.told else _NO_STEPS, self._laws(packed)
+            if rate is None or not loaded:
+                load = balance.load(values if loaded else balance.values, omega)
+            else:
+                load = balance.load(balance.values, 0.0) + (values[name] - balance.values[name]) * rate
+            of = (*self.same, self.limits, *self.factors, *self.lines, *self.units, self.scale, *self.matrices)
+            ended, sampled = looked_at(*of, *laws, load, balance.scales()[1], *told, *self.filled)
+            if ended in (ANEW, LAST):
+                changes = along.changes(values, there)
+                if changes is None:
+                    return None
+                if rate is None:
+                    by_load = -balance.loads.value({**values, "omega": float(self.u[-2])}, balance.size, (name,))
+                else:
+                    by_load = -rate
+                pieces = changes.pieces if len(changes.pieces) else None
+                steps = changes.steps if len(changes.steps) else None
+                moved = (pieces, changes.first, steps, changes.step_first, changes.line)
+                noted = sampled if packed.told and _only_direction(packed) else _NO_NODES
+                ended = differentiated(
+                    *(ended == LAST, *self.same, *self.factors, *self.units, *self.matrices, *laws, *told),
+                    *(noted, *moved, by_load, self.motions, self.table, self.parts, self.vectors),
+                    *(self.gx, self.rates, self.numbers, self.extended),
+                )
+            if ended != MOVED:
+                return ended, packed, sampled
+
+    def _values(self) -> dict[str, float]:
+        return {**self.curve.balance.values, self.curve.names[1]: float(self.u[-1])}
+
+    def _made(self, packed: PackedLaws, sampled: Array) -> Corrected:
+        """The solved point."""
+        curve, u, name = self.curve, self.u, self.curve.names[1]
+        balance, x, omega = curve.balance, u[:-2].reshape(self.parts.shape[1:]), float(u[-2])
+        state = BalanceState(balance, balance.linear, x, omega, self._values())
+        known = state.__dict__
+        known["_evaluated"], known["motions"] = (self.table, self.parts, self.sizes), self.motions
+        known["blocks"], known["nodal"], known["packed"] = self.blocks, [], (packed, self.nodes)
+        if packed.told:
+            known["_told_nodes"] = int(packed.step_owner[-1]), sampled
+        m, (way, sign, by_kappa) = len(self.scale), self.numbers.tolist()
+        g = complex(float(self.vectors[0, m]) * omega**2)
+        right, left = self.vectors[0, :m], self.vectors[1, :m]
+        by_omega, by_name, _ = (-self.rates).tolist()
+        return Corrected(
+            u,
+            state,
+            float(self.memo[ERROR]),
+            Bordered(state, self.kind, 0.0, g, right, left, self.scale, self.borders, None),
+            (-self.gx.ravel(), {"omega": complex(by_omega), name: complex(by_name)}, -1j * by_kappa),
+            Factor(self.lu.T, self.pivots, False),
+            int(self.memo[ITERATION]),
+            way,
+            float(self.memo[RATE]),
+            self.tangent,
+            sign,
+        )
 
 
 def _scratch(m: int, n: int) -> tuple[Array, Array, Array]:

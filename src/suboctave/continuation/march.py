@@ -78,16 +78,12 @@ class _Place:
         """It again, if the step from `point` to `new` passes it in the same direction."""
         w, own = new.weights, self.point
         step = kernels.distance(new.u, point.u, w)
-        index = new.curve.parameter
+        # all its images have its parameter
+        if abs(new.parameter - own.parameter) > 1.5 * step / w[new.curve.parameter]:
+            return None
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
         images = self._images[1]
-        here, reach = new.u[index], 1.5 * step / w[index]
-        for image in images:
-            if abs(here - image[index]) <= reach:
-                break
-        else:
-            return None
         heading = new.curve.transfer(own.tangent, own.curve)
         for image, leaving in zip(images, new.curve.images(heading), strict=True):
             from_point, to_new = w * (image - point.u), w * (new.u - image)

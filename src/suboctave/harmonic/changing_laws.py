@@ -17,13 +17,14 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.changes import change_in_pieces, told_change
 from suboctave.harmonic.group_force import PackedLaws
 from suboctave.harmonic.rates import coefficient_rates
+from suboctave.lazy import lazy
 from suboctave.model.element import Element
 from suboctave.model.sampling import PiecewiseLinear, Sampling, SharpSampling
 
 if TYPE_CHECKING:
     from suboctave.harmonic.balance import HarmonicBalance
 
-__all__ = ["ChangingLaws", "PackedChanges", "ToldLaws"]
+__all__ = ["ChangingLaws", "LinearLaws", "PackedChanges", "ToldLaws"]
 
 _NO_PIECES, _NO_STEPS = np.zeros((0, 5)), np.zeros((0, 6))
 
@@ -51,6 +52,21 @@ class ToldLaws(NamedTuple):
 
     packed: PackedLaws
     elements: list[tuple[Array, Sampling]]
+
+
+class LinearLaws(NamedTuple):
+    """Laws whose coefficients are linear in the parameter, as `moving_laws.laws_at` wants them.
+
+    value
+        The parameter where they are told.
+    linear, rounded, rest
+        Pieces and rounded stops that have it (None without any); constant and slope of the other steps' laws, (G, 2).
+    """
+
+    value: float
+    linear: Array | None
+    rounded: Array | None
+    rest: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +144,54 @@ class ChangingLaws:
                     changing.append(_Changing(balance.elements[i], i, g, own[i], at, place))
             lines.append(told)
         return cls(balance, name, changing, [kinds[item.number] for item in changing], lines)
+
+    @lazy
+    def linear(self) -> LinearLaws | None:
+        """The same for compiled code that asks no element; None where coefficients are not linear in the parameter, or
+        a law is a sum of other than pieces and rounded stops.
+        """
+        linear: list[tuple[float, ...]] = []
+        rounded: list[tuple[float, ...]] = []
+        touched = set()
+        for item in self._changing:
+            if item.rates is None:
+                return None
+            c = item.element.coefficient_values(self._balance.values)
+            kind, own, by = item.element.sampling(c), c.tolist(), item.rates.tolist()
+            if isinstance(kind, PiecewiseLinear):
+                for at, p in enumerate(kind.pieces, item.at):
+                    linear.append((at, p.side, own[p.stiffness], own[p.gap], by[p.stiffness], by[p.gap]))
+            elif isinstance(kind, SharpSampling) and kind.rounded is not None:
+                touched.add((item.direction, item.place))
+                for at, r in enumerate(kind.rounded, item.at):
+                    numbers = [rows[i] for rows in (own, by) for i in (r.stiffness, r.gap, r.sharpness)]
+                    rounded.append((at, item.direction, r.side, *numbers))
+            else:
+                return None
+        rest = np.zeros((len(self._lines), 2))
+        for g, lines in enumerate(self._lines):
+            for place, line in enumerate(lines):
+                if (g, place) not in touched:
+                    rest[g] += line
+        value = float(self._balance.values[self.name])
+        return LinearLaws(value, np.array(linear) if linear else None, np.array(rounded) if rounded else None, rest)
+
+    def room(self, linear: LinearLaws) -> tuple[PackedLaws, PackedChanges]:
+        """Arrays of the laws and their changes for `moving_laws.laws_at` to fill."""
+        base, changed = self._base, linear.linear is not None
+        pieces = base.pieces.copy() if changed else base.pieces
+        steps, line, moved = base.steps, base.line, self._none
+        places = base.places
+        if linear.rounded is not None:
+            steps, line, moved = steps.copy(), line.copy(), np.empty(line.shape)
+            places = places[0].copy(), places[1].copy()
+        packed = PackedLaws(
+            pieces, base.owner, base.first, base.polynomial, steps, base.step_owner, line, base.step_first, places,
+            base.sampled, base.told,
+        )  # fmt: skip
+        pieces_by = _NO_PIECES if linear.linear is None else np.empty((len(linear.linear), 5))
+        steps_by = _NO_STEPS if linear.rounded is None else np.empty((len(linear.rounded), 6))
+        return packed, PackedChanges(pieces_by, self._ends, steps_by, self._step_ends, moved)
 
     def at(self, values: Mapping[str, float]) -> ToldLaws:
         """The laws at parameter values of which only this one differs from the balance's."""

@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient, coefficient
-from suboctave.model.sampling import Piece, PiecewiseLinear, SharpSampling
+from suboctave.model.sampling import Piece, PiecewiseLinear, RoundedPiece, SharpSampling
 from suboctave.model.stops import ElasticStop
 
 __all__ = ["Clearance", "Freeplay"]
@@ -54,6 +55,8 @@ class _Play(Element):
             for side, gap in (("left", 1), ("right", 2))
         )
 
+        self._rounded = (RoundedPiece(0, 1, 3, -1), RoundedPiece(0, 2, 3, 1))
+
     def _of(self, gap: int) -> list[int]:
         """Which of the coefficients are those of one stop."""
         return [0, gap, 3] if self.regularised else [0, gap]
@@ -77,7 +80,8 @@ class _Play(Element):
         """Piecewise linear, or sharp at both ends of the play."""
         if not self.regularised:
             return PiecewiseLinear((Piece(0, 1, -1), Piece(0, 2, 1)))
-        return _together([stop.sampling(c[index]) for stop, index in self._stops])
+        told = _together([stop.sampling(c[index]) for stop, index in self._stops])
+        return replace(told, rounded=self._rounded)
 
     def told_change(self, c: Array, rates: Array) -> SharpSampling | None:
         """See `Element.told_change`."""

@@ -16,7 +16,6 @@ derivative is taken from the side where the stop is open at rest.
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,7 +25,8 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient
-from suboctave.model.sampling import Piece, PiecewiseLinear, SharpSampling
+from suboctave.model.rounding import at_rest, at_rest_by_gap, at_rest_by_sharpness
+from suboctave.model.sampling import Piece, PiecewiseLinear, RoundedPiece, SharpSampling
 
 __all__ = ["ElasticStop"]
 
@@ -69,6 +69,7 @@ class ElasticStop(Element):
             side = "left" if negative else "right"
         self.side = side
         self._sign = _SIDES[side]
+        self._rounded = (RoundedPiece(0, 1, 2, self._sign),)
         if self.regularised and self.coefficients[2].constant:
             self._check_sharpness(self.coefficients[2].value({}))
 
@@ -103,9 +104,8 @@ class ElasticStop(Element):
         """Piecewise linear, or sharp at the gap with width 1/s."""
         if self.regularised:
             k, b, sharpness = c.tolist()
-            # right: k [phi + at_rest], left: k [u - phi + at_rest], phi = y / 2 + an arctan step at the gap
-            constant = k * (self._at_rest(b, sharpness) - 0.5 * self._sign * b)
-            return SharpSampling((b,), (1.0 / sharpness,), constant, 0.5 * k, (self._sign * k,))
+            constant = k * (at_rest(self._sign, b, sharpness) - 0.5 * self._sign * b)
+            return SharpSampling((b,), (1.0 / sharpness,), constant, 0.5 * k, (self._sign * k,), self._rounded)
         return PiecewiseLinear((Piece(stiffness=0, gap=1, side=self._sign),))
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
@@ -114,7 +114,7 @@ class ElasticStop(Element):
             slope = c[0] * self._contact(u, c)
             return slope * (u - c[1]), slope, None
         k, b, s = c
-        force, slope = _kernels().regularised_tangent(np.ascontiguousarray(u), k, b, s, self._sign, self._at_rest(b, s))
+        force, slope = _kernels().regularised_tangent(np.ascontiguousarray(u), k, b, s, self._sign, at_rest(self._sign, b, s))
         return force, slope, None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
@@ -153,11 +153,11 @@ class ElasticStop(Element):
         sign, (by_stiffness, gap, sharpness), (k, b, s) = self._sign, rates.tolist(), c.tolist()
         constant = 0.0
         if by_stiffness:
-            constant += by_stiffness * (self._at_rest(b, s) - 0.5 * sign * b)
+            constant += by_stiffness * (at_rest(sign, b, s) - 0.5 * sign * b)
         if gap:
-            constant += k * gap * (self._at_rest_by_gap(b, s) - 0.5 * sign)
+            constant += k * gap * (at_rest_by_gap(sign, b, s) - 0.5 * sign)
         if sharpness:
-            constant += k * sharpness * self._at_rest_by_sharpness(b, s)
+            constant += k * sharpness * at_rest_by_sharpness(sign, b, s)
         return SharpSampling((gap,), (-sharpness / s**2,), constant, 0.5 * by_stiffness, (sign * by_stiffness,))
 
     def _numbers(self, c: Array) -> tuple[float, ...]:
@@ -165,8 +165,8 @@ class ElasticStop(Element):
         the derivatives by gap and sharpness per unit of stiffness.
         """
         k, b, s = c.tolist()
-        at_rest = (self._at_rest(b, s), self._at_rest_by_gap(b, s), self._at_rest_by_sharpness(b, s))
-        return k, b, s, self._sign, *at_rest
+        side = self._sign
+        return k, b, s, side, at_rest(side, b, s), at_rest_by_gap(side, b, s), at_rest_by_sharpness(side, b, s)
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
@@ -186,20 +186,6 @@ class ElasticStop(Element):
     def _contact(self, u: Array, c: Array) -> Array:
         return (self._sign * (u - c[1]) > 0.0).astype(float)
 
-    def _at_rest(self, b: float, s: float) -> float:
-        """The constant in brackets: what makes the force at `u = 0` that of the exact law."""
-        sign = self._sign
-        return sign * max(-sign * b, 0.0) - sign * _phi(-b, s)
-
-    def _at_rest_by_gap(self, b: float, s: float) -> float:
-        """Its derivative by the gap."""
-        sign = self._sign
-        return sign * (0.5 - math.atan(s * b) / math.pi) - (1.0 if sign * b < 0.0 else 0.0)
-
-    def _at_rest_by_sharpness(self, b: float, s: float) -> float:
-        """Its derivative by the sharpness."""
-        return -self._sign * math.log1p((s * b) ** 2) / (2.0 * math.pi * s**2)
-
     def _by_gap(self, y: Array, b: float, s: float) -> Array:
         """Derivative of the force per unit of stiffness with respect to the gap."""
         sign = self._sign
@@ -212,10 +198,6 @@ def _kernels() -> Any:
     from suboctave.model import stop_kernel
 
     return stop_kernel
-
-
-def _phi(y: float, s: float) -> float:
-    return y * (0.5 + math.atan(s * y) / math.pi) - math.log1p((s * y) ** 2) / (2.0 * math.pi * s)
 
 
 def _phi_y(y: Any, s: float) -> Any:
