@@ -332,7 +332,10 @@ def test_what_is_unsettled_is_said_in_words():
         assert stretch.parameter == "omega"
         assert stretch.arclength[0] < stretch.arclength[1]
         at = np.interp(stretch.arclength, curve.arclength, curve.omega)
-        assert at == pytest.approx([stretch.first, stretch.last], abs=1e-9)
+        # a step may be unsettled in two ways, before and behind a motion inside it
+        known = np.isin(stretch.arclength, curve.arclength)
+        assert at == pytest.approx([stretch.first, stretch.last], abs=2e-2)
+        assert at[known] == pytest.approx(np.array([stretch.first, stretch.last])[known], abs=1e-9)
         assert any(note.startswith(str(stretch)) for note in curve.warnings)
         assert str(stretch) in repr(curve.audit)
 

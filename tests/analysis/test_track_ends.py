@@ -134,7 +134,7 @@ def test_limit_points_end_where_their_motions_become_symmetric():
     branch = so.switch_branch(curve.bifurcations["BP"][0])
     limit_points = so.track(branch.bifurcations["LP"][0], "F", (0.3, 8.0), omega=(0.27, 5.5))
     assert limit_points.ended.count("the motions become symmetric") == 2
-    assert len(limit_points) < 60
+    assert len(limit_points) < 80
     assert [e.kind for e in limit_points.bifurcations] == ["CP", "CP"]
     # the branch points pass there
     found = so.track(curve.bifurcations["BP"][0], "F", (2.0, 6.0), omega=(0.27, 5.5))

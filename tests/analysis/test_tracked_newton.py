@@ -12,10 +12,11 @@ import pytest
 import suboctave as so
 from suboctave.analysis import tracked_curve, tracked_newton
 from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.analysis.tracked_iteration import FIRST, ITERATION, PREVIOUS, RATE, stepped
+from suboctave.analysis.tracked_iteration import FIRST, ITERATION, MEMO, PREVIOUS, RATE, stepped
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.changing_laws import ChangingLaws
 
 OPTIONS = NewtonOptions()
 
@@ -90,10 +91,16 @@ def generally(monkeypatch):
     monkeypatch.setattr(tracked_curve, "matrix_at_once", lambda evaluation, row, weights: None)
 
 
+@pytest.mark.parametrize("asking", [False, True], ids=["at once", "elements asked"])
 @pytest.mark.parametrize(("case", "name", "spare"), EVERY)
-def test_both_ways_agree(monkeypatch, case, name, spare):
+def test_both_ways_agree(monkeypatch, case, name, spare, asking):
     for curve, guess, row, weights in places(case, name):
-        one = curve.corrected(guess, row, weights, OPTIONS, spare)
+        assert curve.balance.laws_along(name).linear is not None
+        with monkeypatch.context() as patch:
+            if asking:
+                patch.setattr(ChangingLaws, "linear", None)
+                curve.balance.laws_along(name).__dict__.pop("linear", None)
+            one = curve.corrected(guess, row, weights, OPTIONS, spare)
         assert one is not None
         with monkeypatch.context() as patch:
             generally(patch)
@@ -140,6 +147,22 @@ def test_factors_of_a_neighbour_are_used(monkeypatch, case):
     assert first[0] is not curve
 
 
+def test_coefficients_that_are_not_linear_in_the_parameter():
+    """The same curve whether the gap is a parameter or its square root is."""
+    found = []
+    for gap, bounds in (("g", (0.01, 0.04)), ("r**2", (0.1, 0.2))):
+        stop = so.ElasticStop(0, stiffness=4.0, gap=gap, side="right", regularization=300.0)
+        loads, values = [so.HarmonicLoad(0, "p")], {"g": 0.0225, "r": 0.15, "p": 0.5}
+        system = so.System(1.0, 0.06, 1.0, [stop], loads, {gap[0]: values[gap[0]], "p": values["p"]})
+        item = so.frequency_response(system, (4.5, 1.3), 15).bifurcations["PD"][0]
+        curve = so.track(item, gap[0], bounds)
+        assert (curve.points[0].orbit.balance.laws_along(gap[0]).linear is None) == (gap != "g")
+        found.append(curve)
+    for end in (0, -1):
+        assert found[0].parameter("g")[end] == pytest.approx(found[1].parameter("r")[end] ** 2, rel=1e-12)
+        assert found[0].omega[end] == pytest.approx(found[1].omega[end], rel=1e-9)
+
+
 def test_what_does_not_converge_is_said(monkeypatch):
     curve, guess, row, weights = places("corners, PD", "j")[-1]
     far = guess + 0.3 * row / weights
@@ -159,7 +182,7 @@ def test_what_does_not_converge_is_said(monkeypatch):
 def test_corrections_that_come_to_nothing_are_seen():
     """Two in succession that hardly shrink, or one that grows far beyond the first."""
     for rate, length, ends in ((0.9, 0.9, True), (0.9, 0.7, False), (0.5, 0.9, False), (0.1, 2.5, True)):
-        memo = np.zeros(9)
+        memo = np.zeros(MEMO)
         memo[PREVIOUS], memo[RATE], memo[ITERATION], memo[FIRST] = 1.0, rate, 2, 1.0
         u, row = np.zeros(3), np.array([0.0, 0.0, 1.0])
         lu, pivots = np.eye(3), np.arange(3, dtype=np.int32)
@@ -191,7 +214,7 @@ def test_whole_curves_agree(monkeypatch):
 ORDINARY = """
 import suboctave as so
 from suboctave.analysis import response, tracked_newton
-calls = dict.fromkeys(("corrected", "looked_at", "differentiated"), 0)
+calls = dict.fromkeys(("corrected", "iterated"), 0)
 
 def counting(module, name):
     own = getattr(module, name)
@@ -200,7 +223,7 @@ def counting(module, name):
         return own(*args)
     setattr(module, name, counted)
 
-counting(response, "corrected"), counting(tracked_newton, "looked_at"), counting(tracked_newton, "differentiated")
+counting(response, "corrected"), counting(tracked_newton, "iterated")
 system = so.library.reference_oscillator(p=0.55, j=0.05, **LAW)
 item = so.frequency_response(system, (4.5, 1.3), 15).bifurcations["PD"][0]
 so.track(item, "Kc", (4.0, 9.0))
@@ -216,6 +239,6 @@ def test_ordinary_processes_use_compiled_searches(law):
     done = subprocess.run(
         [sys.executable, "-c", ORDINARY.replace("LAW", repr(law))], capture_output=True, text=True, check=True
     )
-    responses, looks, matrices = map(int, done.stdout.split())
+    responses, points = map(int, done.stdout.split())
     assert responses > 10
-    assert looks > matrices > 10
+    assert points > 10

@@ -280,10 +280,12 @@ def leave_along(
 
 
 def _is_turn(item: Bifurcation, here: Bifurcation) -> bool:
-    """Whether a limit point that could only be bracketed is where a branch turns back as it passes its branch point."""
+    """Whether a limit point is where a branch turns back as it passes its branch point, told from it by rounding and by
+    the harmonics that are kept there.
+    """
     name = here.parameter_name
     near = math.isclose(item.parameter(name), here.parameter(name), rel_tol=_TURN)
-    return item.kind == "LP" and item.uncertainty > 0.0 and near and item.orbit.matches(here.orbit, math.sqrt(_TURN))
+    return item.kind == "LP" and near and item.orbit.matches(here.orbit, math.sqrt(_TURN))
 
 
 def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:

@@ -31,9 +31,8 @@ from suboctave.stability import StabilityMethod
 
 Range = tuple[float, float]
 
-#: aim for the angle between the tangents of neighbours, radians: a curve of bifurcations is drawn by its points, and
-#: those in its turns cost little
-_ANGLE = 0.15
+#: a curve of bifurcations is drawn by its points, and those in its turns cost little
+_STEPPING = SteppingOptions(angle=0.15, growth=4.0)
 
 
 @timed
@@ -122,7 +121,7 @@ def track(
         _observed(bifurcation, observe),
         (),
         newton,
-        stepping or SteppingOptions(angle=_ANGLE),
+        stepping or _STEPPING,
         stability,
         formulation,
     )

@@ -132,7 +132,8 @@ class _Tracker:
         if found is None:
             return None
         point, note = found
-        self.trace.warnings.append(note)
+        if note not in self.trace.warnings:
+            self.trace.warnings.append(note)
         if point is None or not self._inside(TrackedSample(point)):
             return None
         self._turn_at_corner(last, point)
@@ -268,7 +269,7 @@ class _Tracker:
         On the end of a range a coefficient may have a corner (a gap that is just closed): derivatives there may be
         those of the far side.
         """
-        point, angle = b.point, 2.5 * self.settings.stepping.angle
+        point, angle = b.point, self.settings.stepping.sharpest
         if kernels.cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(angle):
             return b
         chord = point.weights * (point.u - b.curve.transfer(a.point.u, a.curve))

@@ -224,8 +224,9 @@ class _Stretch:
         return self.samples[share], slope / way if way > 0.0 else 0.0
 
     def _turn(self) -> float:
-        """The share at which a parameter turns by its cubic interpolation; 0 if nowhere."""
-        assert isinstance(self.test, Extremum)
+        """The share at which a parameter turns by its cubic interpolation; 0 if nowhere, and for other tests."""
+        if not isinstance(self.test, Extremum):
+            return 0.0
         start, curve, half = _slope_between(self.test.name, self.a, self.b)
         inside = half * half - start * curve
         if inside >= 0.0 and start != 0.0:

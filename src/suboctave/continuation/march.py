@@ -27,6 +27,8 @@ _BEHIND = 2
 _LONG = 32
 #: how often a step is halved towards the bound that it passes; Newton's method does the rest
 _HALVED = 20
+#: angle between successive tangents at which a step is refused, radians, unless the aim is large
+_SHARP = 0.75
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-5
 
@@ -42,8 +44,9 @@ class SteppingOptions:
         First step, and the step below which the curve ends with a reason.
     deviation
         Aim for the distance between prediction and solution.
-    angle
-        Aim for the angle between successive tangents, radians.
+    angle, growth
+        Aim for the angle between successive tangents, radians; by how much at most a curve that turns more and more is
+        expected to turn more from one step to the next.
     max_points
         Points after which the curve ends with a reason.
     """
@@ -53,6 +56,7 @@ class SteppingOptions:
     min_step: float = 1e-7
     deviation: float = 0.01
     angle: float = 0.3
+    growth: float = 1.0
     max_points: int = 20000
 
     def __post_init__(self) -> None:
@@ -62,8 +66,13 @@ class SteppingOptions:
             )
         if not self.min_step < self.max_step < math.inf:
             raise InputError(f"max_step={self.max_step:g} must lie above min_step={self.min_step:g}")
-        if self.deviation <= 0.0 or not 0.0 < self.angle < 1.6 or self.max_points < 2:
+        if self.deviation <= 0.0 or not 0.0 < self.angle < 1.6 or self.growth < 1.0 or self.max_points < 2:
             raise InputError(f"SteppingOptions out of range: {self}")
+
+    @property
+    def sharpest(self) -> float:
+        """Angle between successive tangents at which a step is refused, radians."""
+        return max(_SHARP, 2.5 * self.angle)
 
 
 class _Place:
@@ -71,6 +80,8 @@ class _Place:
 
     def __init__(self, point: CurvePoint) -> None:
         self.point = point
+        #: values of the parameter at its images
+        self._values = [image[point.curve.parameter] for image in point.curve.images(point.u)]
         #: its images in the discretisation of the last point
         self._images: tuple[Curve, list[Array]] | None = None
 
@@ -78,8 +89,8 @@ class _Place:
         """It again, if the step from `point` to `new` passes it in the same direction."""
         w, own = new.weights, self.point
         step = kernels.distance(new.u, point.u, w)
-        # all its images have its parameter
-        if abs(new.parameter - own.parameter) > 1.5 * step / w[new.curve.parameter]:
+        here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
+        if all(abs(here - value) > reach for value in self._values):
             return None
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
@@ -161,7 +172,7 @@ class March:
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
         behind: list[CurvePoint] = []
-        count = 1
+        bend, count = 0.0, 1
         while True:
             if count >= options.max_points:
                 self.ended = (
@@ -197,7 +208,7 @@ class March:
                 )
                 return
             if end is not None:
-                landed = self._land(point, new, end)
+                landed = new if new.parameter == end else self._land(point, new, end)
                 if landed is not None:
                     self.ended = f"reached the end of the range at {landed.curve.where(landed.u)}"
                     yield landed
@@ -210,7 +221,11 @@ class March:
             count += 1
             if count >= _LONG and count & (count - 1) == 0:
                 mark, marked = _Place(new), count
-            step = self._next_step(new, new.arclength - point.arclength, deviation, turn)
+            taken = new.arclength - point.arclength
+            bend, before = (turn / taken if taken > 0.0 else 0.0), bend
+            # a curve that has begun to turn goes on to
+            turn *= min(options.growth, bend / before) if bend > before > 0.0 else 1.0
+            step = self._next_step(new, taken, deviation, turn)
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             adapted = new.curve.adapted(new.u, new.evaluation)
@@ -251,16 +266,20 @@ class March:
         order = len(known)
         while True:
             try:
-                guess = np.empty(len(point.u))
-                kernels.predict(points[:order], tangents[:order], point.weights, step, guess)
-                row = point.weights * point.tangent
+                guess, row, bound = self._predicted(point, points[:order], tangents[:order], step)
                 solved = correct(curve, guess, row, point.weights, self.newton, spare=_SPARED * step)
+                if bound is not None:
+                    solved.u[curve.parameter] = bound
                 taken = kernels.distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
-                fine = turn < 2.5 * self.stepping.angle and solved.distance < 0.4 * step
+                fine = turn < self.stepping.sharpest and solved.distance < 0.4 * step
                 fine = fine and taken <= 1.000001 * self.stepping.max_step
-                if step <= self.stepping.min_step or (fine and (self.inspect is None or self.inspect(point, new))):
+                if step <= self.stepping.min_step:
+                    fine = self._leads_on(point, new)
+                elif fine and self.inspect is not None:
+                    fine = self.inspect(point, new)
+                if fine:
                     return new, step, solved.distance, turn
                 failure = ConvergenceError("the curve turns too sharply")
             except ConvergenceError as error:
@@ -270,6 +289,26 @@ class March:
             # what lies behind may not tell what comes
             order = max(1, order - 1)
             step = max(0.5 * step, self.stepping.min_step)
+
+    def _predicted(
+        self, point: CurvePoint, points: Array, tangents: Array, step: float
+    ) -> tuple[Array, Array, float | None]:
+        """A prediction and the row to solve with: one step ahead, or on the bound (returned) that it would pass."""
+        guess, index = np.empty(len(point.u)), point.curve.parameter
+        kernels.predict(points, tangents, point.weights, step, guess)
+        low, high = self.bounds
+        if low <= guess[index] <= high or not low < point.parameter < high:
+            return guess, point.weights * point.tangent, None
+        bound = low if guess[index] < low else high
+        near, far = 0.0, step
+        for _ in range(_HALVED):
+            middle = 0.5 * (near + far)
+            kernels.predict(points, tangents, point.weights, middle, guess)
+            near, far = (near, middle) if (guess[index] - bound) * (point.parameter - bound) < 0.0 else (middle, far)
+        guess[index] = bound
+        row = np.zeros(len(guess))
+        row[index] = 1.0
+        return guess, row, bound
 
     def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float, float]:
         """A point beyond a corner of the equations, where no tangent leads on but the parameter does.
@@ -294,6 +333,14 @@ class March:
                 beyond = replace(new, arclength=point.arclength + taken)
                 return beyond, self.stepping.initial_step, 0.0, self._angle(point, beyond)
         raise failure
+
+    @staticmethod
+    def _leads_on(point: CurvePoint, new: CurvePoint) -> bool:
+        """Whether the tangent at the second of two points leads away from the first: not at a jump across a corner,
+        onto the part of the curve behind it, which would be followed back into it.
+        """
+        chord = new.weights * (new.u - point.u)
+        return float(chord @ (new.weights * new.tangent)) > 0.0
 
     @staticmethod
     def _angle(a: CurvePoint, b: CurvePoint) -> float:
