@@ -36,9 +36,12 @@ from suboctave.harmonic.state import BalanceState
 
 #: sub-harmonic share of the motion from which on the end of the curve is looked for, and which is none any more
 _FAINT, _NOTHING_LEFT = 3e-3, 1e-5
-#: speed in the plane of the parameters below which it is looked for as well, and distance there at which it is reached
+#: speed in the plane of the parameters below which they may stand, and distance there at which the end is reached
 #: whatever the share: what more of the way a motion of little damping shows is less than residuals tell
 _STANDING, _REACHED = 1e-4, 2e-7
+#: steps like the last within which it vanishes and its end is looked for; how far that may lie from where two points
+#: lead, as a share of the way
+_AHEAD, _LEADS = 3.0, 0.3
 #: way along the parent's curve, in scaled arclength, within which that end lies
 _BESIDE = 0.05
 #: the same along a curve of LP or PD for the end of an NS curve
@@ -91,18 +94,71 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
     if b.curve.balance.basis.nu == 1:
         return _symmetry_gained(a, b)
     share = subharmonic_share(b.point)
-    faint = share <= _FAINT
-    parent = _on_the_parent(a, newton) if faint or (_stands(b) and share < subharmonic_share(a.point)) else None
-    if parent is not None and (faint or _apart(parent.sample.point, b.point) <= _REACHED):
-        where = parent.sample.curve.where(parent.sample.point.u)
-        reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
-        return End(reason, parent, last=True)
+    if share <= _FAINT:
+        parent = _on_the_parent(a, newton)
+        if parent is not None:
+            return _in_the_parent(parent)
+    elif _standing(a, b):
+        parent = _on_the_parent(a, newton)
+        if parent is not None and _apart(parent.sample.point, b.point) <= _REACHED:
+            return _in_the_parent(parent)
+        return End(
+            f"the curve ends on the period doublings of the parent motion beside {b.curve.where(b.point.u)}: the "
+            "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
+        )
     if share <= _NOTHING_LEFT:
         return End(
             f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are period "
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def end_ahead(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
+    """The GPD in which limit points of doubled motions end within a step or two behind the second of two neighbours.
+
+    Towards it the parameters run like the square of the doubled part y, which vanishes evenly: p = p_end + c y^2. Where
+    y is small the equations tell limit points from period doublings of the parent by little, and of little damping by
+    nothing; so the end is looked for while they still do, and taken if it lies where the last two points lead.
+    """
+    lead = _lead(a, b)
+    if lead is None or subharmonic_share(b.point) <= _NOTHING_LEFT:
+        return None
+    before, size = (_doubled(sample.point) for sample in (a, b))
+    if size > _AHEAD * (before - size):
+        return None
+    parent = _on_the_parent(b, newton)
+    if parent is None:
+        return None
+    units = b.point.weights[-2:]
+    miss = float(np.linalg.norm(units * (parent.sample.point.u[-2:] - b.point.u[-2:] - lead)))
+    return _in_the_parent(parent) if miss <= _LEADS * float(np.linalg.norm(units * lead)) + _REACHED else None
+
+
+def _lead(a: TrackedSample, b: TrackedSample) -> Array | None:
+    """What the parameters still change by until the doubled part of limit points vanishes, if two neighbours lead
+    there; None if they do not, or are others.
+    """
+    if b.curve.balance.basis.nu % 2 or b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
+        return None
+    before, size = (_doubled(sample.point) for sample in (a, b))
+    if not 0.0 < size < before:
+        return None
+    result: Array = (b.point.u[-2:] - a.point.u[-2:]) * size**2 / (before**2 - size**2)
+    return result
+
+
+def _doubled(point: CurvePoint) -> float:
+    """Size of the doubled part of a motion."""
+    curve = point.curve
+    assert isinstance(curve, TrackedCurve)
+    return float(np.linalg.norm(_parts(curve, point.u)[0]))
+
+
+def _in_the_parent(parent: Found) -> End:
+    where = parent.sample.curve.where(parent.sample.point.u)
+    reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
+    return End(reason, parent, last=True)
 
 
 def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
@@ -137,9 +193,11 @@ def _apart(one: CurvePoint, other: CurvePoint) -> float:
     return float(np.linalg.norm(other.weights[-2:] * (one.u[-2:] - other.u[-2:])))
 
 
-def _stands(b: TrackedSample) -> bool:
-    """Whether the parameters hardly change along a curve."""
-    return float(np.linalg.norm(b.point.weights[-2:] * b.point.tangent[-2:])) <= _STANDING
+def _standing(a: TrackedSample, b: TrackedSample) -> bool:
+    """Whether the doubled part of limit points goes on to vanish while the parameters have come to their end."""
+    units, lead = b.point.weights[-2:], _lead(a, b)
+    stands = float(np.linalg.norm(units * b.point.tangent[-2:])) <= _STANDING
+    return stands and lead is not None and float(np.linalg.norm(units * lead)) <= _REACHED
 
 
 def _symmetric(b: TrackedSample) -> bool:
@@ -259,4 +317,4 @@ def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
     return [np.flatnonzero(k % prime) for prime in primes]
 
 
-__all__ = ["End", "end_between", "keeps_subharmonics", "rebased", "repeats_earlier", "subharmonic_share"]
+__all__ = ["End", "end_ahead", "end_between", "keeps_subharmonics", "rebased", "repeats_earlier", "subharmonic_share"]

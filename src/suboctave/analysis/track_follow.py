@@ -9,7 +9,7 @@ import numpy as np
 
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_corners import beyond_corner
-from suboctave.analysis.track_ends import End, end_between, keeps_subharmonics, rebased
+from suboctave.analysis.track_ends import End, end_ahead, end_between, keeps_subharmonics, rebased
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import LOOKED_AT, TrackedCurve
@@ -199,7 +199,13 @@ class _Tracker:
         if settings.report is not None:
             low, high = self.box.second
             settings.report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
-        return f"reached the end of the range at {new.curve.where(new.point.u)}" if outside else None
+        if outside:
+            return f"reached the end of the range at {new.curve.where(new.point.u)}"
+        ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
+        if ahead is None:
+            return None
+        self._take_end(new, ahead)
+        return ahead.reason
 
     def _take(self, found: list[Found]) -> None:
         settings, warnings = self.settings, self.trace.warnings

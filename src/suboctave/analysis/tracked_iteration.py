@@ -268,7 +268,7 @@ def iterated(
             nodes, load, weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, blocks, table,
             motions, parts, sizes, operator, border_lu, border_pivots, vectors, numbers,
         )  # fmt: skip
-        if ended == ANEW or ended == LAST:
+        if ended in (ANEW, LAST):
             load_alone[:] = -load_by
             noted = sampled if alone else none
             ended = differentiated(

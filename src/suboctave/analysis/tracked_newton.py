@@ -127,7 +127,8 @@ class _Solve:
             self.memo[WAY], self.memo[FACTORS], self.memo[GIVEN] = np.inf, 1.0, 1.0
         self.motions = np.empty((groups, high + 1), dtype=complex)
         self.blocks = np.empty((high + 1, size, size), dtype=complex)
-        self.table, self.parts = np.empty((3, groups, balance.top + 1), dtype=complex), np.empty((3, 2 * high + 1, size))
+        self.table = np.empty((3, groups, balance.top + 1), dtype=complex)
+        self.parts = np.empty((3, 2 * high + 1, size))
         operator, border_lu, self.extended = _scratch(m, n)
         self.vectors, self.sizes = np.empty((2, m + 1)), np.empty(4)
         self.gx, self.rates = np.empty((2 * high + 1, size)), np.empty(3)
@@ -163,9 +164,7 @@ class _Solve:
         balance, pieces = self.curve.balance, packed.pieces if len(packed.pieces) else None
         return *balance.directions, pieces, packed.first, packed.polynomial, balance.grid, self.nodes
 
-    def _at_once(
-        self, along: ChangingLaws, linear: LinearLaws, rate: Array | None
-    ) -> tuple[int, PackedLaws, Array]:
+    def _at_once(self, along: ChangingLaws, linear: LinearLaws, rate: Array | None) -> tuple[int, PackedLaws, Array]:
         """All iterations in compiled code."""
         balance = self.curve.balance
         packed, changes = along.room(linear)
@@ -174,13 +173,15 @@ class _Solve:
         load_by = np.zeros_like(load) if rate is None else rate
         changed = changes.pieces if linear.linear is not None else None
         steps = changes.steps if linear.rounded is not None else None
-        ended, sampled = iterated(
+        alone = packed.told and _only_direction(packed)
+        given: tuple[Any, ...] = (
             *(*linear, load, load_by, np.empty_like(load)),
             *(*self.same, self.limits, *self.factors, *self.lines, *self.units, self.scale, *self.matrices),
             *(*self._laws(packed), np.empty_like(load), balance.scales()[1], *told, *self.filled),
-            *(packed.told and _only_direction(packed), changed, changes.first, steps, changes.step_first, changes.line),
+            *(alone, changed, changes.first, steps, changes.step_first, changes.line),
             *(self.gx, self.rates, self.extended),
         )
+        ended, sampled = iterated(*given)
         return ended, packed, sampled
 
     def _asking(self, along: ChangingLaws, rate: Array | None) -> tuple[int, PackedLaws, Array] | None:
@@ -196,8 +197,11 @@ class _Solve:
                 load = balance.load(values if loaded else balance.values, omega)
             else:
                 load = balance.load(balance.values, 0.0) + (values[name] - balance.values[name]) * rate
-            of = (*self.same, self.limits, *self.factors, *self.lines, *self.units, self.scale, *self.matrices)
-            ended, sampled = looked_at(*of, *laws, load, balance.scales()[1], *told, *self.filled)
+            given: tuple[Any, ...] = (
+                *(*self.same, self.limits, *self.factors, *self.lines, *self.units, self.scale, *self.matrices),
+                *(*laws, load, balance.scales()[1], *told, *self.filled),
+            )
+            ended, sampled = looked_at(*given)
             if ended in (ANEW, LAST):
                 changes = along.changes(values, there)
                 if changes is None:
@@ -210,11 +214,12 @@ class _Solve:
                 steps = changes.steps if len(changes.steps) else None
                 moved = (pieces, changes.first, steps, changes.step_first, changes.line)
                 noted = sampled if packed.told and _only_direction(packed) else _NO_NODES
-                ended = differentiated(
+                given = (
                     *(ended == LAST, *self.same, *self.factors, *self.units, *self.matrices, *laws, *told),
                     *(noted, *moved, by_load, self.motions, self.table, self.parts, self.vectors),
                     *(self.gx, self.rates, self.numbers, self.extended),
                 )
+                ended = differentiated(*given)
             if ended != MOVED:
                 return ended, packed, sampled
 

@@ -3,8 +3,9 @@
     right:  f = k [phi(y) + r]        left:  f = k [u - phi(y) + r]        y = u - b
     phi(y) = y/2 + y atan(s y)/pi - ln(1 + s^2 y^2)/(2 pi s)
 
-with r = `at_rest`: an arctan step `side k` of width 1/s at b, the slope k/2 and the constant `k (r - side b / 2)`. Numbers
-in, numbers out: the elements take these functions as they are, those who follow laws along a parameter compile them.
+with r = `at_rest`: an arctan step `side k` of width 1/s at b, the slope k/2 and the constant `k (r - side b / 2)`.
+Numbers in, numbers out: elements take these functions as they are, those who follow laws along a parameter compile
+them.
 """
 
 from __future__ import annotations

@@ -114,7 +114,8 @@ class ElasticStop(Element):
             slope = c[0] * self._contact(u, c)
             return slope * (u - c[1]), slope, None
         k, b, s = c
-        force, slope = _kernels().regularised_tangent(np.ascontiguousarray(u), k, b, s, self._sign, at_rest(self._sign, b, s))
+        rest = at_rest(self._sign, b, s)
+        force, slope = _kernels().regularised_tangent(np.ascontiguousarray(u), k, b, s, self._sign, rest)
         return force, slope, None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
