@@ -323,7 +323,7 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             finer = replace(finer, balance=finer.balance.settle(x, omega, values))
             along = finer.transfer(sample.point.tangent, curve)
             weights = finer.weights(u, curve.size(sample.point.u))
-            start = nearest_point(finer, u, weights, newton, along)
+            start = nearest_point(finer, u, weights, newton, along, BEGINNING)
             start = replace(start, arclength=sample.point.arclength)
             near = TrackedSample(start)
             test = found.test.within(near, near)

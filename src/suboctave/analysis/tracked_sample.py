@@ -227,8 +227,10 @@ def nearest_point(
     weights: np.ndarray,
     newton: NewtonOptions,
     along: np.ndarray | None = None,
+    spare: float = 0.0,
 ) -> CurvePoint:
-    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known.
+    """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known; `spare` as
+    in `newton.correct`.
 
     Raises
     ------
@@ -237,7 +239,7 @@ def nearest_point(
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
     try:
-        return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
+        return make_point(correct(curve, u, row, weights, newton, spare=spare), curve, row / weights, 0.0)
     except ConvergenceError:
         if along is not None:
             raise
