@@ -19,6 +19,8 @@ __all__ = ["annotate"]
 
 #: nearest first; further away where everything near is taken
 _DISTANCES = (1.0, 2.4, 3.8)
+#: points kept clear between two texts, and, rather, between a text and the frame with its ticks
+_CLEAR, _TICKS = 1.5, 4.0
 _SIDES = ((1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1))
 
 
@@ -32,11 +34,11 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
     figure.draw_without_rendering()
     points = axes.transData.transform(np.asarray(places, dtype=float))
     taken = _ink(axes)
-    frame = axes.get_window_extent()
+    unit, window = figure.dpi / 72.0, axes.get_window_extent()
+    frame, within = _corners(window), _corners(window.padded(-_TICKS * unit))
     legend = axes.get_legend()
     boxes = [] if legend is None else [_corners(legend.get_window_extent())]
-    unit = figure.dpi / 72.0
-    gap = 0.75 * style.MARKER_SIZE * look.marker
+    gap, clear = 0.75 * style.MARKER_SIZE * look.marker, _CLEAR * unit
     done: list[tuple[str, np.ndarray]] = []
     for text, point in zip(texts, points, strict=True):
         if any(text == other and np.hypot(*(point - there)) < 3.0 * unit for other, there in done):
@@ -49,9 +51,9 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
         for distance, (rank, side) in product(_DISTANCES, enumerate(_SIDES)):
             reach = distance * gap
             box = _beside(point, side, size.width, size.height, reach * unit)
-            inside = frame.x0 <= box[0] and box[2] <= frame.x1 and frame.y0 <= box[1] and box[3] <= frame.y1
-            cost = 2.0 * _covered(box, taken) + 400.0 * sum(_overlap(box, other) for other in boxes)
-            cost += (0.0 if inside else 400.0) + 0.1 * rank + 5.0 * (distance - 1.0)
+            wide = box[0] - clear, box[1] - clear, box[2] + clear, box[3] + clear
+            cost = 2.0 * _covered(box, taken) + 400.0 * sum(_overlap(wide, other) for other in boxes)
+            cost += 400.0 * _leaves(box, frame) + 25.0 * _leaves(box, within) + 0.1 * rank + 5.0 * (distance - 1.0)
             if best is None or cost < best[0]:
                 best = (cost, side, reach)
         assert best is not None
@@ -116,3 +118,7 @@ def _covered(box: tuple[float, float, float, float], ink: np.ndarray) -> float:
 
 def _overlap(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def _leaves(box: tuple[float, float, float, float], frame: tuple[float, float, float, float]) -> bool:
+    return box[0] < frame[0] or box[1] < frame[1] or box[2] > frame[2] or box[3] > frame[3]
