@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from suboctave.errors import InputError
-from suboctave.pictures.strokes import line, repeated, strokes, without_repeats
+from suboctave.pictures.strokes import bent, line, repeated, strokes, without_repeats
 from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.arange(5.0)
@@ -128,3 +128,47 @@ def test_a_parameter_may_have_any_name():
     dataset = curve_dataset(X, X, parameters={"amplitude": X, "error": 3.0}, free="amplitude")
     assert list(dataset["amplitude"].to_numpy()) == list(X)
     assert described(dataset, "error") == [([3.0] * 5, None)]
+
+
+@pytest.mark.parametrize("count", [13, 25])
+def test_a_line_is_drawn_through_its_vertices_and_smooth(count):
+    """A circle in a frame that is not square; the angle between two pieces shrinks with their length."""
+    angle = np.linspace(0.0, 1.9 * np.pi, count)
+    x, y = 30.0 * np.cos(angle), 0.2 * np.sin(angle)
+    drawn = bent(x, y, (30.0, 0.2))
+    for vertex in zip(x, y, strict=True):
+        assert np.min(np.hypot((drawn[0] - vertex[0]) / 30.0, (drawn[1] - vertex[1]) / 0.2)) < 1e-15
+    assert (drawn[0][0], drawn[1][0], drawn[0][-1], drawn[1][-1]) == (x[0], y[0], x[-1], y[-1])
+    off = np.abs(np.hypot(drawn[0] / 30.0, drawn[1] / 0.2) - 1.0)
+    assert off.max() < 0.3 * (1.0 - np.cos(0.5 * angle[1]))
+    heading = np.unwrap(np.arctan2(np.diff(drawn[1] / 0.2), np.diff(drawn[0] / 30.0)))
+    assert np.abs(np.diff(heading)).max() < 0.1 < angle[1]
+
+
+def test_corners_stay():
+    """Straight on both sides, whatever lies close to the corner, and none beside it."""
+    x = np.array([0.0, 0.3, 0.6, 0.6 + 1e-9, 0.6, 0.6, 0.6])
+    y = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.35, 0.9])
+    drawn = bent(x, y, (1.0, 1.0))
+    below = drawn[0] < 0.6 - 1e-12
+    assert drawn[1][below] == pytest.approx(0.0, abs=1e-15)
+    assert drawn[0][~below] == pytest.approx(0.6, abs=1e-8)
+    assert np.all(np.diff(drawn[0]) >= -1e-8)
+    assert np.all(np.diff(drawn[1]) >= 0.0)
+
+
+def test_few_vertices_and_unknown_values_are_drawn_as_they_are():
+    for values in ([1.0], [1.0, 2.0], [1.0, np.nan, 2.0, 4.0]):
+        x = np.array(values)
+        one, other = bent(x, 2.0 * x, (1.0, 1.0))
+        np.testing.assert_array_equal(one, x)
+        np.testing.assert_array_equal(other, 2.0 * x)
+    # an event upon the last point, as upon the first
+    twice = np.array([0.0, 0.0, 0.2, 0.5, 1.0, 1.0])
+    one, other = bent(twice, twice**2, (1.0, 1.0))
+    assert (one[0], other[0], one[-1], other[-1]) == (0.0, 0.0, 1.0, 1.0)
+    assert np.isfinite(one).all()
+    same = np.full(5, 0.5)
+    one, other = bent(same, same, (1.0, 1.0))
+    assert one == pytest.approx(0.5)
+    assert other == pytest.approx(0.5)

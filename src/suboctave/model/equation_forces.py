@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -65,9 +66,10 @@ class Forces:
                 continue
             for j, slope in zip(inside[1:], slopes[1:], strict=True):
                 ratio = sympy.cancel(slope / slopes[0]) if expanded_size(slope) < _MOST_TERMS else slope / slopes[0]
-                if not ratio.is_number or direction[j] not in (0.0, float(ratio)):
+                number = _real(ratio)
+                if number is None or direction[j] not in (0.0, number):
                     return None
-                direction[j] = float(ratio)
+                direction[j] = number
         return direction if all(direction[j] for j in inside) else None
 
     # ----------------------------------------------------------------------------------------------------- elements
@@ -204,7 +206,11 @@ class Forces:
             if not all(slope.is_number for slope in used) or not any(used):
                 return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
             first = next(slope for slope in used if slope)
-            forms.add(tuple(float(slope / first) for slope in used))
+            ratios = [_real(slope / first) for slope in used]
+            known = [ratio for ratio in ratios if ratio is not None]
+            if len(known) < len(ratios):
+                return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
+            forms.add(tuple(known))
         if len(forms) != 1:
             return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
         form = forms.pop()
@@ -236,3 +242,14 @@ def _number(value: float) -> Any:
     import sympy
 
     return sympy.Integer(int(value)) if float(value).is_integer() else sympy.Float(value)
+
+
+def _real(value: Any) -> float | None:
+    """A real number, None for all else (an expression, a complex number, infinity)."""
+    if not value.is_number:
+        return None
+    try:
+        number = float(value)
+    except (TypeError, OverflowError):
+        return None
+    return number if math.isfinite(number) else None

@@ -127,7 +127,10 @@ class _Equations:
     def _ordered(self, mass: list[list[Any]], equations: list[Any]) -> tuple[list[list[Any]], list[Any]]:
         """Equations in the order of the DOFs whose masses they hold, with positive masses."""
         values = {symbol(name): value for name, value in self.parameters.items()}
-        numbers = np.array([[float(entry.subs(values)) if entry != 0 else 0.0 for entry in row] for row in mass])
+        try:
+            numbers = np.array([[float(entry.subs(values)) if entry != 0 else 0.0 for entry in row] for row in mass])
+        except (TypeError, OverflowError):
+            raise InputError(f"the masses {mass} are not all finite real numbers at the parameters {values}") from None
         if np.all(np.diag(numbers)) and np.allclose(np.abs(numbers), np.abs(numbers.T), rtol=1e-9, atol=0.0):
             order = list(range(self.n))
         else:

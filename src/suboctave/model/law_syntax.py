@@ -149,6 +149,13 @@ class _Reader:
             return sympy.Integer(int(value))
         return sympy.Float(float(value))
 
+    def real(self, node: ast.AST, value: Any) -> float:
+        """The number that a part without names stands for."""
+        try:
+            return float(value)
+        except (TypeError, OverflowError):
+            raise self.refuse(node, "not a finite real number") from None
+
     def name(self, node: ast.AST, name: str) -> Any:
         import sympy
 
@@ -171,7 +178,7 @@ class _Reader:
         first = arguments[0]
         corner = corner_functions()
         if all(not argument.free_symbols for argument in arguments):
-            values = [float(argument) for argument in arguments]
+            values = [self.real(node, argument) for argument in arguments]
             plain: dict[str, Callable[..., float]] = {
                 **FUNCTIONS,
                 "max": max,
@@ -211,7 +218,7 @@ class _Reader:
                 return a / b
             case ast.Pow():
                 if not b.free_symbols:
-                    exponent = float(b)
+                    exponent = self.real(node, b)
                     if abs(exponent) > _LARGEST_POWER:
                         raise self.refuse(node, f"the power is larger than {_LARGEST_POWER}")
                     if float(2.0 * exponent).is_integer():

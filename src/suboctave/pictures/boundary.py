@@ -35,7 +35,7 @@ from suboctave.pictures.periods import tinted
 from suboctave.pictures.regions import CENTRE, MERGING, end_text, regions, split, with_ends
 from suboctave.pictures.response import dress
 from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import strokes, without_repeats
+from suboctave.pictures.strokes import bent, strokes, without_repeats
 from suboctave.pictures.view import View
 from suboctave.store.layout import check_layout, coordinate
 
@@ -263,9 +263,10 @@ def _lines(
     for dataset, curve in zip(prepared, styles, strict=True):
         pieces = strokes(dataset, plane.across, _UPWARDS)
         for stroke in without_repeats(pieces, earlier.setdefault(curve, []), (spread[0], spread[1])):
+            x, y = bent(stroke.x, stroke.y, (spread[0], spread[1]))
             axes.plot(
-                stroke.x * factors[0],
-                stroke.y * factors[1],
+                x * factors[0],
+                y * factors[1],
                 color=curve.colour,
                 linewidth=look.line * curve.width,
                 linestyle=_dash(stroke.stable, curve),

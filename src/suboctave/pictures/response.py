@@ -18,7 +18,7 @@ from suboctave.pictures import style
 from suboctave.pictures.legend import ordered, place_legend
 from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
 from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import Stroke, strokes, without_repeats
+from suboctave.pictures.strokes import Stroke, bent, strokes, without_repeats
 from suboctave.pictures.view import View
 from suboctave.store.layout import check_layout, coordinate
 
@@ -141,7 +141,8 @@ def draw_response(
         pieces = without_repeats(
             strokes(group[index], horizontal, shown.variable), earlier.setdefault(styles[index], []), spread
         )
-        legend |= _draw_line(axes, pieces, shown.factors(horizontal), styles[index], look, name, periods)
+        drawn = [Stroke(*bent(piece.x, piece.y, spread), piece.stable) for piece in pieces]
+        legend |= _draw_line(axes, drawn, shown.factors(horizontal), styles[index], look, name, periods)
     for index in order:  # markers after all lines: none is crossed out by another curve
         edge = styles[index].colour if several or periods else style.INK
         legend |= _draw_events(axes, group[index], shown, horizontal, edge, look, several)

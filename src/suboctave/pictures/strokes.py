@@ -6,6 +6,7 @@ an event, not at the computed point nearest to it, so that a dash begins at the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,7 +19,7 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Line", "Stroke", "line", "repeated", "strokes", "without_repeats"]
+__all__ = ["Line", "Stroke", "bent", "line", "repeated", "strokes", "without_repeats"]
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,46 @@ def without_repeats(pieces: Sequence[Stroke], earlier: list[np.ndarray], spread:
         cuts = np.flatnonzero(np.diff(np.concatenate([[False], fresh, [False]])))
         kept += [Stroke(piece.x[a : b + 1], piece.y[a : b + 1], False) for a, b in cuts.reshape(-1, 2)]
     return kept
+
+
+#: angle between two pieces that is a corner; in units of the frame, nearest vertices that are two, and length of the
+#: pieces that are drawn
+_CORNER, _SAME, _PIECE = 0.8, 1e-5, 5e-3
+
+
+def bent(x: np.ndarray, y: np.ndarray, spread: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """A line through vertices as it is drawn: through all of them, and smooth but for its corners (modified Akima).
+
+    `spread`: width and height of the frame, in the units of x and y.
+    """
+    from scipy.interpolate import Akima1DInterpolator
+
+    path = np.column_stack([x / spread[0], y / spread[1]])
+    if len(path) < 3 or not np.isfinite(path).all():
+        return x, y
+    way = np.hypot(*np.diff(path, axis=0).T)
+    # one of those that lie upon each other, the last of all among them
+    kept = np.append(way > _SAME, True)
+    kept[0] = kept[0] or not np.any(kept[:-1])
+    path, vertices = path[kept], np.flatnonzero(kept)
+    steps = np.diff(path, axis=0)
+    heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    corners = np.flatnonzero(np.abs(np.diff(heading)) > _CORNER) + 1
+    found = [path[:1]]
+    for first, last in pairwise([0, *corners, len(path) - 1]):
+        own = path[first : last + 1]
+        if len(own) < 3:
+            found.append(own[1:])
+            continue
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(own, axis=0).T))])
+        shares = [np.linspace(a, b, 1 + math.ceil((b - a) / _PIECE))[1:] for a, b in pairwise(along)]
+        drawn = Akima1DInterpolator(along, own, method="makima")(np.concatenate(shares))
+        # the vertices themselves, without rounding
+        drawn[np.cumsum([len(share) for share in shares]) - 1] = own[1:]
+        found.append(drawn)
+    whole = np.concatenate(found) * spread
+    whole[0], whole[-1] = (x[vertices[0]], y[vertices[0]]), (x[-1], y[-1])
+    return whole[:, 0], whole[:, 1]
 
 
 def repeated(whole: Line) -> np.ndarray:
