@@ -154,3 +154,59 @@ def test_limit_points_end_where_their_motions_become_symmetric():
     for orbit in (limit_points.orbits[0], limit_points.orbits[-1]):
         apart = np.hypot(found.omega - orbit.omega, found.parameter("F") - orbit.values["F"])
         assert apart.min() < 0.2
+
+
+def test_a_system_that_is_symmetric_at_one_value_only_does_not_end_a_curve():
+    """Stops at g**2 and g - 1 are mirror images at g = 0.618, where the limit points' motions are nearly symmetric."""
+    stops = [
+        so.ElasticStop(0, 4.7, "g**2", side="right", regularization=300.0),
+        so.ElasticStop(0, 4.7, "-1 + g", side="left", regularization=300.0),
+    ]
+    system = so.System(1.0, 0.03, 1.0, stops, [so.HarmonicLoad(0, 0.55)], {"g": 0.2})
+    limit_point = so.frequency_response(system, (0.8, 5.0)).bifurcations["LP"][0]
+    curve = so.track(limit_point, "g", (0.0, 0.9), omega=(0.2, 8.0), max_step=0.1)
+    assert "symmetric" not in curve.ended
+    ends = sorted((curve.omega[i], curve.parameter("g")[i]) for i in (0, -1))
+    assert ends == [pytest.approx((0.717156, 0.0), abs=1e-6), pytest.approx((0.798715, 0.0), abs=1e-6)]
+
+
+def test_behind_a_corner_no_other_part_of_the_curve_is_taken():
+    """The only solution at a given height of the grazing lay far from it, on a part that led back to the start."""
+    stops = [
+        so.ElasticStop(0, 3.0, -0.2, side="right"),
+        so.ElasticStop(0, 6.0, -1.04, side="left"),
+    ]
+    system = so.System(1.0, 0.04, 1.0, stops, [so.HarmonicLoad(0, "F")], {"F": 0.8})
+    limit_point = so.frequency_response(system, (0.5, 5.0)).bifurcations["LP"][0]
+    curve = so.track(limit_point, "F", (0.2, 3.0), omega=(0.2, 8.0))
+    cusps = [(e.omega, e.parameter("F")) for e in curve.bifurcations if e.kind == "CP"]
+    for one in range(len(cusps)):
+        for other in range(one):
+            assert np.hypot(*(np.array(cusps[one]) - cusps[other])) > 1e-6
+    start, end = ((curve.omega[i], curve.parameter("F")[i]) for i in (0, -1))
+    assert np.hypot(start[0] - end[0], start[1] - end[1]) > 1e-3
+
+
+def test_an_event_that_is_not_found_again_does_not_end_a_curve():
+    system = so.System(
+        1.0, 0.05, 1.0, [so.ElasticStop(0, 6.0, "g", side="right")], [so.HarmonicLoad(0, 0.6)], {"g": 0.5}
+    )
+    doubling = so.frequency_response(system, (0.4, 5.0)).bifurcations["PD"][0]
+    curve = so.track(doubling, "g", (0.0, 1.0), omega=(0.2, 8.0))
+    assert len(curve) > 20
+    assert any("not found again" in note for note in curve.warnings)
+
+
+def test_a_bound_just_inside_a_turn_ends_a_curve_from_either_side():
+    """Each cusp once, and none beyond the bound."""
+    spring = so.PolynomialSpring(0, {2: 0.8, 3: 0.5})
+    system = so.System(1.0, 0.03, 1.0, [spring], [so.HarmonicLoad(0, "F")], {"F": 0.4})
+    for limit_point in so.frequency_response(system, (0.3, 3.0)).bifurcations["LP"][:2]:
+        whole = so.track(limit_point, "F", (0.01, 1.0))
+        assert whole.closed
+        low = min(e.parameter("F") for e in whole.bifurcations["CP"])
+        inside = so.track(limit_point, "F", (low + 1e-5, 1.0))
+        assert not inside.closed
+        assert inside.ended.startswith("reached the end of the range")
+        assert inside.parameter("F").min() == low + 1e-5
+        assert len(inside.bifurcations["CP"]) == 1

@@ -366,3 +366,14 @@ def test_going_round_and_round_without_passing_the_start():
     assert "without having passed its start" in engine.ended
     assert np.abs(u[-1]).max() <= 1.001
     assert len(points) < 1100
+
+
+@pytest.mark.parametrize("max_step", [0.05, 0.2, 0.3])
+@pytest.mark.parametrize("start", [0.5, 0.55, 0.6, 0.7])
+def test_a_bound_that_is_passed_and_passed_back_within_a_step(max_step, start):
+    """A circle reaches 1: 2e-4 beyond the bound, on an arc of 0.04."""
+    engine, _, u = march(circle(), math.sqrt(1.0 - start**2), start, 1.0, (-2.0, 1.0 - 2e-4), max_step=max_step)
+    assert not engine.closed
+    assert u[-1, 1] == 1.0 - 2e-4
+    assert u[-1, 0] == pytest.approx(math.sqrt(1.0 - (1.0 - 2e-4) ** 2), abs=1e-9)
+    assert u[:, 1].max() == 1.0 - 2e-4

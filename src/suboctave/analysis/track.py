@@ -266,9 +266,8 @@ def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) ->
     if forward is not None and (forward.closed or forward.interrupted or not ways[1]):
         return forward
     back = follow_tracked(turned, box, settings)
-    if forward is not None:
-        return back.reversed_before(forward)
-    return back
+    # closed the other way it is the whole curve, wherever this way came to an end
+    return back if forward is None or back.closed else back.reversed_before(forward)
 
 
 def _leads_inside(point: CurvePoint, box: Box) -> bool:

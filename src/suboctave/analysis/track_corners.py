@@ -30,7 +30,7 @@ _GRAZES = 1e-3
 _CLEAR = 1e-6
 #: ways in height at which the far side is looked for, the nearest first (what happens before the point found is not
 #: seen), and how far it may lie then, in scaled arclength
-_HEIGHTS, _NEAR = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 0.05
+_HEIGHTS, _NEAR = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 5e-3
 
 
 def beyond_corner(

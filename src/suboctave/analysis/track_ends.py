@@ -52,8 +52,9 @@ _RESONANT = 2e-3
 _DOUBTFUL = 0.05
 #: share of a perturbation with waves of the other parity that is none
 _NO_PARITY = 1e-6
-#: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system
-_UNSYMMETRIC = 0.1
+#: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system; share
+#: of a parameter's range after which it is asked again whether they stay by themselves
+_UNSYMMETRIC, _ASIDE = 0.1, 0.02
 #: unfolding, in units of the forces that balance, above which there is no branch point
 _UNFOLDING = 1e-8
 
@@ -100,8 +101,8 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             return _in_the_parent(parent)
     elif _standing(a, b):
         parent = _on_the_parent(a, newton)
-        if parent is not None and _apart(parent.sample.point, b.point) <= _REACHED:
-            return _in_the_parent(parent)
+        if parent is not None:
+            return _in_the_parent(parent) if _apart(parent.sample.point, b.point) <= 10.0 * _REACHED else None
         return End(
             f"the curve ends on the period doublings of the parent motion beside {b.curve.where(b.point.u)}: the "
             "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
@@ -175,6 +176,16 @@ def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
     # square
     if symmetric.residual_size() > _UNSYMMETRIC * before * symmetric.force_scale():
         return None
+    # a system may be symmetric at one value of a parameter that the curve passes
+    for name, width in zip(a.curve.names, a.curve.spans, strict=True):
+        if name != "omega":
+            values = {**state.values, name: state.values[name] + _ASIDE * width}
+            aside = state.balance.at(x, state.omega, values)
+            even = np.vstack(
+                (aside.residual.reshape(x.shape)[:1], *(aside.residual.reshape(x.shape)[i::4] for i in (3, 4)))
+            )
+            if float(np.abs(even).max()) > _NO_PARITY * aside.force_scale():
+                return None
     return End(
         f"the motions become symmetric at {b.curve.where(b.point.u)}, x(t + T/2) = -x(t): what follows are branch "
         "points of symmetric motions, which solve the same equations"
@@ -196,8 +207,12 @@ def _apart(one: CurvePoint, other: CurvePoint) -> float:
 def _standing(a: TrackedSample, b: TrackedSample) -> bool:
     """Whether the doubled part of limit points goes on to vanish while the parameters have come to their end."""
     units, lead = b.point.weights[-2:], _lead(a, b)
-    stands = float(np.linalg.norm(units * b.point.tangent[-2:])) <= _STANDING
-    return stands and lead is not None and float(np.linalg.norm(units * lead)) <= _REACHED
+    speed = float(np.linalg.norm(units * b.point.tangent[-2:]))
+    if lead is None or speed > _STANDING or float(np.linalg.norm(units * lead)) > _REACHED:
+        return False
+    # the same by the tangent: two points may agree by chance, to what residuals tell
+    before, size = (_doubled(sample.point) for sample in (a, b))
+    return 0.5 * speed * size * (b.point.arclength - a.point.arclength) <= _REACHED * (before - size)
 
 
 def _symmetric(b: TrackedSample) -> bool:

@@ -334,7 +334,10 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
                 f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
             if sample is found.sample and found.rough is not None:
-                sample = found.rough.zero_from(sample, found.slope)
+                try:
+                    sample = found.rough.zero_from(sample, found.slope)
+                except ConvergenceError as again:
+                    warnings.append(f"nor closer than to a share {_ROUGH:g} of the step without these ({again})")
             break
     return found if sample is found.sample else replace(found, sample=sample)
 

@@ -195,7 +195,10 @@ class March:
                     yield arrival.point
                 return
             largest = max(largest, new.curve.size(new.u))
-            end = self._bound_passed(point, new)
+            end, landed = self._bound_passed(point, new), None
+            if end is None:
+                landed = self._turned_beyond(point, new)
+                end = None if landed is None else landed.parameter
             back = None if count < 3 else home.passed(point, new)
             if back is not None:
                 self.closed, self.ended = True, "the curve closed on itself"
@@ -208,7 +211,8 @@ class March:
                 )
                 return
             if end is not None:
-                landed = new if new.parameter == end else self._land(point, new, end)
+                if landed is None:
+                    landed = new if new.parameter == end else self._land(point, new, end)
                 if landed is not None:
                     self.ended = f"reached the end of the range at {landed.curve.where(landed.u)}"
                     yield landed
@@ -369,13 +373,32 @@ class March:
             return high if here > high else low
         return None
 
-    def _land(self, point: CurvePoint, new: CurvePoint, bound: float) -> CurvePoint | None:
-        """The point on the bound between two neighbours."""
+    def _turned_beyond(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """The point on the bound, if the curve passes it within a step and comes back; by its cubic interpolation."""
+        index, step = point.curve.parameter, new.arclength - point.arclength
+        start, last = point.tangent[index] * step, new.tangent[new.curve.parameter] * step
+        way = new.parameter - point.parameter
+        if start * last >= 0.0:
+            return None
+        # the slope is start + 2 half s + curve s^2
+        half, curve = 3.0 * way - 2.0 * start - last, 3.0 * (start + last - 2.0 * way)
+        share = -start / (half - math.copysign(math.sqrt(max(half * half - start * curve, 0.0)), start))
+        top = point.parameter + share * (start + share * (half + share * curve / 3.0))
+        low, high = self.bounds
+        slack = 1e-9 * (high - low)
+        if low - slack <= top <= high + slack or not 0.0 < share < 1.0:
+            return None
+        found = self._land(point, new, high if top > high else low, share)
+        return found if found is not None and found.arclength <= new.arclength else None
+
+    def _land(self, point: CurvePoint, new: CurvePoint, bound: float, share: float = 1.0) -> CurvePoint | None:
+        """The point on the bound between two neighbours; share: where on the way it has been passed."""
         index = point.curve.parameter
-        low, high = 0.0, 1.0
+        low, high = 0.0, share
+        side = between(point, new, high)[index] - bound
         for _ in range(_HALVED):
             middle = 0.5 * (low + high)
-            beyond = (between(point, new, middle)[index] - bound) * (new.parameter - bound) > 0.0
+            beyond = (between(point, new, middle)[index] - bound) * side > 0.0
             low, high = (low, middle) if beyond else (middle, high)
         guess = between(point, new, high)
         guess[index] = bound
@@ -387,5 +410,5 @@ class March:
             return None
         u = solved.u
         u[index] = bound
-        arclength = point.arclength + length(new.weights * (u - point.u))
+        arclength = point.arclength + length(new.weights * (u - new.curve.transfer(point.u, point.curve)))
         return make_point(solved, new.curve, new.tangent, arclength)
