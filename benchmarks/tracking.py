@@ -7,6 +7,7 @@ the processor, so that a busy machine matters less: the least and the median of 
 eigenvalues of a 62 x 62 matrix timed in between. On a machine on which these take 478 us, 0.5 ms per point is a ratio
 of 1.05 and 1.5 ms one of 3.14.
 
+The median point: what half of a curve's points cost at most, each with the events behind it, the least of REPEATS runs.
 A last run of each case counts the evaluations of the augmented equations and of their Jacobian.
 
     python benchmarks/tracking.py [repeats]
@@ -27,7 +28,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.analysis import tracked_events, tracked_hidden, tracked_newton
+from suboctave.analysis import track_follow, tracked_events, tracked_hidden, tracked_newton
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.analysis.tracked_iteration import FACTORISED, LOOKS
@@ -63,6 +64,24 @@ def seconds(work: Callable[[], object]) -> float:
     start = time.process_time()
     work()
     return time.process_time() - start
+
+
+def between_points(work: Callable[[], object], repeats: int) -> Any:
+    """Seconds from each point of a curve to the next, (points - 1,): the least of several runs."""
+    own, stamps, runs = track_follow._Tracker._accept, [], []
+
+    def accept(self: Any, point: Any) -> Any:
+        try:
+            return own(self, point)
+        finally:
+            stamps.append(time.process_time())
+
+    with patch.object(track_follow._Tracker, "_accept", accept):
+        for _ in range(repeats):
+            stamps.clear()
+            work()
+            runs.append(np.diff(stamps))
+    return np.min(runs, axis=0)
 
 
 def counted(work: Callable[[], object]) -> Counter[str]:
@@ -115,7 +134,7 @@ def main(repeats: int) -> None:
     print(f"{repeats} repeats, one thread, warm; eigvals 62: least {1e6 * least:.0f} us, median {1e6 * middle:.0f} us")
     print("a point in ms and in units of the eigenvalues, of least and of median times\n")
     head = ("points", "events", "all, least    ", "all, median   ", "points, least ", "points, median")
-    head = (*head, "evaluations/point", "Jacobians/point")
+    head = (*head, "median point", "evaluations/point", "Jacobians/point")
     print("| " + f"{'curve':<19}" + " | " + " | ".join(head) + " |")
     print("|" + "-" * 21 + "|" + "".join("-" * (len(title) + 1) + ":|" for title in head))
     for name, curve in curves.items():
@@ -124,6 +143,8 @@ def main(repeats: int) -> None:
         for taken in (times, alone):
             for value, by in ((min(taken[name]), least), (float(np.median(taken[name])), middle)):
                 row.append(f"{1e3 * value / n:.2f} ms = {value / n / by:.2f}")
+        typical = float(np.median(between_points(work[name], repeats)))
+        row.append(f"{1e3 * typical:.2f} ms")
         row += [f"{counts[kind] / n:.1f}" for kind in ("evaluations", "jacobians")]
         cells = [text.rjust(len(title)) for text, title in zip(row, head, strict=True)]
         print("| " + f"{name:<19}" + " | " + " | ".join(cells) + " |")
