@@ -94,22 +94,19 @@ def corrected(
         If the iterations do not contract or run out.
     """
     along = curve.balance.laws_along(curve.names[1])
-    return None if along is None else _Solve(curve, guess, row, weights, options, spare, known).run(along)
+    if along is None:
+        return None
+    limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
+    return _Solve(curve, (guess, row, weights), limits, known).run(along)
 
 
 class _Solve:
     """One solution: what the kernels want, and their results."""
 
     def __init__(
-        self,
-        curve: TrackedCurve,
-        guess: Array,
-        row: Array,
-        weights: Array,
-        options: NewtonOptions,
-        spare: float,
-        known: Factor | None,
+        self, curve: TrackedCurve, place: tuple[Array, Array, Array], limits: Array, known: Factor | None
     ) -> None:
+        guess = place[0]
         balance, own = curve.balance, curve.augmentation
         assert isinstance(own, SingularOperator)
         assert isinstance(balance.linear, StructuralMatrices)
@@ -134,9 +131,8 @@ class _Solve:
         self.gx, self.rates = np.empty((2 * high + 1, size)), np.empty(3)
         self.scale, self.nodes = balance.row_weights(m), balance.packed_laws(balance.values)[1]
         frequencies = basis.multiples if mean else basis.half_multiples
-        limits = np.array((options.tolerance, options.correction, options.iterations, spare, curve.floor))
         # the arguments of the kernels, in their order
-        self.same = self.u, guess, row, weights
+        self.same = self.u, *place
         self.factors = self.memo, self.lu, self.pivots, self.tangent
         self.limits, self.lines = limits, (borders.left, borders.right)
         self.units = own.unit, curve.force, mean, frequencies, basis.nu, balance.moving
