@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from suboctave.analysis.response import ResponseCurve
-from suboctave.continuation.march import March, SteppingOptions
+from suboctave.continuation.march import March
 from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.point import CurvePoint, make_point, solve_at
 from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.continuation.stepping import SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.orbit import PeriodicOrbit

@@ -78,6 +78,8 @@ def track(
         Largest distance between neighbours in scaled arclength: each parameter in units of its range (omega without a
         range in units of its value at the start), the motion in units of its own size.
 
+    stepping
+        As in `frequency_response`; default: `SteppingOptions(angle=0.15, growth=4)`.
     formulation
         As in `frequency_response`: with "extended" the null vector is among the unknowns, with "alcorta2019" period
         doublings are those of the published system.

@@ -181,10 +181,7 @@ def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
         if name != "omega":
             values = {**state.values, name: state.values[name] + _ASIDE * width}
             aside = state.balance.at(x, state.omega, values)
-            even = np.vstack(
-                (aside.residual.reshape(x.shape)[:1], *(aside.residual.reshape(x.shape)[i::4] for i in (3, 4)))
-            )
-            if float(np.abs(even).max()) > _NO_PARITY * aside.force_scale():
+            if np.abs(_even(aside.residual.reshape(x.shape))).max() > _NO_PARITY * aside.force_scale():
                 return None
     return End(
         f"the motions become symmetric at {b.curve.where(b.point.u)}, x(t + T/2) = -x(t): what follows are branch "
@@ -195,8 +192,12 @@ def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
 def _unsymmetric_share(state: BalanceState) -> float:
     """Share of mean and even harmonics in a motion."""
     x = state.x * state.balance.scales()[0]
-    even = math.sqrt(float((x[0] ** 2).sum() + (x[3::4] ** 2).sum() + (x[4::4] ** 2).sum()))
-    return even / (float(np.linalg.norm(x)) or 1.0)
+    return float(np.linalg.norm(_even(x))) / (float(np.linalg.norm(x)) or 1.0)
+
+
+def _even(x: Array) -> Array:
+    """Mean and even harmonics of coefficients (2 H + 1, n)."""
+    return np.concatenate((x[:1], x[3::4], x[4::4]))
 
 
 def _apart(one: CurvePoint, other: CurvePoint) -> float:

@@ -38,8 +38,14 @@ _LARGE = 30.0
 
 @dataclass(frozen=True)
 class Found:
-    """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns; `rough`:
-    where more harmonics are to locate it better, `slope` about the test's derivative by arclength.
+    """An event between two neighbours.
+
+    test, sample, extreme
+        Its test, where it lies, and at an extremum which way the curve turns.
+    rough, slope
+        Where more harmonics are to locate it better; about the test's derivative by arclength.
+    off
+        How far it may still lie off, in scaled arclength, where nothing could locate it better.
     """
 
     test: CurveTest
@@ -47,6 +53,7 @@ class Found:
     extreme: str = ""
     rough: _Stretch | None = None
     slope: float = 0.0
+    off: float = 0.0
 
 
 def events_between(
@@ -162,6 +169,11 @@ class _Stretch:
         self.values = {0.0: test.value(a), 1.0: test.value(b)}
         #: as in `newton.correct`: points that only lead to the zero may have the derivatives of one beside
         self.spare = 0.0
+
+    @property
+    def way(self) -> float:
+        """Its length in scaled arclength."""
+        return self.b.point.arclength - self.a.point.arclength
 
     def value(self, share: float) -> float:
         """The test's function."""
@@ -329,7 +341,7 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             test = found.test.within(near, near)
             sample = zero_along(start, test.value, newton, _BESIDE, found.slope, factor=start.factor)
         except ConvergenceError as failure:
-            warnings.append(
+            words = (
                 f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
                 f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
@@ -337,7 +349,9 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
                 try:
                     sample = found.rough.zero_from(sample, found.slope)
                 except ConvergenceError as again:
-                    warnings.append(f"nor closer than to a share {_ROUGH:g} of the step without these ({again})")
+                    words += f", nor more closely without these ({again})"
+                    found = replace(found, off=_ROUGH * found.rough.way)
+            warnings.append(words)
             break
     return found if sample is found.sample else replace(found, sample=sample)
 

@@ -17,16 +17,19 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
     """An event as users get it; `observe`: the DOF whose amplitude is reported."""
     sample = found.sample
     curve, orbit = sample.curve, sample.orbit
+    name = getattr(found.test, "name", curve.names[1])
     return TrackedEvent(
         found.test.kind,
         orbit,
         method.along(sample.state),
         orbit.residual,
         orbit.amplitude(observe),
-        getattr(found.test, "name", curve.names[1]),
+        name,
         sample.vectors,
         sample.kappa,
         arclength=sample.point.arclength,
+        # a parameter changes by no more than its range along a unit of arclength
+        uncertainty=found.off * curve.spans[curve.names.index(name)],
         curve=curve.augmentation.name,
         names=curve.names,
         extreme=found.extreme,

@@ -156,7 +156,7 @@ class _Solve:
         return self._made(packed, sampled) if ended == SOLVED else None
 
     def _laws(self, packed: PackedLaws) -> tuple[Any, ...]:
-        """Laws as the kernels want them, and arctan steps."""
+        """Directions and laws as the kernels want them, without arctan steps."""
         balance, pieces = self.curve.balance, packed.pieces if len(packed.pieces) else None
         return *balance.directions, pieces, packed.first, packed.polynomial, balance.grid, self.nodes
 

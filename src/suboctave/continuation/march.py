@@ -17,9 +17,11 @@ import numpy as np
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.place import Place
 from suboctave.continuation.point import CurvePoint, between, make_point
-from suboctave.continuation.problem import Array, Curve
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.continuation.problem import Array
+from suboctave.continuation.stepping import SteppingOptions
+from suboctave.errors import ConvergenceError
 
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
@@ -27,88 +29,8 @@ _BEHIND = 2
 _LONG = 32
 #: how often a step is halved towards the bound that it passes; Newton's method does the rest
 _HALVED = 20
-#: angle between successive tangents at which a step is refused, radians, unless the aim is large
-_SHARP = 0.75
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-5
-
-
-@dataclass(frozen=True)
-class SteppingOptions:
-    """How far the engine steps.
-
-    max_step
-        Largest distance between neighbours in scaled arclength: parameters in units of their range, the solution in
-        units of its own current size (or of 1 % of the largest met so far, if that is larger).
-    initial_step, min_step
-        First step, and the step below which the curve ends with a reason.
-    deviation
-        Aim for the distance between prediction and solution.
-    angle, growth
-        Aim for the angle between successive tangents, radians; by how much at most a curve that turns more and more is
-        expected to turn more from one step to the next.
-    max_points
-        Points after which the curve ends with a reason.
-    """
-
-    max_step: float = 0.06
-    initial_step: float = 0.01
-    min_step: float = 1e-7
-    deviation: float = 0.01
-    angle: float = 0.3
-    growth: float = 1.0
-    max_points: int = 20000
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.min_step <= self.initial_step:
-            raise InputError(
-                f"initial_step={self.initial_step:g} must be positive and not below min_step={self.min_step:g}"
-            )
-        if not self.min_step < self.max_step < math.inf:
-            raise InputError(f"max_step={self.max_step:g} must lie above min_step={self.min_step:g}")
-        if self.deviation <= 0.0 or not 0.0 < self.angle < 1.6 or self.growth < 1.0 or self.max_points < 2:
-            raise InputError(f"SteppingOptions out of range: {self}")
-
-    @property
-    def sharpest(self) -> float:
-        """Angle between successive tangents at which a step is refused, radians."""
-        return max(_SHARP, 2.5 * self.angle)
-
-
-class _Place:
-    """A point of a curve that a march may come back to."""
-
-    def __init__(self, point: CurvePoint) -> None:
-        self.point = point
-        #: values of the parameter at its images
-        self._values = [image[point.curve.parameter] for image in point.curve.images(point.u)]
-        #: its images in the discretisation of the last point
-        self._images: tuple[Curve, list[Array]] | None = None
-
-    def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
-        """It again, if the step from `point` to `new` passes it in the same direction."""
-        w, own = new.weights, self.point
-        step = kernels.distance(new.u, point.u, w)
-        here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
-        if all(abs(here - value) > reach for value in self._values):
-            return None
-        if self._images is None or self._images[0] is not new.curve:
-            self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
-        images = self._images[1]
-        heading = new.curve.transfer(own.tangent, own.curve)
-        for image, leaving in zip(images, new.curve.images(heading), strict=True):
-            from_point, to_new = w * (image - point.u), w * (new.u - image)
-            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
-                continue
-            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
-            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
-            if not (ahead and same_way):
-                continue
-            fraction = length(from_point) / (length(from_point) + length(to_new))
-            miss = length(w * (between(point, new, fraction) - image))
-            if miss < 0.05 * step + 1e-6:
-                return replace(own, arclength=point.arclength + length(from_point))
-        return None
 
 
 @dataclass(frozen=True)
@@ -165,8 +87,8 @@ class March:
         """Points in order, the start first."""
         options = self.stepping
         point = self._set_out()
-        home = _Place(self.home or point)
-        mark: _Place | None = None
+        home = Place(self.home or point)
+        mark: Place | None = None
         marked = 0
         yield point
         largest = point.curve.size(point.u)
@@ -224,7 +146,7 @@ class March:
             yield new
             count += 1
             if count >= _LONG and count & (count - 1) == 0:
-                mark, marked = _Place(new), count
+                mark, marked = Place(new), count
             taken = new.arclength - point.arclength
             bend, before = (turn / taken if taken > 0.0 else 0.0), bend
             # a curve that has begun to turn goes on to

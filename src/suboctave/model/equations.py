@@ -264,13 +264,12 @@ class _Equations:
             if not waves and static == 0:
                 continue
             listed = waves or [("0", 0, "0")]
-            amplitude, harmonic, phase = ([wave[k] for wave in listed] for k in range(3))
             loads.append(
                 HarmonicLoad(
                     dof=i,
-                    amplitude=amplitude,
-                    harmonic=harmonic,  # type: ignore[arg-type]
-                    phase=phase,
+                    amplitude=[amplitude for amplitude, _, _ in listed],
+                    harmonic=[multiple for _, multiple, _ in listed],
+                    phase=[phase for _, _, phase in listed],
                     static=as_text(static) if static != 0 else 0.0,
                 )
             )

@@ -1,0 +1,48 @@
+"""Whether a curve comes back to a point that it has passed, or to an image of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from suboctave.continuation import kernels
+from suboctave.continuation.linear import length
+from suboctave.continuation.point import CurvePoint, between
+from suboctave.continuation.problem import Array, Curve
+
+__all__ = ["Place"]
+
+
+class Place:
+    """A point of a curve that a march may come back to."""
+
+    def __init__(self, point: CurvePoint) -> None:
+        self.point = point
+        #: values of the parameter at its images
+        self._values = [image[point.curve.parameter] for image in point.curve.images(point.u)]
+        #: its images in the discretisation of the last point
+        self._images: tuple[Curve, list[Array]] | None = None
+
+    def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """It again, if the step from `point` to `new` passes it in the same direction."""
+        w, own = new.weights, self.point
+        step = kernels.distance(new.u, point.u, w)
+        here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
+        if all(abs(here - value) > reach for value in self._values):
+            return None
+        if self._images is None or self._images[0] is not new.curve:
+            self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
+        images = self._images[1]
+        heading = new.curve.transfer(own.tangent, own.curve)
+        for image, leaving in zip(images, new.curve.images(heading), strict=True):
+            from_point, to_new = w * (image - point.u), w * (new.u - image)
+            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
+                continue
+            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
+            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
+            if not (ahead and same_way):
+                continue
+            fraction = length(from_point) / (length(from_point) + length(to_new))
+            miss = length(w * (between(point, new, fraction) - image))
+            if miss < 0.05 * step + 1e-6:
+                return replace(own, arclength=point.arclength + length(from_point))
+        return None
