@@ -27,7 +27,8 @@ from suboctave.bifurcation.formulation import BORDERED, Alcorta2019, ExtendedSys
 from suboctave.bifurcation.gaps import levels
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint
-from suboctave.continuation.newton import correct
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import correct, tangent
 from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
@@ -178,10 +179,11 @@ def solved_start(
         curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
     begin = u
     origin = curve
+    along: np.ndarray | None = None
     try:
         for _ in range(8):
             weights = curve.weights(u, 0.0)
-            row = null_row(curve, u, weights)
+            row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
             if abs(row[-1]) > 1e-2:
                 row = np.eye(1, len(row), len(row) - 1)[0]
             solved = correct(curve, u, row, weights, settings.newton)
@@ -189,6 +191,7 @@ def solved_start(
             same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
             if same:
                 break
+            along = adapted.transfer(tangent(solved), curve)
             u, curve = adapted.transfer(solved.u, curve), adapted
         moved = weights * (solved.u - curve.transfer(begin, origin))
         if float(np.linalg.norm(moved)) > _NEAR:

@@ -44,6 +44,8 @@ _AT_ZERO, _SECANT = 1e-10, 1e-6
 #: way along the tangent that leads no further off the curve than rounding, and its product with the secant's length
 #: from which on what the secant leaves is less than that
 _STRAIGHT, _SURE = 1e-7, 1e-13
+#: inverse of the component along the last parameter up to which a curve's direction is found at the first attempt
+_STEEP = 100.0
 #: shortest corrections towards a curve before a point of it is solved for
 _SHORTEST = 6
 
@@ -265,8 +267,11 @@ def null_row(curve: TrackedCurve, u: np.ndarray, weights: np.ndarray) -> np.ndar
         found = factor.solve(last) if not factor.singular else None
         if found is None or not np.isfinite(found).all():
             break
-        # from the second time on the row is the direction itself, so that the matrix is as regular as can be
-        row = found / length(found)
+        size = length(found)
+        row = found / size
+        if size < _STEEP:
+            return row
+        # the second time the row is the direction itself, so that the matrix is as regular as can be
     else:
         return row
     result: np.ndarray = np.linalg.qr(jacobian.T, mode="complete")[0][:, -1]

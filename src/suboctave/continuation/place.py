@@ -31,12 +31,11 @@ class Place:
             return None
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
-        images = self._images[1]
-        heading = new.curve.transfer(own.tangent, own.curve)
-        for image, leaving in zip(images, new.curve.images(heading), strict=True):
-            from_point, to_new = w * (image - point.u), w * (new.u - image)
-            if length(from_point) > 1.5 * step or length(to_new) > 1.5 * step:
+        for i, image in enumerate(self._images[1]):
+            if max(kernels.distance(image, point.u, w), kernels.distance(new.u, image, w)) > 1.5 * step:
                 continue
+            from_point, to_new = w * (image - point.u), w * (new.u - image)
+            leaving = new.curve.images(new.curve.transfer(own.tangent, own.curve))[i]
             ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
             same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
             if not (ahead and same_way):
