@@ -26,7 +26,7 @@ from suboctave.continuation.point import between, make_point
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
-_JUMP = 1e-4
+_JUMP = 2e-6
 #: how often a step is halved towards the bound that it passes
 _HALVED = 20
 #: corners after which no further one is passed

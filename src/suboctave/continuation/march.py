@@ -16,10 +16,10 @@ import numpy as np
 
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
-from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.place import Place
 from suboctave.continuation.point import CurvePoint, between, make_point
-from suboctave.continuation.problem import Array
+from suboctave.continuation.problem import Array, Curve
 from suboctave.continuation.stepping import SteppingOptions
 from suboctave.errors import ConvergenceError
 
@@ -29,6 +29,12 @@ _BEHIND = 2
 _LONG = 32
 #: how often a step is halved towards the bound that it passes; Newton's method does the rest
 _HALVED = 20
+#: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; how many times as far it
+#: may lie from the corner without further question
+_BEYOND, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 100.0
+#: steps below which points are solved for more closely, the share of the tolerance that is left then and its least, and
+#: the share of the step that a point may lie off where rounding leaves more
+_CLOSELY, _SHARE, _LEAST, _LEFT = 1e-4, 1e-3, 1e-13, 1e-2
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-5
 
@@ -82,6 +88,7 @@ class March:
         self.closed = False
         self.ended = "not started"
         self._direction = direction
+        self._close = replace(newton, tolerance=min(newton.tolerance, max(_SHARE * newton.tolerance, _LEAST)))
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Points in order, the start first."""
@@ -193,7 +200,7 @@ class March:
         while True:
             try:
                 guess, row, bound = self._predicted(point, points[:order], tangents[:order], step)
-                solved = correct(curve, guess, row, point.weights, self.newton, spare=_SPARED * step)
+                solved = self._solved(curve, guess, row, point.weights, step)
                 if bound is not None:
                     solved.u[curve.parameter] = bound
                 taken = kernels.distance(solved.u, point.u, point.weights)
@@ -215,6 +222,21 @@ class March:
             # what lies behind may not tell what comes
             order = max(1, order - 1)
             step = max(0.5 * step, self.stepping.min_step)
+
+    def _solved(self, curve: Curve, guess: Array, row: Array, weights: Array, step: float) -> Solved:
+        """The point beside a prediction; of a short step more closely: what the tolerance leaves open may be as long as
+        the step, or as a sharp turn is wide.
+        """
+        if step < _CLOSELY:
+            try:
+                return correct(curve, guess, row, weights, self._close, spare=_SPARED * step)
+            except ConvergenceError:
+                # by rounding perhaps
+                solved = correct(curve, guess, row, weights, self.newton)
+                if solved.factor.singular or length(solved.factor.solve(_missing(solved))) > _LEFT * step:
+                    raise
+                return solved
+        return correct(curve, guess, row, weights, self.newton, spare=_SPARED * step)
 
     def _predicted(
         self, point: CurvePoint, points: Array, tangents: Array, step: float
@@ -246,7 +268,8 @@ class March:
         heading = math.copysign(1.0, point.tangent[index])
         row = np.zeros(len(point.u))
         row[index] = 1.0
-        for share in (1e-6, 1e-5, 1e-4, 1e-3):
+        nearer: CurvePoint | None = None
+        for share in _BEYOND:
             guess = point.u.copy()
             guess[index] += heading * share / point.weights[index]
             try:
@@ -255,9 +278,13 @@ class March:
             except ConvergenceError:
                 continue
             taken = length(point.weights * (solved.u - point.u))
-            if taken <= min(100.0 * share, self.stepping.max_step):
-                beyond = replace(new, arclength=point.arclength + taken)
+            beyond = replace(new, arclength=point.arclength + taken)
+            if taken <= min(_CLOSE * share, self.stepping.max_step):
                 return beyond, self.stepping.initial_step, 0.0, self._angle(point, beyond)
+            # a steep curve goes far, but comes from the corner: half as far at least for a tenth of the share
+            before, nearer = nearer, beyond
+            if before is not None and 2.0 * (before.arclength - point.arclength) < taken <= self.stepping.max_step:
+                return before, self.stepping.initial_step, 0.0, self._angle(point, before)
         raise failure
 
     @staticmethod
@@ -334,3 +361,8 @@ class March:
         u[index] = bound
         arclength = point.arclength + length(new.weights * (u - new.curve.transfer(point.u, point.curve)))
         return make_point(solved, new.curve, new.tangent, arclength)
+
+
+def _missing(solved: Solved) -> Array:
+    """What is left of the equations at a solved point, and nothing of its row."""
+    return np.append(solved.evaluation.residual, 0.0)

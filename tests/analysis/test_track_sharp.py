@@ -1,0 +1,95 @@
+"""Curves of period doublings of little damping: tongues with tips as sharp as steps are short, and the corner at a
+closed gap, behind which they go steeply on."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import suboctave as so
+
+STEPS = [{}, {"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003}, {"initial_step": 0.02}, {"angle": 0.3}]
+
+
+def rattling(damping: float, **values: float) -> so.System:
+    elements = [
+        so.ElasticStop(dof=0, stiffness=1.5, gap="g", side="right", regularization=60.0),
+        so.CubicSpring(dof=0, coefficient=0.2),
+    ]
+    return so.System(
+        mass=1.0,
+        damping=damping,
+        stiffness=1.0,
+        elements=elements,
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"g": 0.1, "F": 0.02, **values},
+    )
+
+
+def tracked(item: so.Bifurcation, name: str, bounds: tuple[float, float], **stepping: float) -> Any:
+    options = {"angle": 0.15, "growth": 4.0, **stepping}
+    return so.track(item, name, bounds, omega=(1.2, 5.0), stepping=so.SteppingOptions(**options))
+
+
+def doublings(system: so.System) -> list[so.Bifurcation]:
+    return list(so.frequency_response(system, (1.4, 3.2)).bifurcations["PD"])
+
+
+def events(curve: Any) -> list[tuple[str, str, float, float]]:
+    found = [(e.kind, getattr(e, "extreme", ""), e.omega, e.parameter(curve.names[1])) for e in curve.bifurcations]
+    return sorted(found, key=lambda item: item[2:])
+
+
+@pytest.mark.parametrize("stepping", STEPS, ids=str)
+@pytest.mark.parametrize("which", [0, 1])
+def test_tongue_over_the_gap_closes_once_round(which, stepping):
+    # its two sides pass g = 0, where the law's derivative by g jumps, at 22 g and -3 g; its tips turn within 1e-4
+    curve = tracked(doublings(rattling(2e-3))[which], "g", (-0.2, 0.6), **stepping)
+    assert curve.closed, curve.ended
+    found = events(curve)
+    assert [kind for kind, *_ in found].count("GPD") == 4
+    assert [extreme for kind, extreme, *_ in found if kind == "extremum"] == [
+        "minimum",
+        "maximum",
+        "minimum",
+        "maximum",
+    ]
+    assert len(found) == 8
+    places = np.array([item[2:] for item in found])
+    expected = [
+        (2.07183325, 0.10798446),
+        (2.07183391, 0.10800188),
+        (2.07188654, 0.10806718),
+        (2.54313954, 0.00682218),
+        (2.57484537, 0.00121778),
+        (3.07764918, -0.14869604),
+        (3.07769492, -0.14862041),
+        (3.07769496, -0.14862488),
+    ]
+    np.testing.assert_allclose(places, expected, atol=1e-7)
+
+
+@pytest.mark.parametrize("gap", [1e-5, 0.0, -1e-5, -1e-3])
+def test_both_sides_of_a_closed_gap_are_those_of_response_curves(gap):
+    curve = tracked(doublings(rattling(2e-3))[0], "g", (-0.2, 0.6))
+    at = curve.parameter("g")
+    crossed = np.flatnonzero((at[:-1] - gap) * (at[1:] - gap) <= 0.0)
+    between = [np.sort(curve.omega[[i, i + 1]]) for i in crossed]
+    for item in doublings(rattling(2e-3, g=gap)):
+        assert any(low - 1e-6 <= item.omega <= high + 1e-6 for low, high in between)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("stepping", STEPS, ids=str)
+def test_tip_of_a_tongue_over_the_load_has_one_extremum(which, stepping):
+    # its width is 4e-5 of omega, its radius in scaled arclength 1e-6: a step may lead from one side to the other
+    curve = tracked(doublings(rattling(1e-3))[which], "F", (0.006, 0.08), **stepping)
+    turns = [e for e in curve.bifurcations if e.kind == "extremum"]
+    assert len(turns) <= 1
+    if "step size fell" in curve.ended:
+        return
+    assert [e.kind for e in curve.bifurcations].count("GPD") == 1
+    assert turns[0].parameter_name == "F"
+    assert turns[0].extreme == "minimum"
+    assert abs(turns[0].omega - 2.0773824) < 2e-6
+    assert abs(turns[0].parameter("F") - 0.00867985) < 1e-8
