@@ -93,3 +93,22 @@ def test_tip_of_a_tongue_over_the_load_has_one_extremum(which, stepping):
     assert turns[0].extreme == "minimum"
     assert abs(turns[0].omega - 2.0773824) < 2e-6
     assert abs(turns[0].parameter("F") - 0.00867985) < 1e-8
+
+
+@pytest.mark.parametrize("max_step", [None, 0.15])
+@pytest.mark.parametrize("inside", [1e-3, 1e-6])
+def test_range_of_omega_that_ends_just_inside_a_turn_ends_the_curve(inside, max_step):
+    # the tongue's least and greatest omega: a step may pass the bound and come back
+    item = doublings(rattling(0.02, F=0.24))[0]
+    whole = so.track(item, "g", (-0.5, 1.0), omega=(1.2, 5.0), max_step=max_step)
+    assert whole.closed
+    turns = [e.omega for e in whole.extrema if e.parameter_name == "omega"]
+    for bounds in ((1.2, max(turns) - inside), (min(turns) + inside, 5.0)):
+        part = so.track(item, "g", (-0.5, 1.0), omega=bounds, max_step=max_step)
+        assert not part.closed
+        bound = next(b for b in bounds if b not in (1.2, 5.0))
+        assert part.omega[0] == bound
+        assert part.omega[-1] == bound
+        assert bounds[0] <= part.omega.min()
+        assert part.omega.max() <= bounds[1]
+        assert sum(e.parameter_name == "omega" for e in part.extrema) == 1

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_corners import beyond_corner
 from suboctave.analysis.track_ends import End, end_ahead, end_between, keeps_subharmonics, rebased
@@ -21,14 +19,14 @@ from suboctave.analysis.tracked_sample import TrackedSample
 from suboctave.analysis.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
+from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.newton import correct
-from suboctave.continuation.point import between, make_point
+from suboctave.continuation.point import make_point
+from suboctave.continuation.problem import Curve
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 2e-6
-#: how often a step is halved towards the bound that it passes
-_HALVED = 20
 #: corners after which no further one is passed
 _CORNERS = 5
 #: way before a corner, in scaled arclength, on which what turns there is not told from it
@@ -71,6 +69,7 @@ class _Tracker:
         assert isinstance(start.curve, TrackedCurve)
         self.settings = settings
         self.box = box
+        self.first = _first_bounds(box)
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
         self.trace = TrackedTrace()
@@ -186,11 +185,11 @@ class _Tracker:
         if end is not None:
             self._take_end(a, end)
             return end.reason
-        outside = not self._inside(new)
-        landed = self._landed(a, new) if outside else new
-        if landed is None:
-            return f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
-        new = self._smooth(a, landed)
+        try:
+            left = self._left(a, new)
+        except ConvergenceError as failure:
+            return str(failure)
+        new = self._smooth(a, left or new)
         warnings = self.trace.warnings
         found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
         self._take(found + events_between(a, new, self.tests, settings.newton, warnings))
@@ -199,7 +198,7 @@ class _Tracker:
         if settings.report is not None:
             low, high = self.box.second
             settings.report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
-        if outside:
+        if left is not None:
             return f"reached the end of the range at {new.curve.where(new.point.u)}"
         ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
         if ahead is None:
@@ -282,33 +281,39 @@ class _Tracker:
         return TrackedSample(replace(point, tangent=kernels.normalised(chord, point.weights)))
 
     def _inside(self, sample: TrackedSample) -> bool:
-        if self.box.first is None:
-            return True
-        low, high = self.box.first
-        return low <= float(sample.point.u[sample.curve.index(sample.curve.names[0])]) <= high
+        """Whether a point lies in the range of the first parameter."""
+        box = self.box.first
+        return box is None or box[0] <= float(sample.point.u[sample.curve.index(sample.curve.names[0])]) <= box[1]
 
-    def _landed(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
-        """The point at which the curve leaves the range of its first parameter between two neighbours."""
-        assert self.box.first is not None
-        index = b.curve.index(b.curve.names[0])
-        low, high = self.box.first
-        bound = low if b.point.u[index] < low else high
-        left, right = 0.0, 1.0
-        for _ in range(_HALVED):
-            middle = 0.5 * (left + right)
-            beyond = (between(a.point, b.point, middle)[index] - bound) * (b.point.u[index] - bound) > 0.0
-            left, right = (left, middle) if beyond else (middle, right)
-        guess = between(a.point, b.point, right)
-        guess[index] = bound
-        row = np.zeros(len(guess))
-        row[index] = 1.0
-        try:
-            solved = correct(b.curve, guess, row, b.point.weights, self.settings.newton)
-        except ConvergenceError:
+    def _left(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
+        """The point between two neighbours at which the curve leaves the range of its first parameter, None if it stays
+        in it; raises ConvergenceError where it leaves but no solution is found on the bound.
+        """
+        if self.first is None:
             return None
-        solved.u[index] = bound
-        arclength = a.point.arclength + right * (b.point.arclength - a.point.arclength)
-        return TrackedSample(make_point(solved, b.curve, b.point.tangent, arclength))
+        newton = self.settings.newton
+        bound = self.first.passed(a.point, b.point)
+        if bound is None:
+            found = self.first.turned_beyond(a.point, b.point, newton)
+            return None if found is None else TrackedSample(found)
+        if self.first.value(b.point) == bound:
+            return b
+        found = self.first.land(a.point, b.point, bound, newton)
+        if found is None:
+            raise ConvergenceError(
+                f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
+            )
+        return TrackedSample(found)
+
+
+def _first_bounds(box: Box) -> Bounds | None:
+    """The range of the first parameter."""
+
+    def index(curve: Curve) -> int:
+        assert isinstance(curve, TrackedCurve)
+        return curve.index(curve.names[0])
+
+    return None if box.first is None else Bounds(index, *box.first)
 
 
 def _drop_seam(events: list[TrackedEvent]) -> None:

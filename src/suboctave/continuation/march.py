@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation import kernels
+from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.place import Place
-from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array, Curve
 from suboctave.continuation.stepping import SteppingOptions
 from suboctave.errors import ConvergenceError
@@ -27,7 +28,7 @@ from suboctave.errors import ConvergenceError
 _BEHIND = 2
 #: points from which on a march watches whether it goes round and round without passing its start
 _LONG = 32
-#: how often a step is halved towards the bound that it passes; Newton's method does the rest
+#: how often a prediction is halved towards the bound that it passes
 _HALVED = 20
 #: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; how many times as far it
 #: may lie from the corner without further question
@@ -88,6 +89,7 @@ class March:
         self.closed = False
         self.ended = "not started"
         self._direction = direction
+        self._range = Bounds(lambda curve: curve.parameter, *bounds)
         self._close = replace(newton, tolerance=min(newton.tolerance, max(_SHARE * newton.tolerance, _LEAST)))
 
     def __iter__(self) -> Iterator[CurvePoint]:
@@ -124,9 +126,9 @@ class March:
                     yield arrival.point
                 return
             largest = max(largest, new.curve.size(new.u))
-            end, landed = self._bound_passed(point, new), None
+            end, landed = self._range.passed(point, new), None
             if end is None:
-                landed = self._turned_beyond(point, new)
+                landed = self._range.turned_beyond(point, new, self.newton)
                 end = None if landed is None else landed.parameter
             back = None if count < 3 else home.passed(point, new)
             if back is not None:
@@ -141,7 +143,7 @@ class March:
                 return
             if end is not None:
                 if landed is None:
-                    landed = new if new.parameter == end else self._land(point, new, end)
+                    landed = new if new.parameter == end else self._range.land(point, new, end, self.newton)
                 if landed is not None:
                     self.ended = f"reached the end of the range at {landed.curve.where(landed.u)}"
                     yield landed
@@ -310,57 +312,6 @@ class March:
         # the predictor's curvature may carry a step a little beyond its length: keep the distance below the largest
         # allowed
         return min(0.98 * options.max_step, max(step, options.min_step))
-
-    def _bound_passed(self, point: CurvePoint, new: CurvePoint) -> float | None:
-        low, high = self.bounds
-        here, before = new.parameter, point.parameter
-        if here >= high and before < high:
-            return high
-        if here <= low and before > low:
-            return low
-        if not low <= here <= high:
-            return high if here > high else low
-        return None
-
-    def _turned_beyond(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
-        """The point on the bound, if the curve passes it within a step and comes back; by its cubic interpolation."""
-        index, step = point.curve.parameter, new.arclength - point.arclength
-        start, last = point.tangent[index] * step, new.tangent[new.curve.parameter] * step
-        way = new.parameter - point.parameter
-        if start * last >= 0.0:
-            return None
-        # the slope is start + 2 half s + curve s^2
-        half, curve = 3.0 * way - 2.0 * start - last, 3.0 * (start + last - 2.0 * way)
-        share = -start / (half - math.copysign(math.sqrt(max(half * half - start * curve, 0.0)), start))
-        top = point.parameter + share * (start + share * (half + share * curve / 3.0))
-        low, high = self.bounds
-        slack = 1e-9 * (high - low)
-        if low - slack <= top <= high + slack or not 0.0 < share < 1.0:
-            return None
-        found = self._land(point, new, high if top > high else low, share)
-        return found if found is not None and found.arclength <= new.arclength else None
-
-    def _land(self, point: CurvePoint, new: CurvePoint, bound: float, share: float = 1.0) -> CurvePoint | None:
-        """The point on the bound between two neighbours; share: where on the way it has been passed."""
-        index = point.curve.parameter
-        low, high = 0.0, share
-        side = between(point, new, high)[index] - bound
-        for _ in range(_HALVED):
-            middle = 0.5 * (low + high)
-            beyond = (between(point, new, middle)[index] - bound) * side > 0.0
-            low, high = (low, middle) if beyond else (middle, high)
-        guess = between(point, new, high)
-        guess[index] = bound
-        row = np.zeros(len(guess))
-        row[index] = 1.0
-        try:
-            solved = correct(new.curve, guess, row, new.weights, self.newton)
-        except ConvergenceError:
-            return None
-        u = solved.u
-        u[index] = bound
-        arclength = point.arclength + length(new.weights * (u - new.curve.transfer(point.u, point.curve)))
-        return make_point(solved, new.curve, new.tangent, arclength)
 
 
 def _missing(solved: Solved) -> Array:

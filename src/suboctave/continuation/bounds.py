@@ -1,0 +1,91 @@
+"""Where a curve leaves the range of one of its parameters: within a step, or by passing a bound and coming back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.problem import Curve
+from suboctave.errors import ConvergenceError
+
+__all__ = ["Bounds"]
+
+#: how often a step is halved towards the bound that it passes; Newton's method does the rest
+_HALVED = 20
+#: way beyond a bound, as a share of the range, that a turn on it may lie by rounding
+_ON_IT = 1e-9
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The range (low, high) of a parameter; `index`: that of the parameter among the unknowns of a curve."""
+
+    index: Callable[[Curve], int]
+    low: float
+    high: float
+
+    def value(self, point: CurvePoint) -> float:
+        """The parameter at a point."""
+        return float(point.u[self.index(point.curve)])
+
+    def passed(self, a: CurvePoint, b: CurvePoint) -> float | None:
+        """The bound on or beyond which the second of two neighbours lies and the first does not, or None."""
+        before, here = self.value(a), self.value(b)
+        if here >= self.high > before:
+            return self.high
+        if here <= self.low < before:
+            return self.low
+        if not self.low <= here <= self.high:
+            return self.high if here > self.high else self.low
+        return None
+
+    def turned_beyond(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
+        """The point on a bound that the curve passes between two neighbours and comes back through, by its cubic
+        interpolation; None if it does not.
+        """
+        step = b.arclength - a.arclength
+        start, last = a.tangent[self.index(a.curve)] * step, b.tangent[self.index(b.curve)] * step
+        before, way = self.value(a), self.value(b) - self.value(a)
+        if start * last >= 0.0:
+            return None
+        # the slope is start + 2 half s + curve s^2
+        half, curve = 3.0 * way - 2.0 * start - last, 3.0 * (start + last - 2.0 * way)
+        share = -start / (half - math.copysign(math.sqrt(max(half * half - start * curve, 0.0)), start))
+        top = before + share * (start + share * (half + share * curve / 3.0))
+        slack = _ON_IT * (self.high - self.low)
+        if self.low - slack <= top <= self.high + slack or not 0.0 < share < 1.0:
+            return None
+        found = self.land(a, b, self.high if top > self.high else self.low, newton, share)
+        return found if found is not None and found.arclength <= b.arclength else None
+
+    def land(
+        self, a: CurvePoint, b: CurvePoint, bound: float, newton: NewtonOptions, share: float = 1.0
+    ) -> CurvePoint | None:
+        """The point on a bound between two neighbours; share: where on the way it has been passed. None where Newton's
+        method finds none.
+        """
+        index = self.index(b.curve)
+        low, high = 0.0, share
+        side = between(a, b, high)[index] - bound
+        for _ in range(_HALVED):
+            middle = 0.5 * (low + high)
+            beyond = (between(a, b, middle)[index] - bound) * side > 0.0
+            low, high = (low, middle) if beyond else (middle, high)
+        guess = between(a, b, high)
+        guess[index] = bound
+        row = np.zeros(len(guess))
+        row[index] = 1.0
+        try:
+            solved = correct(b.curve, guess, row, b.weights, newton)
+        except ConvergenceError:
+            return None
+        u = solved.u
+        u[index] = bound
+        arclength = a.arclength + length(b.weights * (u - b.curve.transfer(a.u, a.curve)))
+        return make_point(solved, b.curve, b.tangent, arclength)
