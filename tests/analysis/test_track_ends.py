@@ -239,3 +239,29 @@ def test_a_curve_that_closes_the_other_way_is_whole(monkeypatch):
     assert len(calls) == 2
     assert curve.closed
     assert [e.kind for e in curve.bifurcations] == [e.kind for e in expected.bifurcations][::-1]
+
+
+@pytest.mark.parametrize("stepping", [{}, {"max_step": 0.02}, {"max_step": 0.1}, {"initial_step": 0.02}], ids=str)
+def test_nothing_turns_falsely_where_doubled_limit_points_of_little_damping_come_to_their_end(stepping):
+    # within 1e-6 of the end the parameters run as the tolerance of points would have them, were it all that is asked
+    spring = so.PolynomialSpring(0, {2: "a2", 3: 0.5})
+    system = so.System(1.0, 1e-3, 1.0, [spring], [so.HarmonicLoad(0, 0.02)], {"a2": 0.8})
+    doubling = so.frequency_response(system, (1.3, 3.0)).bifurcations["PD"][0]
+    parent = so.track(doubling, "a2", (0.0, 1.3), omega=(1.2, 4.0))
+    ends = {e.omega: e.parameter("a2") for e in parent.bifurcations if e.kind == "GPD"}
+    assert len(ends) == 3
+    doubled = so.switch_branch(doubling).bifurcations["LP"]
+    assert len(doubled) == 3
+    options = {"angle": 0.15, "growth": 4.0, **stepping}
+    met = set()
+    for item in doubled:
+        curve = so.track(item, "a2", (0.0, 1.3), omega=(1.2, 4.0), stepping=so.SteppingOptions(**options))
+        assert "in a GPD" in curve.ended
+        (end,) = (e for e in curve.bifurcations if e.kind == "GPD")
+        omega = min(ends, key=lambda known: abs(known - end.omega))
+        met.add(omega)
+        np.testing.assert_allclose((end.omega, end.parameter("a2")), (omega, ends[omega]), rtol=1e-8)
+        rest = [e for e in curve.bifurcations if e is not end]
+        assert all(e.kind == "extremum" for e in rest)
+        assert all(abs(e.parameter("a2") - end.parameter("a2")) > 1e-3 for e in rest)
+    assert met == set(ends)

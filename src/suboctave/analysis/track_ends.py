@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -44,6 +45,8 @@ _STANDING, _REACHED = 1e-4, 2e-7
 _AHEAD, _LEADS = 3.0, 0.3
 #: way along the parent's curve, in scaled arclength, within which that end lies
 _BESIDE = 0.05
+#: parts of that way on which it is looked for one after the other: the parent's curve may turn sharply there
+_NEARER = (1.0, 1e-2, 1e-4)
 #: the same along a curve of LP or PD for the end of an NS curve
 _AROUND = 0.2
 #: kappa in units of the base frequency, from 0 or 1/2, at which an NS curve has reached its end
@@ -282,7 +285,11 @@ def _zero_beside(
     """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
     u = curve.join(x, np.zeros(curve.augmentation.extras), a.point.u[-2:])
     start = nearest_point(curve, u, curve.weights(u, curve.size(u)), newton)
-    return Found(test, zero_along(start, test.value, newton, reach))
+    *wider, last = _NEARER
+    for share in wider:
+        with suppress(ConvergenceError):
+            return Found(test, zero_along(start, test.value, newton, share * reach))
+    return Found(test, zero_along(start, test.value, newton, last * reach))
 
 
 def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:

@@ -181,6 +181,13 @@ class TrackedCurve:
         """Index of the last free parameter in u, the last entry."""
         return self.balance.dimension + self.augmentation.extras + len(self.names) - 1
 
+    @property
+    def delicate(self) -> bool:
+        """See `Curve`: limit points of doubled motions, whose equations those of the parent's period doublings solve as
+        well. Where the doubled part is small the two are told apart by little.
+        """
+        return self.augmentation.name == "LP" and self.balance.basis.nu % 2 == 0
+
     def index(self, name: str) -> int:
         """Index of one of the free parameters in u."""
         return self.balance.dimension + self.augmentation.extras + self.names.index(name)

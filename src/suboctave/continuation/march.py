@@ -33,11 +33,11 @@ _HALVED = 20
 #: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; how many times as far it
 #: may lie from the corner without further question
 _BEYOND, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 100.0
-#: steps below which points are solved for more closely, the share of the tolerance that is left then and its least, and
-#: the share of the step that a point may lie off where rounding leaves more
+#: steps below which points are solved for more closely anyway, the share of the tolerance that is left then and its
+#: least, and the share of the step that a point may lie off where rounding leaves more
 _CLOSELY, _SHARE, _LEAST, _LEFT = 1e-4, 1e-3, 1e-13, 1e-2
 #: share of a step over which derivatives count as the same
-_SPARED = 2e-5
+_SPARED = 2e-4
 
 
 @dataclass(frozen=True)
@@ -226,12 +226,13 @@ class March:
             step = max(0.5 * step, self.stepping.min_step)
 
     def _solved(self, curve: Curve, guess: Array, row: Array, weights: Array, step: float) -> Solved:
-        """The point beside a prediction; of a short step more closely: what the tolerance leaves open may be as long as
-        the step, or as a sharp turn is wide.
+        """The point beside a prediction; of a short step, or where the curve asks for it, more closely: what the
+        tolerance leaves open may be as long as the step, or as a sharp turn is wide.
         """
-        if step < _CLOSELY:
+        delicate = getattr(curve, "delicate", False)
+        if delicate or step < _CLOSELY:
             try:
-                return correct(curve, guess, row, weights, self._close, spare=_SPARED * step)
+                return correct(curve, guess, row, weights, self._close, spare=0.0 if delicate else _SPARED * step)
             except ConvergenceError:
                 # by rounding perhaps
                 solved = correct(curve, guess, row, weights, self.newton)

@@ -41,7 +41,8 @@ class Curve(Protocol):
     to.
 
     It may have a method `corrected(guess, row, weights, options, spare, known)` too, which does what `newton.correct`
-    does at once and raises what that does, or returns None where it does not go.
+    does at once and raises what that does, or returns None where it does not go; and an attribute `delicate`, true
+    where its tangents ask for points as close as rounding allows.
     """
 
     @property
