@@ -58,7 +58,9 @@ def beyond_corner(
             solved = correct(curve, guess, row, point.weights, newton)
             away = point.weights * (solved.u - point.u)
             if length(away) < _NEAR:
-                new = make_point(solved, curve, away / point.weights, point.arclength + length(away))
+                # behind a corner the extremum moves on from the gap; what led there may be most of the way
+                ahead = math.copysign(1.0, rise) * row / point.weights
+                new = make_point(solved, curve, ahead, point.arclength + length(away))
                 return new, f"the curve has a corner at {where}, where {label} grazes"
         except ConvergenceError:
             continue

@@ -30,9 +30,9 @@ _BEHIND = 2
 _LONG = 32
 #: how often a prediction is halved towards the bound that it passes
 _HALVED = 20
-#: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; how many times as far it
-#: may lie from the corner without further question
-_BEYOND, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 100.0
+#: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; up to which of them, and
+#: how many times as far from the corner, it is taken without further question
+_BEYOND, _AT_ONCE, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 1e-5, 100.0
 #: steps below which points are solved for more closely anyway, the share of the tolerance that is left then and its
 #: least, and the share of the step that a point may lie off where rounding leaves more
 _CLOSELY, _SHARE, _LEAST, _LEFT = 1e-4, 1e-3, 1e-13, 1e-2
@@ -279,12 +279,13 @@ class March:
                 solved = correct(point.curve, guess, row, point.weights, self.newton)
                 new = make_point(solved, point.curve, heading * row, point.arclength)
             except ConvergenceError:
+                nearer = None
                 continue
             taken = length(point.weights * (solved.u - point.u))
             beyond = replace(new, arclength=point.arclength + taken)
-            if taken <= min(_CLOSE * share, self.stepping.max_step):
+            if share <= _AT_ONCE and taken <= _CLOSE * share:
                 return beyond, self.stepping.initial_step, 0.0, self._angle(point, beyond)
-            # a steep curve goes far, but comes from the corner: half as far at least for a tenth of the share
+            # what lies farther comes from the corner if a tenth of the share leads less than half as far
             before, nearer = nearer, beyond
             if before is not None and 2.0 * (before.arclength - point.arclength) < taken <= self.stepping.max_step:
                 return before, self.stepping.initial_step, 0.0, self._angle(point, before)
