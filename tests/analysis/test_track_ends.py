@@ -265,3 +265,39 @@ def test_nothing_turns_falsely_where_doubled_limit_points_of_little_damping_come
         assert all(e.kind == "extremum" for e in rest)
         assert all(abs(e.parameter("a2") - end.parameter("a2")) > 1e-3 for e in rest)
     assert met == set(ends)
+
+
+@pytest.fixture(scope="module")
+def entrained() -> list[so.Bifurcation]:
+    """NS points of a van der Pol-Duffing oscillator, in two gaps between which it follows its load."""
+    system = so.System.from_equations(
+        "x'' - 0.2*(1 - x**2)*x' + x + a*x**3 = F*cos(omega*t)", parameters={"a": 0.2, "F": 1.5}
+    )
+    return list(so.frequency_response(system, (0.3, 3.0)).bifurcations["NS"])
+
+
+STEPPINGS = [{}, {"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003}, {"angle": 0.3}]
+
+
+@pytest.mark.parametrize("stepping", STEPPINGS, ids=str)
+def test_of_two_resonances_close_by_an_ns_curve_ends_in_its_own(entrained, stepping):
+    """Another 1:1 resonance lies 3e-3 further on, on the curve of limit points through both."""
+    item = min(entrained, key=lambda known: abs(known.omega - 0.376684))
+    options = so.SteppingOptions(**{"angle": 0.15, "growth": 4.0, **stepping})
+    curve = so.track(item, "F", (0.2, 3.0), omega=(0.3, 4.0), stepping=options)
+    found = sorted((e.omega, e.parameter("F")) for e in curve.bifurcations if e.kind == "R1")
+    np.testing.assert_allclose(found, [(0.3143185, 1.6421045), (0.3963500, 1.2138676)], atol=2e-6)
+
+
+@pytest.mark.parametrize("stepping", STEPPINGS, ids=str)
+def test_a_turn_just_before_the_end_is_met(entrained, stepping):
+    """omega turns 1e-4 before the 1:1 resonance, within the last step."""
+    item = min(entrained, key=lambda known: abs(known.omega - 0.376684))
+    options = so.SteppingOptions(**{"angle": 0.15, "growth": 4.0, **stepping})
+    curve = so.track(item, "a", (0.0, 1.0), omega=(0.3, 4.0), stepping=options)
+    (turn,) = curve.extrema
+    (end,) = (e for e in curve.bifurcations if e.kind == "R1")
+    assert (turn.parameter_name, turn.extreme) == ("omega", "maximum")
+    assert turn.omega > end.omega
+    np.testing.assert_allclose((turn.omega, turn.parameter("a")), (0.4656724, 0.4786963), atol=1e-6)
+    np.testing.assert_allclose((end.omega, end.parameter("a")), (0.4656711, 0.4787943), atol=1e-5)

@@ -10,8 +10,8 @@ from typing import Any
 from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
 from suboctave.analysis.making import check_unknowns, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
+from suboctave.analysis.subharmonic_part import repeats_earlier
 from suboctave.analysis.trace import Settings
-from suboctave.analysis.track_ends import repeats_earlier
 from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
 from suboctave.analysis.track_onto import aside, curve_onto, start_onto
 from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, solved_start

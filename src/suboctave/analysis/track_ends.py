@@ -19,10 +19,10 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
+from suboctave.analysis.subharmonic_part import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.analysis.tracked_events import Found
 from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, zero_along
@@ -35,8 +35,8 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.state import BalanceState
 
-#: sub-harmonic share of the motion from which on the end of the curve is looked for, and which is none any more
-_FAINT, _NOTHING_LEFT = 3e-3, 1e-5
+#: sub-harmonic share of the motion from which on the end of the curve is looked for
+_FAINT = 3e-3
 #: speed in the plane of the parameters below which they may stand, and distance there at which the end is reached
 #: whatever the share: what more of the way a motion of little damping shows is less than residuals tell
 _STANDING, _REACHED = 1e-4, 2e-7
@@ -53,6 +53,8 @@ _AROUND = 0.2
 _RESONANT = 2e-3
 #: the same, within which the pair is looked at
 _DOUBTFUL = 0.05
+#: the same, from which that end is looked for, with steps as long as need be
+_CLOSE = 0.02
 #: share of a perturbation with waves of the other parity that is none
 _NO_PARITY = 1e-6
 #: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system; share
@@ -85,16 +87,9 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
                 f"the branch points end after {a.curve.where(a.point.u)}: their unfolding is {beta:.1e} at "
                 f"{b.curve.where(b.point.u)}, the symmetry that forces them is broken there"
             )
-    if isinstance(augmentation, SingularOperator) and augmentation.kind is Kind.FREE:
-        before, share = a.kappa / a.state.rate, b.kappa / b.state.rate
-        double = abs(share - 0.5) < 0.25
-        if double and _symmetric(b):
-            return None
-        # a step may lead across
-        target = 0.5 if double else float(round(share))
-        distance = (share - target) * math.copysign(1.0, before - target)
-        if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)):
-            return _resonance(a, double, newton)
+    target = resonant_between(a, b)
+    if target is not None:
+        return _resonance(a, target == 0.5, newton)
     if b.curve.balance.basis.nu == 1:
         return _symmetry_gained(a, b)
     share = subharmonic_share(b.point)
@@ -110,12 +105,36 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
             f"the curve ends on the period doublings of the parent motion beside {b.curve.where(b.point.u)}: the "
             "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
         )
-    if share <= _NOTHING_LEFT:
+    if share <= NOTHING_LEFT:
         return End(
             f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are period "
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def resonant_between(a: TrackedSample, b: TrackedSample) -> float | None:
+    """kappa in units of the base frequency at which an NS curve ends between two neighbours, None if it does not,
+    and of other curves."""
+    augmentation = b.curve.augmentation.own
+    if not isinstance(augmentation, SingularOperator) or augmentation.kind is not Kind.FREE:
+        return None
+    before, share = a.kappa / a.state.rate, b.kappa / b.state.rate
+    double = abs(share - 0.5) < 0.25
+    if double and _symmetric(b):
+        return None
+    # a step may lead across
+    target = 0.5 if double else float(round(share))
+    distance = (share - target) * math.copysign(1.0, before - target)
+    return target if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)) else None
+
+
+def comes_close(a: TrackedSample, b: TrackedSample) -> bool:
+    """False if an NS curve ends between two neighbours and the first is not close to its end: there may be several
+    resonances about, on the curves through them.
+    """
+    target = resonant_between(a, b)
+    return target is None or abs(a.kappa / a.state.rate - target) < _CLOSE
 
 
 def end_ahead(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
@@ -126,9 +145,9 @@ def end_ahead(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End 
     nothing; so the end is looked for while they still do, and taken if it lies where the last two points lead.
     """
     lead = _lead(a, b)
-    if lead is None or subharmonic_share(b.point) <= _NOTHING_LEFT:
+    if lead is None or subharmonic_share(b.point) <= NOTHING_LEFT:
         return None
-    before, size = (_doubled(sample.point) for sample in (a, b))
+    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
     if size > _AHEAD * (before - size):
         return None
     parent = _on_the_parent(b, newton)
@@ -145,18 +164,11 @@ def _lead(a: TrackedSample, b: TrackedSample) -> Array | None:
     """
     if b.curve.balance.basis.nu % 2 or b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
         return None
-    before, size = (_doubled(sample.point) for sample in (a, b))
+    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
     if not 0.0 < size < before:
         return None
     result: Array = (b.point.u[-2:] - a.point.u[-2:]) * size**2 / (before**2 - size**2)
     return result
-
-
-def _doubled(point: CurvePoint) -> float:
-    """Size of the doubled part of a motion."""
-    curve = point.curve
-    assert isinstance(curve, TrackedCurve)
-    return float(np.linalg.norm(_parts(curve, point.u)[0]))
 
 
 def _in_the_parent(parent: Found) -> End:
@@ -215,7 +227,7 @@ def _standing(a: TrackedSample, b: TrackedSample) -> bool:
     if lead is None or speed > _STANDING or float(np.linalg.norm(units * lead)) > _REACHED:
         return False
     # the same by the tangent: two points may agree by chance, to what residuals tell
-    before, size = (_doubled(sample.point) for sample in (a, b))
+    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
     return 0.5 * speed * size * (b.point.arclength - a.point.arclength) <= _REACHED * (before - size)
 
 
@@ -300,44 +312,4 @@ def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
     return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
 
 
-def keeps_subharmonics(a: CurvePoint, b: CurvePoint) -> bool:
-    """False if the sub-harmonic part of a motion may have vanished between two neighbours."""
-    curve = b.curve
-    assert isinstance(curve, TrackedCurve)
-    if curve.balance.basis.nu == 1 or subharmonic_share(b) <= _NOTHING_LEFT:
-        return True
-    before = _parts(curve, curve.transfer(a.u, a.curve))
-    return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, _parts(curve, b.u), strict=True))
-
-
-def subharmonic_share(point: CurvePoint) -> float:
-    """Smallest share of a motion that one of its period multiplications has brought about."""
-    curve = point.curve
-    assert isinstance(curve, TrackedCurve)
-    return min(float(np.linalg.norm(part)) for part in _parts(curve, point.u)) / (curve.size(point.u) or 1.0)
-
-
-def _parts(curve: TrackedCurve, u: Array) -> list[Array]:
-    """Harmonics that the motion would not have if it repeated earlier: one array for each prime factor of nu."""
-    basis = curve.balance.basis
-    nu = basis.nu
-    x = u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
-    return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
-
-
-def repeats_earlier(orbit: PeriodicOrbit) -> bool:
-    """Whether a motion repeats after a part of the period that it is written with."""
-    basis, scales = orbit.basis, orbit.balance.scales()[0]
-    x = orbit.coefficients.reshape(basis.size, -1) * scales
-    least = min((float(np.linalg.norm(x[rows])) for rows in _rows_of_parts(basis.nu, basis.harmonics)), default=np.inf)
-    return least <= _NOTHING_LEFT * float(np.linalg.norm(x))
-
-
-@lru_cache(maxsize=64)
-def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
-    k = np.append(0, np.repeat(np.arange(1, harmonics + 1), 2))
-    primes = [d for d in range(2, nu + 1) if nu % d == 0 and all(d % e for e in range(2, math.isqrt(d) + 1))]
-    return [np.flatnonzero(k % prime) for prime in primes]
-
-
-__all__ = ["End", "end_ahead", "end_between", "keeps_subharmonics", "rebased", "repeats_earlier", "subharmonic_share"]
+__all__ = ["End", "comes_close", "end_ahead", "end_between", "rebased", "resonant_between"]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from suboctave.analysis.subharmonic_part import keeps_subharmonics
 from suboctave.analysis.trace import Settings
+from suboctave.analysis.track_approach import points_before
 from suboctave.analysis.track_corners import beyond_corner
-from suboctave.analysis.track_ends import End, end_ahead, end_between, keeps_subharmonics, rebased
+from suboctave.analysis.track_ends import End, comes_close, end_ahead, end_between, rebased
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import LOOKED_AT, TrackedCurve
@@ -27,6 +29,8 @@ from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 2e-6
+#: steps that need not come closer to the end of an NS curve
+_NEAR_END = 1e-3
 #: corners after which no further one is passed
 _CORNERS = 5
 #: way before a corner, in scaled arclength, on which what turns there is not told from it
@@ -159,7 +163,10 @@ class _Tracker:
     @staticmethod
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve."""
-        if b.orientation != a.orientation and b.arclength - a.arclength > _JUMP:
+        way = b.arclength - a.arclength
+        if b.orientation != a.orientation and way > _JUMP:
+            return False
+        if way > _NEAR_END and not comes_close(TrackedSample(a), TrackedSample(b)):
             return False
         return keeps_subharmonics(a, b)
 
@@ -246,7 +253,12 @@ class _Tracker:
             )
 
     def _take_end(self, a: TrackedSample, end: End) -> None:
-        settings, arclength = self.settings, a.point.arclength + end.way(a)
+        settings = self.settings
+        for b in points_before(end, a, settings.newton):
+            self._take(events_between(a, b, self.tests, settings.newton, self.trace.warnings))
+            self._add(b)
+            a = b
+        arclength = a.point.arclength + end.way(a)
         if end.event is not None:
             found = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(found, settings.stability, settings.observe)
