@@ -112,3 +112,33 @@ def test_range_of_omega_that_ends_just_inside_a_turn_ends_the_curve(inside, max_
         assert bounds[0] <= part.omega.min()
         assert part.omega.max() <= bounds[1]
         assert sum(e.parameter_name == "omega" for e in part.extrema) == 1
+
+
+@pytest.fixture(scope="module")
+def between_stops() -> list[so.Bifurcation]:
+    stops = [
+        so.ElasticStop(dof=0, stiffness=5.0, gap="g", side="right", regularization=200.0),
+        so.ElasticStop(dof=0, stiffness=5.0, gap="-g/2", side="left", regularization=200.0),
+    ]
+    system = so.System(1.0, 0.04, 1.0, stops, [so.HarmonicLoad(0, 0.8)], {"g": 1.0})
+    return list(so.frequency_response(system, (0.28, 0.34)).bifurcations["PD"])
+
+
+@pytest.mark.parametrize(
+    "stepping", [{}, {"max_step": 0.1}, {"max_step": 0.15}, {"angle": 0.3}, {"initial_step": 0.02}]
+)
+def test_two_turns_within_a_step_are_told_from_each_other(between_stops, stepping):
+    # omega has a maximum and a minimum 2e-6 apart; more harmonics move the minimum by half of the way between
+    options = so.SteppingOptions(**{"angle": 0.15, "growth": 4.0, **stepping})
+    curve = so.track(between_stops[0], "g", (0.9, 1.25), omega=(0.2, 0.5), stepping=options)
+    found = [(e.parameter_name, e.extreme, e.omega, e.parameter("g")) for e in curve.extrema]
+    expected = [
+        ("omega", "minimum", 0.3001754, 1.04935),
+        ("omega", "maximum", 0.3009383, 1.13935),
+        ("omega", "minimum", 0.3009362, 1.14474),
+        ("g", "maximum", 0.3014528, 1.15833),
+        ("omega", "maximum", 0.3018463, 1.14914),
+        ("omega", "minimum", 0.3016095, 1.10971),
+    ]
+    assert [item[:2] for item in found] == [item[:2] for item in expected]
+    np.testing.assert_allclose([item[2:] for item in found], [item[2:] for item in expected], atol=1e-5)

@@ -27,7 +27,7 @@ from suboctave.harmonic.selection import choose_harmonics
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
 #: share of a step within which events coincide
-_SAME = 5e-3
+SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
 #: share of a test's values at the ends of a step with which a zero is near enough for secants
@@ -67,12 +67,12 @@ def events_between(
     found: list[Found] = []
     for test in tests:
         try:
-            both = [located(test, low, high, newton) for low, high in _brackets(test, a, b, newton)]
+            both = [located(test, low, high, newton) for low, high in brackets(test, a, b, newton)]
             found += [item for item in both if item is not None]
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
     if b.curve.augmentation.turning:
-        found = _without_consequences(found, b.curve, _SAME * (b.point.arclength - a.point.arclength))
+        found = _without_consequences(found, b.curve, SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
 
 
@@ -117,7 +117,7 @@ def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) 
     return [item for item in found if not any(item is d for d in dropped)]
 
 
-def _brackets(
+def brackets(
     test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
 ) -> list[tuple[TrackedSample, TrackedSample]]:
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
@@ -135,15 +135,23 @@ def _brackets(
 
 def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
     """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
-    start, curve, half = _slope_between(name, a, b)
-    if curve == 0.0:
-        return None
-    s = -half / curve
-    if not 0.0 < s < 1.0:
-        return None
-    slope = start + s * half
+    share, slope = slowest_between(name, a, b)
+    start = abs(a.slopes[name])
     # where it nearly vanishes the interpolation cannot tell
-    return s if slope * math.copysign(1.0, start) < 0.05 * abs(start) else None
+    return share if 0.0 < share < 1.0 and slope < 0.05 * start else None
+
+
+def slowest_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float]:
+    """Where between two neighbours (0 and 1: at one of them) a parameter runs slowest by its cubic interpolation, and
+    its slope there in the direction of the first.
+    """
+    start, curve, half = _slope_between(name, a, b)
+    sign = math.copysign(1.0, start)
+    share = -half / curve if curve != 0.0 else 0.0
+    if 0.0 < share < 1.0:
+        return share, sign * (start + share * half)
+    last = sign * b.slopes[name]
+    return (0.0, sign * start) if sign * start < last else (1.0, last)
 
 
 def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float, float]:
@@ -356,4 +364,4 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
     return found if sample is found.sample else replace(found, sample=sample)
 
 
-__all__ = ["Found", "events_between", "extreme_of", "located", "refined"]
+__all__ = ["SAME", "Found", "brackets", "events_between", "extreme_of", "located", "refined", "slowest_between"]

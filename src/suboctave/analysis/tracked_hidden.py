@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from suboctave.analysis.tracked_events import Found, located
+from suboctave.analysis.tracked_events import SAME, Found, brackets, located, slowest_between
 from suboctave.analysis.tracked_sample import TrackedSample, same_discretisation
 from suboctave.analysis.tracked_tests import CurveTest, Extremum
 from suboctave.compiled import kernel
@@ -29,6 +29,8 @@ __all__ = ["HiddenPairs"]
 
 #: share of the smaller end's value below which the function must be suspected to fall inside
 _FALLS = 0.8
+#: share of the slower end's slope below which a parameter must run inside by its cubic interpolation as well
+_SLOWER = 0.95
 #: points solved for inside one step for one test
 _PROBES = 5
 #: shares of a step at which the interpolations are looked at
@@ -39,7 +41,7 @@ class HiddenPairs:
     """Looks at every step when the points beside it are known."""
 
     def __init__(self, tests: Sequence[CurveTest], newton: NewtonOptions) -> None:
-        self.tests = [test for test in tests if not isinstance(test, Extremum)]
+        self.tests = list(tests)
         self.newton = newton
         #: the last points, with sign and logarithm of every test's function
         self._known: list[tuple[TrackedSample, list[tuple[float, float]]]] = []
@@ -72,7 +74,7 @@ class HiddenPairs:
         for i, test in enumerate(self.tests):
             functions = [known[i] for _, known in near]
             share = falling(places, _values(functions), at)
-            if share is None:
+            if share is None or self._told(test, samples, at):
                 continue
             try:
                 found += self._pair(test, samples, functions, at)
@@ -80,6 +82,15 @@ class HiddenPairs:
                 where = samples[at].curve.where(samples[at].point.u)
                 warnings.append(f"whether two {test.kind} lie after {where} could not be told: {failure}")
         return found
+
+    def _told(self, test: CurveTest, samples: list[TrackedSample], at: int) -> bool:
+        """Whether a parameter does not turn twice in a step for all that is known, or was seen to do so already."""
+        if not isinstance(test, Extremum):
+            return False
+        a, b = samples[at : at + 2]
+        share, slope = slowest_between(test.name, a, b)
+        slower = 0.0 < share < 1.0 and slope < _SLOWER * min(abs(s.slopes[test.name]) for s in (a, b))
+        return not slower or test.level(*samples) or len(brackets(test, a, b, self.newton)) > 1
 
     def _pair(
         self, test: CurveTest, samples: list[TrackedSample], functions: list[tuple[float, float]], at: int
@@ -106,11 +117,18 @@ class HiddenPairs:
             before, after = inside[i - low], inside[i - low + 1]
             if test.changed(before, middle) and test.changed(middle, after):
                 both = [located(test, before, middle, self.newton), located(test, middle, after, self.newton)]
-                return [item for item in both if item is not None]
+                genuine = [item for item in both if item is not None]
+                return [] if isinstance(test, Extremum) and _coincide(genuine, way) else genuine
             places.insert(i + 1, place)
             known.insert(i + 1, test.smooth(middle))
             inside.insert(i - low + 1, middle)
         return []
+
+
+def _coincide(found: list[Found], way: float) -> bool:
+    """Whether two events are one place of a step: slopes jump at a corner, and may seem to turn to and fro in it."""
+    places = [item.sample.point.arclength for item in found]
+    return len(places) > 1 and max(places) - min(places) <= SAME * way
 
 
 def _values(functions: Sequence[Sequence[float]]) -> list[float]:

@@ -41,6 +41,8 @@ _NOTHING = 1e-9
 BEGINNING = 1e-5
 #: way along a curve, in scaled arclength, that a zero may still be off by the last secant, and the first secant's least
 _AT_ZERO, _SECANT = 1e-10, 1e-6
+#: share of its first value from which on a function's secants are no rounding
+_ROUNDING = 1e-3
 #: way along the tangent that leads no further off the curve than rounding, and its product with the secant's length
 #: from which on what the secant leaves is less than that
 _STRAIGHT, _SURE = 1e-7, 1e-13
@@ -289,8 +291,8 @@ def zero_along(
 ) -> TrackedSample:
     """The zero of a function along a curve near one of its points, by secants in arclength.
 
-    `slope`: about the derivative of the function by arclength, 0 if that is not known; `factor`: that of the start,
-    if it was solved with about its tangent.
+    `slope`: about the derivative of the function by arclength at the zero, 0 if that is not known; `factor`: that of
+    the start, if it was solved with about its tangent.
 
     Raises
     ------
@@ -300,7 +302,8 @@ def zero_along(
     curve, weights = start.curve, start.weights
     row = weights * start.tangent
     row = row / length(row)
-    value_old = function(TrackedSample(start))
+    first = value_old = function(TrackedSample(start))
+    known = slope
     step = -value_old / slope if slope != 0.0 else math.inf
     # not so short that the secant would be one through rounding
     s, old = math.copysign(min(max(abs(step), _SECANT), 0.02 * reach), step), 0.0
@@ -312,7 +315,7 @@ def zero_along(
         except ConvergenceError:
             # a curve that turns sharply does not reach as far along one tangent
             if last is not None:
-                return zero_along(last, function, newton, reach, slope, iterations - iteration)
+                return zero_along(last, function, newton, reach, known or slope, iterations - iteration)
             if abs(s) < 10.0 * _SECANT:
                 raise
             s *= 0.1
@@ -326,6 +329,9 @@ def zero_along(
             break
         slope = (value - value_old) / (s - old)
         change = value / slope if value != 0.0 else 0.0
+        if slope * known < 0.0 and abs(value) > _ROUNDING * abs(first):
+            # it turns before it comes to the zero at which it has its slope: the other way lies another one
+            change = -2.0 * (s - old)
         if abs(change) < _AT_ZERO:
             return sample
         if abs(change) < _STRAIGHT and abs(change * (s - old)) < _SURE:

@@ -89,6 +89,11 @@ class Extremum(CurveTest):
         plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
         return slope / sample.bend if plane and sample.bend != 0.0 else slope
 
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+        """See `CurveTest.smooth`: at a cusp it vanishes as well."""
+        slope = sample.slopes[self.name]
+        return (1.0 if slope > 0.0 else -1.0), _logarithm(slope)
+
     def level(self, *samples: TrackedSample) -> bool:
         """Whether the parameter stays as it is but for rounding."""
         return all(
