@@ -18,7 +18,7 @@ import numpy as np
 from suboctave.analysis import tracked_newton
 from suboctave.analysis.tracked_matrix import bordered_by_rows, evaluate_at_once, matrix_at_once
 from suboctave.bifurcation.augmented import Augmentation, Equations
-from suboctave.continuation.kernels import bordered_transposed
+from suboctave.continuation.kernels import bordered_transposed, weighted_length
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, Solved
 from suboctave.continuation.problem import Array, Curve, Evaluation
@@ -176,7 +176,7 @@ class TrackedCurve:
     cache: dict[HarmonicBasis, HarmonicBalance]
     steps: int = 0
 
-    @property
+    @lazy
     def parameter(self) -> int:
         """Index of the last free parameter in u, the last entry."""
         return self.balance.dimension + self.augmentation.extras + len(self.names) - 1
@@ -241,7 +241,7 @@ class TrackedCurve:
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
-        return length(self._weight * u[: self.balance.dimension])
+        return float(weighted_length(self._weight, u))
 
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""

@@ -103,14 +103,14 @@ class March:
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
         behind: list[CurvePoint] = []
-        bend, count = 0.0, 1
+        curve, bend, count = point.curve, 0.0, 1
         while True:
             if count >= options.max_points:
                 self.ended = (
                     f"{options.max_points} points computed at {point.curve.where(point.u)}; raise max_points to go on"
                 )
                 return
-            point = self._rescaled(point, largest)
+            point = self._rescaled(curve, point, largest)
             try:
                 new, step, deviation, turn = self._advance(point, step, behind)
             except ConvergenceError as failure:
@@ -163,15 +163,7 @@ class March:
             step = self._next_step(new, taken, deviation, turn)
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
-            adapted = new.curve.adapted(new.u, new.evaluation)
-            if adapted is not new.curve:
-                u, t = adapted.transfer(new.u, new.curve), adapted.transfer(new.tangent, new.curve)
-                weights = adapted.weights(u, largest)
-                point = CurvePoint(
-                    adapted, u, t, weights, new.evaluation, new.orientation, new.arclength, new.iterations, new.factor
-                )
-            else:
-                point = new
+            curve, point = new.curve.adapted(new.u, new.evaluation), new
 
     def _set_out(self) -> CurvePoint:
         """The start with its tangent pointing in the wanted direction."""
@@ -181,12 +173,14 @@ class March:
         return point
 
     @staticmethod
-    def _rescaled(point: CurvePoint, largest: float) -> CurvePoint:
-        """The same point with scaling and tangent length of the present amplitude."""
-        weights, t = point.curve.weights(point.u, largest), np.empty(len(point.u))
-        kernels.rescaled(point.tangent, weights, t)
-        p = point
-        return CurvePoint(p.curve, p.u, t, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
+    def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
+        """The same point as one of `curve`, with scaling and tangent length of the present amplitude."""
+        p, u, along = point, point.u, point.tangent
+        if curve is not p.curve:
+            u, along = curve.transfer(u, p.curve), curve.transfer(along, p.curve)
+        weights, t = curve.weights(u, largest), np.empty(len(u))
+        kernels.rescaled(along, weights, t)
+        return CurvePoint(curve, u, t, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
     def _advance(
         self, point: CurvePoint, step: float, behind: list[CurvePoint]
