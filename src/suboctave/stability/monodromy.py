@@ -22,9 +22,10 @@ square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import eigh, lapack
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState, length
@@ -135,15 +136,7 @@ class _Several:
         n, linear = len(mass), along.state.linear
         shapes = np.array([linear.expand(direction) for direction in along.directions], dtype=float).reshape(-1, n)
         acting = np.array([linear.expand(direction) for direction in along.acting], dtype=float).reshape(-1, n)
-        # DOFs weighted by the square roots of their masses: norms have no units
-        weight = np.sqrt(mass.diagonal())
-        inverse = np.linalg.inv(mass) * weight[:, None]
-        self.matrices = (
-            inverse @ stiffness / weight,
-            inverse @ damping / weight,
-            np.ascontiguousarray(acting @ inverse.T),
-            shapes / weight,
-        )
+        self.matrices = _in_modes(mass, damping, stiffness, acting, shapes)
         self.none = np.zeros((len(shapes), 0))
         self.scale = 1.0 / along.state.rate
         self.before: Array = np.zeros((0, 0))
@@ -224,6 +217,54 @@ class _Several:
     def gap(self) -> float:
         """Distance to +1 of the nearest multiplier of the motion as it stands."""
         return float(np.abs(1.0 - np.linalg.eigvals(self.before)).min())
+
+
+def _in_modes(
+    mass: Array, damping: Array, stiffness: Array, acting: Array, shapes: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Stiffness, damping (n, n), and the directions in which elements act and are moved (G, n), in modes of the linear
+    part normalised by mass: norms have no units, and most products are with diagonal matrices.
+
+    Where mass or stiffness is not symmetric, or the mass not positive definite, in DOFs weighted by the square roots of
+    their masses.
+    """
+    modes = _modes(mass.tobytes(), stiffness.tobytes(), len(mass))
+    if modes is not None:
+        values, shape = modes
+        return (
+            np.diag(values),
+            _cleaned(shape.T @ damping @ shape),
+            np.ascontiguousarray(acting @ shape),
+            np.ascontiguousarray(shapes @ shape),
+        )
+    weight = np.sqrt(mass.diagonal())
+    inverse = np.linalg.inv(mass) * weight[:, None]
+    return (
+        inverse @ stiffness / weight,
+        inverse @ damping / weight,
+        np.ascontiguousarray(acting @ inverse.T),
+        shapes / weight,
+    )
+
+
+@lru_cache(maxsize=16)
+def _modes(mass: bytes, stiffness: bytes, size: int) -> tuple[Array, Array] | None:
+    """Squares of natural frequencies and modes in columns of matrices (size, size), None where there are none."""
+    m, k = (np.frombuffer(given).reshape(size, size) for given in (mass, stiffness))
+    if not (np.array_equal(m, m.T) and np.array_equal(k, k.T)):
+        return None
+    try:
+        values, shape = eigh(k, m)
+    except np.linalg.LinAlgError:
+        return None
+    return values, shape
+
+
+def _cleaned(matrix: Array) -> Array:
+    """Without what rounding leaves off the diagonal."""
+    size = np.sqrt(np.abs(np.multiply.outer(matrix.diagonal(), matrix.diagonal())))
+    result: Array = np.where(np.abs(matrix) > 1e-13 * size, matrix, 0.0)
+    return result
 
 
 _Motion = ClosedSingle | _Single | _Several

@@ -90,25 +90,26 @@ def series(state, matrix, damping, left, right, local, span, moving, graded, eno
         share = 1.0 / (order + 1)
         if not graded:
             share *= span
-        for i in range(size):
-            for j in range(cols):
-                room[groups + i, j] = 0.0 if graded else terms[o, i, j]
-            if graded:
+        if graded:
+            for i in range(size):
+                for j in range(cols):
+                    room[groups + i, j] = 0.0
                 for q in range(ORDER):
                     f = local[0, q]
                     for j in range(cols):
                         room[groups + i, j] += f * terms[o - q, i, j]
+        now = room[groups:] if graded else terms[o]
         most = last = 0.0
         for i in range(n):
             for j in range(cols):
-                terms[o + 1, i, j] = share * room[groups + n + i, j]
+                terms[o + 1, i, j] = share * now[n + i, j]
                 terms[o + 1, n + i, j] = 0.0
             for k in range(n):
                 p = share * matrix[i, k]
                 q = share * damping[i, k]
                 if p != 0.0 or q != 0.0:
                     for j in range(cols):
-                        terms[o + 1, n + i, j] -= p * room[groups + k, j] + q * room[groups + n + k, j]
+                        terms[o + 1, n + i, j] -= p * now[k, j] + q * now[n + k, j]
             for g in range(groups):
                 f = share * left[g, i]
                 if f != 0.0:
