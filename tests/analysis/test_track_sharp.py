@@ -142,3 +142,67 @@ def test_two_turns_within_a_step_are_told_from_each_other(between_stops, steppin
     ]
     assert [item[:2] for item in found] == [item[:2] for item in expected]
     np.testing.assert_allclose([item[2:] for item in found], [item[2:] for item in expected], atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def rattle() -> so.Bifurcation:
+    """A limit point of a mass between two rounded stops of another one."""
+    stops = [so.ElasticStop((0, 1), "k", gap, side=side, regularization=50.0) for gap, side in GAPS]
+    system = so.System(
+        [[1.0, 0.0], [0.0, 0.3]],
+        [[0.03, -0.01], [-0.01, 0.01]],
+        [[1.2, -0.2], [-0.2, 0.2]],
+        stops,
+        [so.HarmonicLoad(0, 0.1)],
+        {"k": 2.0},
+    )
+    return so.frequency_response(system, (0.4, 2.6)).bifurcations["LP"][0]
+
+
+GAPS = [(0.5, "right"), (-0.5, "left")]
+
+
+@pytest.mark.parametrize("max_step", [None, 0.02, 0.15])
+def test_pair_that_passes_the_circle_just_before_it_splits_beside_the_critical_multiplier(rattle, max_step):
+    # the one real multiplier of it goes on to +1 (R1), within a stride of points whose multipliers are computed
+    curve = so.track(rattle, "k", (0.1, 6.0), omega=(0.3, 4.0), max_step=max_step)
+    (item,) = (e for e in curve.bifurcations if e.kind == "LPNS")
+    assert (item.omega, item.parameter("k")) == pytest.approx((0.8698852, 3.5015484), abs=1e-6)
+    pair = item.multipliers[item.multipliers.imag > 0.0]
+    assert np.abs(np.abs(pair) - 1.0).min() < 1e-3
+    (double,) = (e for e in curve.bifurcations if e.kind == "R1")
+    assert (double.omega, double.parameter("k")) == pytest.approx((0.868686, 3.393689), abs=1e-4)
+
+
+@pytest.mark.parametrize("stepping", [{}, {"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003}], ids=str)
+def test_minimum_and_maximum_beside_a_cusp(stepping):
+    # both parameters turn in the cusp 7e-6 before the extremum, within a step
+    system = so.System.from_equations(
+        [
+            "x'' + 0.004*x' + x + x**3 + c*(x'-y') + 0.045*(x-y) + 0.004*(x-y)**3 = 0.12*cos(omega*t)",
+            "0.05*y'' + c*(y'-x') + 0.045*(y-x) + 0.004*(y-x)**3 = 0",
+        ],
+        parameters={"c": 0.012},
+    )
+    item = so.frequency_response(system, (0.6, 2.0)).bifurcations["LP"][0]
+    options = so.SteppingOptions(**{"angle": 0.15, "growth": 4.0, **stepping})
+    curve = so.track(item, "c", (0.004, 0.03), omega=(0.4, 3.0), stepping=options)
+    (turn,) = (e for e in curve.extrema if abs(e.omega - 1.055034) < 1e-5)
+    assert (turn.parameter_name, turn.extreme) == ("omega", "maximum")
+    assert turn.parameter("c") == pytest.approx(0.0120186, abs=1e-7)
+    # along the curve itself: from the cusp omega rises to there
+    (cusp,) = (e for e in curve.bifurcations if e.kind == "CP" and abs(e.omega - turn.omega) < 1e-5)
+    assert cusp.omega < turn.omega
+
+
+def test_curves_of_extrema_keep_the_ranges_of_the_curve_that_they_lie_on():
+    stop = so.ElasticStop(dof=0, stiffness=1.0, gap=0.3, side="left", regularization=500.0)
+    system = so.System(1.0, "2*z", 0.3, [stop], [so.HarmonicLoad(0, "p")], {"z": 0.05, "p": 0.2})
+    doubling = so.frequency_response(system, (0.3, 2.6)).bifurcations["PD"][0]
+    first = so.track(doubling, "p", (0.02, 1.0), omega=(0.2, 5.0))
+    by_name = {name: next(e for e in first.extrema if e.parameter_name == name) for name in ("omega", "p")}
+    beside = so.track(by_name["omega"], "z", (0.01, 0.1))
+    assert beside.parameter("p").max() == 1.0
+    extreme = so.track(by_name["p"], "z", (0.01, 0.1))
+    assert extreme.parameter("p").max() == pytest.approx(1.98)
+    assert len(extreme) < 400

@@ -65,10 +65,10 @@ def track(
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
-        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside. The parameter that is extreme
-        is not bounded.
+        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside. The parameters of an
+        extremum's curve keep their ranges, the one that is extreme with as much again on both sides.
     omega
-        Range of omega, rad per unit time; default: not bounded.
+        Range of omega, rad per unit time; default: not bounded, but where it keeps its range.
     onto
         From a point of codimension two: the kind of the curve to follow. Default: that on which it was not found, the
         Neimark-Sacker points that begin in an R1 or R2 of a curve of LP or PD, the LP or PD through that of an NS.
@@ -107,9 +107,9 @@ def track(
     """
     turning = bifurcation.parameter_name if is_extremum(bifurcation) else ""
     if is_extremum(bifurcation):
-        names, ranges = _third(bifurcation, parameter, bounds, omega)
+        names, ranges, between = _third(bifurcation, parameter, bounds, omega)
     else:
-        names, ranges = _free(bifurcation, parameter, bounds, omega)
+        (names, ranges), between = _free(bifurcation, parameter, bounds, omega), None
     kind = curve_onto(bifurcation, onto)
     if bifurcation.kind == "LP" and repeats_earlier(bifurcation.orbit):
         raise InputError(
@@ -135,7 +135,7 @@ def track(
     wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
     second = ranges[1]
     assert second is not None
-    box = Box(None if ranges[0] is None else (min(ranges[0]), max(ranges[0])), (min(second), max(second)))
+    box = Box(None if ranges[0] is None else (min(ranges[0]), max(ranges[0])), (min(second), max(second)), between)
     computation_begins()
     with one_thread(), reporting(progress, f"{kind} over {names[-1]}") as report:
         settings = replace(settings, report=report)
@@ -172,8 +172,10 @@ def track(
 
 def _third(
     item: TrackedEvent, parameter: Any, bounds: Any, omega: Any
-) -> tuple[tuple[str, ...], tuple[Range | None, Range | None]]:
-    """The three parameters in which an extremum is followed, and the ranges of the first and the last, checked."""
+) -> tuple[tuple[str, ...], tuple[Range | None, Range | None], Range | None]:
+    """The three parameters in which an extremum is followed, the ranges of the first and the last, checked, and that of
+    the one between. Those of the extremum's curve keep their ranges.
+    """
     system = item.orbit.system
     if len(item.names) != 2:
         raise InputError(
@@ -187,10 +189,22 @@ def _third(
         raise InputError(f"{parameter} is free on the curve of this extremum already: name a third parameter")
     if omega is not None and item.names[0] != "omega":
         raise InputError("omega= bounds omega where it is free, which it is not on the curve of this extremum")
-    first = None if omega is None else check_range("omega", omega, positive=True)
+    first, between = (_kept(item, name) for name in item.names)
+    if omega is not None:
+        first = check_range("omega", omega, positive=True)
     ranges = (first, check_bounds(system, parameter, bounds))
     _check_inside(item, (item.names[0], parameter), ranges)
-    return (*item.names, parameter), ranges
+    return (*item.names, parameter), ranges, between
+
+
+def _kept(item: TrackedEvent, name: str) -> Range | None:
+    """The range that a parameter of an extremum's curve keeps; if it is extreme, with as much again on both sides."""
+    given = dict((item.context or {}).get("bounds", {})).get(name)
+    if given is None:
+        return None
+    low, high = sorted(given)
+    more = high - low if name == item.parameter_name else 0.0
+    return (max(low - more, 0.5 * low) if name == "omega" else low - more), high + more
 
 
 def _free(
@@ -276,11 +290,8 @@ def _leads_inside(point: CurvePoint, box: Box) -> bool:
     """Whether a curve that begins at a point stays within its ranges there."""
     assert isinstance(point.curve, TrackedCurve)
     names = point.curve.names
-    for name, ends in ((names[0], box.first), (names[-1], box.second)):
-        if ends is None:
-            continue
+    for name, (low, high) in box.ranges(names).items():
         index = point.curve.index(name)
-        low, high = ends
         value, slope = point.u[index], point.tangent[index]
         slack = 1e-9 * (high - low)
         if (value >= high - slack and slope > 0.0) or (value <= low + slack and slope < 0.0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from suboctave.analysis.subharmonic_part import keeps_subharmonics
@@ -73,7 +74,7 @@ class _Tracker:
         assert isinstance(start.curve, TrackedCurve)
         self.settings = settings
         self.box = box
-        self.first = _first_bounds(box)
+        self.others = _other_bounds(start.curve, box)
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
         self.trace = TrackedTrace()
@@ -155,7 +156,7 @@ class _Tracker:
                 continue
             i = last.curve.index(test.name)
             if last.point.tangent[i] * beyond.tangent[i] < 0.0:
-                found = Found(test, last, extreme_of(test, last))
+                found = Found(test, last, extreme_of(test, test.value(last), last))
                 event = as_event(found, self.settings.stability, self.settings.observe)
                 width = abs(float(beyond.u[i] - last.point.u[i]))
                 events.append(replace(event, isola="", uncertainty=width, arclength=middle))
@@ -217,6 +218,13 @@ class _Tracker:
         settings, warnings = self.settings, self.trace.warnings
         for item in found:
             better = refined(item, settings.newton, warnings)
+            if not better.test.confirmed(better.sample):
+                where = better.sample.curve.where(better.sample.point.u)
+                warnings.append(
+                    f"{better.test.kind} at {where} is left out: with the harmonics kept a pair of multipliers lies on "
+                    "the unit circle there, by the monodromy matrix none does"
+                )
+                continue
             self.trace.events.append(as_event(better, settings.stability, settings.observe))
 
     def _add(self, sample: TrackedSample) -> None:
@@ -293,39 +301,44 @@ class _Tracker:
         return TrackedSample(replace(point, tangent=kernels.normalised(chord, point.weights)))
 
     def _inside(self, sample: TrackedSample) -> bool:
-        """Whether a point lies in the range of the first parameter."""
-        box = self.box.first
-        return box is None or box[0] <= float(sample.point.u[sample.curve.index(sample.curve.names[0])]) <= box[1]
+        """Whether a point lies in the ranges of the parameters but the last."""
+        return all(bounds.low <= bounds.value(sample.point) <= bounds.high for bounds in self.others)
 
     def _left(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
-        """The point between two neighbours at which the curve leaves the range of its first parameter, None if it stays
-        in it; raises ConvergenceError where it leaves but no solution is found on the bound.
+        """The first point between two neighbours at which the curve leaves the range of a parameter but the last, None
+        if it stays in them; raises ConvergenceError where it leaves one but no solution is found on its bound.
         """
-        if self.first is None:
-            return None
-        newton = self.settings.newton
-        bound = self.first.passed(a.point, b.point)
-        if bound is None:
-            found = self.first.turned_beyond(a.point, b.point, newton)
-            return None if found is None else TrackedSample(found)
-        if self.first.value(b.point) == bound:
-            return b
-        found = self.first.land(a.point, b.point, bound, newton)
-        if found is None:
-            raise ConvergenceError(
-                f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
-            )
-        return TrackedSample(found)
+        newton, found = self.settings.newton, None
+        for bounds in self.others:
+            end = b if found is None else found
+            bound = bounds.passed(a.point, end.point)
+            if bound is None:
+                landed = bounds.turned_beyond(a.point, end.point, newton)
+            elif bounds.value(end.point) == bound:
+                landed = end.point
+            else:
+                landed = bounds.land(a.point, end.point, bound, newton)
+                if landed is None:
+                    raise ConvergenceError(
+                        f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
+                    )
+            if landed is not None:
+                found = end if landed is end.point else TrackedSample(landed)
+        return found
 
 
-def _first_bounds(box: Box) -> Bounds | None:
-    """The range of the first parameter."""
+def _other_bounds(curve: TrackedCurve, box: Box) -> list[Bounds]:
+    """The ranges of the parameters but the last."""
 
-    def index(curve: Curve) -> int:
-        assert isinstance(curve, TrackedCurve)
-        return curve.index(curve.names[0])
+    def index_of(name: str) -> Callable[[Curve], int]:
+        def index(curve: Curve) -> int:
+            assert isinstance(curve, TrackedCurve)
+            return curve.index(name)
 
-    return None if box.first is None else Bounds(index, *box.first)
+        return index
+
+    ranges = box.ranges(curve.names)
+    return [Bounds(index_of(name), *ranges[name]) for name in curve.names[:-1] if name in ranges]
 
 
 def _drop_seam(events: list[TrackedEvent]) -> None:

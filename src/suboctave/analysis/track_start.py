@@ -44,15 +44,22 @@ _NEAR = 0.05
 
 @dataclass(frozen=True)
 class Box:
-    """Ranges of the first and the last free parameter, None where one is not bounded: the curve ends on them."""
+    """Ranges of the first and the last free parameter, and of that between along a curve of extrema; None where one is
+    not bounded. The curve ends on them.
+    """
 
     first: tuple[float, float] | None
     second: tuple[float, float]
+    between: tuple[float, float] | None = None
+
+    def ranges(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Those of the free parameters that are bounded, by their names, the last one last."""
+        known = {names[0]: self.first, names[1]: self.between, names[-1]: self.second}
+        return {name: ends for name, ends in known.items() if ends is not None}
 
     def around(self, names: Sequence[str], values: Mapping[str, float]) -> bool:
         """Whether values of the free parameters lie within the ranges."""
-        both = ((names[0], self.first), (names[-1], self.second))
-        return all(ends is None or ends[0] <= values[name] <= ends[1] for name, ends in both)
+        return all(low <= values[name] <= high for name, (low, high) in self.ranges(names).items())
 
 
 def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
@@ -102,7 +109,7 @@ def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tupl
     """Sizes of the free parameters: widths of their ranges, where there are none their values."""
     ranges = dict((item.context or {}).get("bounds", {})) if is_extremum(item) else {}
     if box is not None:
-        ranges |= {name: ends for name, ends in ((names[0], box.first), (names[-1], box.second)) if ends is not None}
+        ranges |= box.ranges(names)
     sizes = [abs(float(ranges[n][1]) - float(ranges[n][0])) if n in ranges else abs(item.parameter(n)) for n in names]
     return tuple(size or 1.0 for size in sizes)
 
@@ -172,9 +179,8 @@ def solved_start(
         If it is not found again.
     """
     curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), settings.formulation)
-    for name, ends in ((names[0], box.first), (names[-1], box.second)):
-        if ends is not None:
-            u[curve.index(name)] = min(ends[1], max(ends[0], u[curve.index(name)]))
+    for name, (low, high) in box.ranges(names).items():
+        u[curve.index(name)] = min(high, max(low, u[curve.index(name)]))
     if is_extremum(item):
         curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
     begin = u

@@ -87,16 +87,17 @@ def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: Ne
         way = high.point.arclength - low.point.arclength
         slope = (stretch.values[1.0] - stretch.values[0.0]) / way
         sample = zero_along(same.point, own.value, newton, way, slope)
-        return Found(own, sample, extreme_of(test, low), None, slope) if own.genuine(sample) else None
+        return Found(own, sample, extreme_of(own, -slope, sample), None, slope) if own.genuine(sample) else None
     # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
     close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
     sample, slope = stretch.about(_ROUGH if close else 0.0)
     if not own.genuine(sample):
         return None
+    before = stretch.values[0.0] if stretch.values[0.0] != 0.0 else -slope
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
     sample = sample if finer else stretch.zero_from(sample, slope)
-    return Found(own, sample, extreme_of(test, low), stretch if finer else None, slope)
+    return Found(own, sample, extreme_of(own, before, sample), stretch if finer else None, slope)
 
 
 def _without_consequences(found: list[Found], curve: TrackedCurve, near: float) -> list[Found]:
@@ -229,6 +230,8 @@ class _Stretch:
         first, last = self.values[0.0], self.values[1.0]
         self.spare = BEGINNING
         # components of a tangent change evenly; others may be large at one end
+        if first * last > 0.0:
+            raise ConvergenceError("the test does not change sign between the points about it")
         even = isinstance(self.test, Extremum)
         scaled = _even(first, last)
         start, stop = scaled(first), scaled(last)
@@ -319,11 +322,9 @@ def _finer(sample: TrackedSample) -> HarmonicBasis | None:
     return basis if basis.harmonics > curve.balance.basis.harmonics else None
 
 
-def extreme_of(test: CurveTest, a: TrackedSample) -> str:
-    """Whether a parameter that turns behind a point has a maximum or a minimum; empty for other events."""
-    if not isinstance(test, Extremum):
-        return ""
-    return "maximum" if a.point.tangent[a.curve.index(test.name)] > 0.0 else "minimum"
+def extreme_of(test: CurveTest, before: float, at: TrackedSample) -> str:
+    """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before it."""
+    return test.extreme(before, at) if isinstance(test, Extremum) else ""
 
 
 def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:

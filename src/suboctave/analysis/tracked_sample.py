@@ -199,9 +199,16 @@ class TrackedSample:
         mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
         if critical is None:
             return mu
-        count = 2 if self.curve.augmentation.name == "NS" else 1
         distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
-        result: ComplexArray = np.delete(mu, np.argsort(distance, kind="stable")[:count])
+        nearest = np.argsort(distance, kind="stable")
+        result: ComplexArray
+        if self.curve.augmentation.name != "NS" and mu[nearest[0]].imag != 0.0:
+            # two that are nearly the same came out as a pair, whose sum is known better than either
+            pair = np.abs(mu - np.conj(mu[nearest[0]])).argmin()
+            beside = 2.0 * mu[nearest[0]].real - critical
+            result = np.append(np.delete(mu, [nearest[0], pair]), beside)
+        else:
+            result = np.delete(mu, nearest[: 2 if self.curve.augmentation.name == "NS" else 1])
         return result
 
 

@@ -40,8 +40,11 @@ _CRITICAL = 0.1
 _RESONANT = 0.5
 #: corrections of kappa, and their size in units of the base frequency, after which it is known
 _CORRECTIONS, _KNOWN = 6, 1e-11
-#: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair
-_STRAYED = 0.1
+#: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair, and
+#: of that pair's growth from that of the multipliers, as a share
+_STRAYED, _AGREES = 0.1, 0.25
+#: logarithm of a pair's modulus up to which it may be on the unit circle
+_ON_IT = 0.03
 
 
 class CurveTest(ABC):
@@ -74,6 +77,10 @@ class CurveTest(ABC):
         """Whether what was located is an event."""
         return True
 
+    def confirmed(self, sample: TrackedSample) -> bool:
+        """Whether multipliers, which depend little on the harmonics kept, agree with an event as it is reported."""
+        return True
+
 
 @dataclass(frozen=True)
 class Extremum(CurveTest):
@@ -85,9 +92,17 @@ class Extremum(CurveTest):
     def value(self, sample: TrackedSample) -> float:
         """See `CurveTest.value`."""
         slope = sample.slopes[self.name]
-        # at a cusp both change sign
-        plane = sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning
-        return slope / sample.bend if plane and sample.bend != 0.0 else slope
+        return slope / sample.bend if self._beside_cusps(sample) else slope
+
+    @staticmethod
+    def _beside_cusps(sample: TrackedSample) -> bool:
+        """Whether both parameters turn where the cusp's function vanishes, which it does not do here."""
+        return sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning and sample.bend != 0.0
+
+    def extreme(self, before: float, at: TrackedSample) -> str:
+        """Whether the parameter has a maximum or a minimum at a zero; before: sign of the function before it."""
+        rising = before * at.bend if self._beside_cusps(at) else before
+        return "maximum" if rising > 0.0 else "minimum"
 
     def smooth(self, sample: TrackedSample) -> tuple[float, float]:
         """See `CurveTest.smooth`: at a cusp it vanishes as well."""
@@ -247,8 +262,9 @@ class PairCrossing(CurveTest):
         """See `CurveTest.value`: logarithm of the pair's modulus."""
         assert self.target is not None
         assert self.borders is not None
-        rate = sample.state.rate
-        kappa = start = _frequency(sample, self.target)
+        rate, pair = sample.state.rate, _nearest_pair(sample, self.target)
+        kappa, growth = float(np.angle(pair)) * rate / (2.0 * np.pi), math.log(abs(pair))
+        start = kappa
         for _ in range(_CORRECTIONS):
             border = bordered(sample.state, Kind.FREE, self.borders, kappa)
             change = border.g / border.gradient(())[2]
@@ -256,8 +272,19 @@ class PairCrossing(CurveTest):
                 break
             kappa -= change.real
             if abs(kappa - start) > _STRAYED * rate:
-                raise ConvergenceError("the harmonics kept do not tell where the pair of multipliers is")
-        return float(change.imag) * 2.0 * np.pi / rate
+                return growth
+        found = float(change.imag) * 2.0 * np.pi / rate
+        # other multipliers, the critical one among them, have zeros of g as well
+        return found if abs(found - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
+
+    def confirmed(self, sample: TrackedSample) -> bool:
+        """See `CurveTest.confirmed`."""
+        assert self.target is not None
+        found, error = sample.evaluation.floquet, 0.0
+        if found.errors.size:
+            error = float(found.errors[np.abs(found.multipliers - self.target).argmin()])
+        pairs = sample.others[sample.others.imag > 0.0]
+        return bool(pairs.size) and math.log(abs(_nearest_pair(sample, self.target))) ** 2 < (_ON_IT + error) ** 2
 
     def smooth(self, sample: TrackedSample) -> tuple[float, float]:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
@@ -270,12 +297,17 @@ def _logarithm(value: float) -> float:
     return math.log(abs(value)) if value != 0.0 else -math.inf
 
 
-def _frequency(sample: TrackedSample, target: complex) -> float:
-    """kappa of the complex multiplier that is nearest to a target."""
+def _nearest_pair(sample: TrackedSample, target: complex) -> complex:
+    """The complex multiplier of the upper half plane that is nearest to a target."""
     pairs = sample.others[sample.others.imag > 0.0]
     if not pairs.size:
         raise ConvergenceError("the pair of multipliers splits into two real ones")
-    return float(np.angle(pairs[np.argmin(np.abs(pairs - target))])) * sample.state.rate / (2.0 * np.pi)
+    return complex(pairs[np.argmin(np.abs(pairs - target))])
+
+
+def _frequency(sample: TrackedSample, target: complex) -> float:
+    """kappa of that multiplier."""
+    return float(np.angle(_nearest_pair(sample, target))) * sample.state.rate / (2.0 * np.pi)
 
 
 def _passing(first: ComplexArray, last: ComplexArray) -> tuple[complex, complex] | None:
