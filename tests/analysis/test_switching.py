@@ -307,3 +307,17 @@ def test_the_beginning_of_a_closed_branch_is_no_limit_point():
     found = sorted(b.omega for b in loop.bifurcations["LP"])
     assert len(found) == 8
     assert found[::2] == pytest.approx(found[1::2], abs=1e-8)
+
+
+def test_a_step_that_ends_right_on_the_parent_has_met_it():
+    """Its motion has an odd part of 2e-6: limit points found on what followed were those of the parent's doubling."""
+    system = so.System.from_equations(
+        "x'' + 0.05*x' + x - 0.9*x**2 + 0.35*x**3 = p*cos(omega*t)", parameters={"p": 0.25}
+    )
+    doublings = so.frequency_response(system, (0.3, 2.6)).bifurcations["PD"]
+    both = [so.switch_branch(item) for item in doublings]
+    for branch in both:
+        assert [b.kind for b in branch.bifurcations] == ["LP"] * 3
+        assert "met the T motion" in branch.ended
+    first, last = (sorted(b.omega for b in branch.bifurcations) for branch in both)
+    np.testing.assert_allclose(first, last, rtol=1e-9)

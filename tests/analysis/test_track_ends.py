@@ -301,3 +301,19 @@ def test_a_turn_just_before_the_end_is_met(entrained, stepping):
     assert turn.omega > end.omega
     np.testing.assert_allclose((turn.omega, turn.parameter("a")), (0.4656724, 0.4786963), atol=1e-6)
     np.testing.assert_allclose((end.omega, end.parameter("a")), (0.4656711, 0.4787943), atol=1e-5)
+
+
+def test_a_curve_towards_heteroclinic_motions_ends_where_multipliers_tell_nothing():
+    """A softening spring at low frequencies: the motions stay symmetric, but for what rounding makes of them."""
+    system = so.System.from_equations("x'' + 0.1*x' + x - a*x**3 = 0.2*cos(omega*t)", parameters={"a": 0.15})
+    limit_point = so.frequency_response(system, (0.3, 1.6)).bifurcations["LP"][0]
+    curve = so.track(limit_point, "a", (0.01, 0.4), omega=(0.1, 3.0))
+    assert "symmetric" not in curve.ended
+    assert "multipliers of up to" in curve.ended
+    assert len(curve) < 400
+    # up to there they are those of response curves
+    found = so.frequency_response(system.with_parameters({"a": 0.1}), (0.3, 1.6)).bifurcations["LP"]
+    at = curve.parameter("a")
+    for i in np.flatnonzero((at[:-1] - 0.1) * (at[1:] - 0.1) < 0.0):
+        low, high = sorted(curve.omega[[i, i + 1]])
+        assert any(low - 1e-4 < item.omega < high + 1e-4 for item in found)

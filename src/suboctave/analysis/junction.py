@@ -44,6 +44,8 @@ __all__ = [
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 #: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
 _CLOSE = 0.02
+#: share of its odd part with which a step leaves a motion right beside its parent, on whose doublings what follows lies
+_VANISHED = 0.01
 #: way in the scaled parameter that rounding may account for
 _STILL = 1e-10
 #: what a branch says where it could not look closer
@@ -107,10 +109,13 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     curve = b.curve
     assert isinstance(curve, ResponseCurve)
     basis = curve.balance.basis
-    if basis.nu % 2 or not _turned(a, b, curve):
+    if basis.nu % 2:
+        return None
+    odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
+    turned = bool(odd_a @ odd_b < 0.0)
+    if not turned and length(odd_b) > _VANISHED * length(odd_a):
         return None
     parent = curve.with_basis(basis.halved)
-    odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
     share = length(odd_a) / (length(odd_a) + length(odd_b))
     u = between(a, b, share)
     x, omega, values = curve.split(u)
@@ -124,16 +129,12 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     value = state.omega if curve.name == "omega" else state.values[curve.name]
     there = curve.join(parent.balance.basis.resized(state.x, basis), value)
     place = position(a, b, there)
-    if place is None or not -1e-6 <= place <= 1.0 + 1e-6 or found.vectors is None:
+    beyond = 1e-6 if turned else 2.0 * _VANISHED
+    if place is None or not -1e-6 <= place <= 1.0 + beyond or found.vectors is None:
         return None
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
     last, doubt = _last_before(a, b, there, found, newton)
     return Meeting(found, parent.with_balance(state.balance), Arrival(last, reason), doubt)
-
-
-def _turned(a: CurvePoint, b: CurvePoint, curve: ResponseCurve) -> bool:
-    odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
-    return bool(odd_a @ odd_b < 0.0)
 
 
 def _odd(u: Array, curve: ResponseCurve, weights: Array) -> Array:

@@ -77,8 +77,10 @@ class End:
         return 0.0 if self.event is None else _apart(self.event.sample.point, a.point)
 
 
-def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
-    """The end of a curve between two neighbours, None if it goes on."""
+def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions, lopsided: bool = True) -> End | None:
+    """The end of a curve between two neighbours, None if it goes on; lopsided: whether its motions had no half-wave
+    symmetry where it began.
+    """
     augmentation = b.curve.augmentation.own
     if isinstance(augmentation, BranchPointUnfolded):
         beta = float(b.evaluation.extra[0])
@@ -91,7 +93,7 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> En
     if target is not None:
         return _resonance(a, target == 0.5, newton)
     if b.curve.balance.basis.nu == 1:
-        return _symmetry_gained(a, b)
+        return _symmetry_gained(a, b) if lopsided else None
     share = subharmonic_share(b.point)
     if share <= _FAINT:
         parent = _on_the_parent(a, newton)
@@ -204,6 +206,11 @@ def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
     )
 
 
+def is_lopsided(sample: TrackedSample) -> bool:
+    """Whether a motion lacks the half-wave symmetry by more than rounding."""
+    return _unsymmetric_share(sample.state) > _NO_PARITY
+
+
 def _unsymmetric_share(state: BalanceState) -> float:
     """Share of mean and even harmonics in a motion."""
     x = state.x * state.balance.scales()[0]
@@ -312,4 +319,4 @@ def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
     return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
 
 
-__all__ = ["End", "comes_close", "end_ahead", "end_between", "rebased", "resonant_between"]
+__all__ = ["End", "comes_close", "end_ahead", "end_between", "is_lopsided", "rebased", "resonant_between"]

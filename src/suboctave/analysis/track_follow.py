@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from suboctave.analysis.subharmonic_part import keeps_subharmonics
 from suboctave.analysis.trace import Settings
 from suboctave.analysis.track_approach import points_before
 from suboctave.analysis.track_corners import beyond_corner
-from suboctave.analysis.track_ends import End, comes_close, end_ahead, end_between, rebased
+from suboctave.analysis.track_ends import End, comes_close, end_ahead, end_between, is_lopsided, rebased
 from suboctave.analysis.track_start import Box
 from suboctave.analysis.tracked_branch import TrackedPoint
 from suboctave.analysis.tracked_curve import LOOKED_AT, TrackedCurve
@@ -36,8 +38,9 @@ _NEAR_END = 1e-3
 _CORNERS = 5
 #: way before a corner, in scaled arclength, on which what turns there is not told from it
 _CORNER = 1e-5
-#: distance of the multipliers from the critical one at which a point is doubtful
-_DOUBTFUL = 0.05
+#: distance of the multipliers from the critical one at which a point is doubtful; points in succession at which it is,
+#: beside multipliers so large that it cannot be told, after which a curve ends
+_DOUBTFUL, _UNTOLD, _VIOLENT = 0.05, 3, 1e4
 
 
 @dataclass
@@ -75,6 +78,7 @@ class _Tracker:
         self.settings = settings
         self.box = box
         self.others = _other_bounds(start.curve, box)
+        self.lopsided = is_lopsided(TrackedSample(start))
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
         self.trace = TrackedTrace()
@@ -88,6 +92,8 @@ class _Tracker:
         #: how many points have known multipliers, and where none of these is the critical one
         self.looked = 0
         self.doubtful: list[str] = []
+        #: how many of the last of these in succession, with others that are large
+        self.untold = 0
         #: the first point, headed as the curve leaves it
         self.home: CurvePoint | None = None
 
@@ -178,6 +184,12 @@ class _Tracker:
         if self.previous is not None:
             # by now the choice of harmonics has asked for what it needs
             self._note_doubt(self.previous)
+            if self.untold >= _UNTOLD:
+                largest, where = np.abs(self.previous.evaluation.floquet.multipliers).max(), self.previous.curve.where
+                return (
+                    f"multipliers of up to {largest:.0e} at {where(self.previous.point.u)} leave the critical one untold: "
+                    "the motions are so unstable there that their bifurcations have no meaning"
+                )
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
             for watch in (self.hidden, self.pairs):
@@ -189,7 +201,7 @@ class _Tracker:
         if self.march.closed:
             new = self._closing(self.previous, new)
         a = self.previous
-        end = end_between(a, new, settings.newton)
+        end = end_between(a, new, settings.newton, self.lopsided)
         if end is not None:
             self._take_end(a, end)
             return end.reason
@@ -249,8 +261,11 @@ class _Tracker:
         known = "floquet" in evaluation.__dict__ or sample.curve.steps % LOOKED_AT == 0
         if known and evaluation.critical is not None:
             self.looked += 1
-            if evaluation.doubt > _DOUBTFUL:
+            doubtful = evaluation.doubt > _DOUBTFUL
+            if doubtful:
                 self.doubtful.append(sample.curve.where(sample.point.u))
+            violent = np.abs(evaluation.floquet.multipliers).max() > _VIOLENT
+            self.untold = self.untold + 1 if doubtful and violent else 0
 
     def _say_doubts(self) -> None:
         if self.doubtful:
