@@ -187,8 +187,8 @@ class _Tracker:
             if self.untold >= _UNTOLD:
                 largest, where = np.abs(self.previous.evaluation.floquet.multipliers).max(), self.previous.curve.where
                 return (
-                    f"multipliers of up to {largest:.0e} at {where(self.previous.point.u)} leave the critical one untold: "
-                    "the motions are so unstable there that their bifurcations have no meaning"
+                    f"multipliers of up to {largest:.0e} at {where(self.previous.point.u)} leave the critical one "
+                    "untold: the motions are so unstable there that their bifurcations have no meaning"
                 )
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
