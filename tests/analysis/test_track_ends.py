@@ -314,6 +314,8 @@ def test_a_curve_towards_heteroclinic_motions_ends_where_multipliers_tell_nothin
     # up to there they are those of response curves
     found = so.frequency_response(system.with_parameters({"a": 0.1}), (0.3, 1.6)).bifurcations["LP"]
     at = curve.parameter("a")
-    for i in np.flatnonzero((at[:-1] - 0.1) * (at[1:] - 0.1) < 0.0):
+    crossed = np.flatnonzero((at[:-1] - 0.1) * (at[1:] - 0.1) < 0.0)
+    assert len(crossed) > 0
+    for i in crossed:
         low, high = sorted(curve.omega[[i, i + 1]])
         assert any(low - 1e-4 < item.omega < high + 1e-4 for item in found)

@@ -65,10 +65,10 @@ def track(
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
-        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside. The parameters of an
-        extremum's curve keep their ranges, the one that is extreme with as much again on both sides.
+        Its range (from, to); or two ranges. A bifurcation on a bound counts as inside. Named parameters of an
+        extremum's curve keep their ranges, one that is extreme with as much again on both sides.
     omega
-        Range of omega, rad per unit time; default: not bounded, but where it keeps its range.
+        Range of omega, rad per unit time; default: not bounded.
     onto
         From a point of codimension two: the kind of the curve to follow. Default: that on which it was not found, the
         Neimark-Sacker points that begin in an R1 or R2 of a curve of LP or PD, the LP or PD through that of an NS.
@@ -150,7 +150,9 @@ def track(
         if bifurcation.kind in CURVES_THROUGH:
             start = aside(start, box, settings.newton)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
-    bounded = {name: r for name, r in zip((names[0], names[-1]), ranges, strict=True) if r is not None}
+    bounded = {
+        name: r for name, r in ((names[0], ranges[0]), (names[1], between), (names[-1], second)) if r is not None
+    }
     options = options_of(settings, wanted, bounded)
     context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
@@ -174,7 +176,7 @@ def _third(
     item: TrackedEvent, parameter: Any, bounds: Any, omega: Any
 ) -> tuple[tuple[str, ...], tuple[Range | None, Range | None], Range | None]:
     """The three parameters in which an extremum is followed, the ranges of the first and the last, checked, and that of
-    the one between. Those of the extremum's curve keep their ranges.
+    the one between: named ones of the extremum's curve keep theirs.
     """
     system = item.orbit.system
     if len(item.names) != 2:
@@ -198,13 +200,16 @@ def _third(
 
 
 def _kept(item: TrackedEvent, name: str) -> Range | None:
-    """The range that a parameter of an extremum's curve keeps; if it is extreme, with as much again on both sides."""
+    """The range that a parameter of an extremum's curve keeps; if it is extreme, with as much again on both sides.
+
+    None for omega, whose range is often no more than where bifurcations were looked for.
+    """
     given = dict((item.context or {}).get("bounds", {})).get(name)
-    if given is None:
+    if given is None or name == "omega":
         return None
     low, high = sorted(given)
     more = high - low if name == item.parameter_name else 0.0
-    return (max(low - more, 0.5 * low) if name == "omega" else low - more), high + more
+    return low - more, high + more
 
 
 def _free(

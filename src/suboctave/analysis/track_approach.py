@@ -31,8 +31,8 @@ def points_before(end: End, a: TrackedSample, newton: NewtonOptions) -> list[Tra
     last = end.event.sample.point.u[-2:]
     for _ in range(_APPROACHES):
         point, curve = a.point, a.curve
-        here = _left(curve, point.u)
-        rate = (_left(curve, point.u + _LITTLE * point.tangent) - here) / _LITTLE
+        here = _remaining(curve, point.u)
+        rate = (_remaining(curve, point.u + _LITTLE * point.tangent) - here) / _LITTLE
         slopes = point.tangent[-2:] * here
         # 2 c z^2 and 2 (c + 2 d z^2) z^2, but for the sign
         first, turned = 2.0 * (point.u[-2:] - last) * 2.0 * rate - slopes, slopes
@@ -45,14 +45,14 @@ def points_before(end: End, a: TrackedSample, newton: NewtonOptions) -> list[Tra
             b = TrackedSample(make_point(solved, curve, point.tangent, point.arclength + way))
         except ConvergenceError:
             break
-        if not abs(_left(curve, b.point.u)) < abs(here) or resonant_between(a, b) is not None:
+        if not abs(_remaining(curve, b.point.u)) < abs(here) or resonant_between(a, b) is not None:
             break
         found.append(b)
         a = b
     return found
 
 
-def _left(curve: TrackedCurve, u: Array) -> float:
+def _remaining(curve: TrackedCurve, u: Array) -> float:
     """What vanishes at the end of limit points of doubled motions, or of an NS curve."""
     if curve.augmentation.name == "LP":
         return doubled_size(curve, u)

@@ -116,8 +116,9 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions, lopsi
 
 
 def resonant_between(a: TrackedSample, b: TrackedSample) -> float | None:
-    """kappa in units of the base frequency at which an NS curve ends between two neighbours, None if it does not,
-    and of other curves."""
+    """kappa in units of the base frequency at which an NS curve ends between two neighbours; None if it goes on, or if
+    the curve is another one.
+    """
     augmentation = b.curve.augmentation.own
     if not isinstance(augmentation, SingularOperator) or augmentation.kind is not Kind.FREE:
         return None

@@ -228,7 +228,8 @@ def _in_modes(
     Where mass or stiffness is not symmetric, or the mass not positive definite, in DOFs weighted by the square roots of
     their masses.
     """
-    modes = _modes(mass.tobytes(), stiffness.tobytes(), len(mass))
+    given = (np.asarray(matrix, dtype=float).tobytes() for matrix in (mass, stiffness))
+    modes = _modes(*given, len(mass))
     if modes is not None:
         values, shape = modes
         return (
