@@ -1,4 +1,5 @@
-"""Every example runs from top to bottom, its assertion holds, and it draws its figure only when told where."""
+"""Every example runs from top to bottom, its assertion holds, what it computes lists the events that are recorded of
+it, and it draws its figure only when told where."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from event_tables import against_recorded, recording
 
 FOLDER = Path(__file__).parents[2] / "examples"
 SCRIPTS = sorted(FOLDER.glob("ex*.py"))
@@ -21,7 +23,9 @@ def test_example(script, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(script), "figure.png"])
-    runpy.run_path(str(script), run_name="__main__")
+    with recording() as tables:
+        runpy.run_path(str(script), run_name="__main__")
+    assert not against_recorded(script.stem, tables)
     assert [path.name for path in tmp_path.iterdir()] == ["figure.png"]
 
 

@@ -1,4 +1,5 @@
-"""Every figure of the gallery runs from top to bottom, its assertion holds, and it draws only when told where."""
+"""Every figure of the gallery runs from top to bottom, its assertion holds, what it computes lists the events that are
+recorded of it, and it draws only when told where."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from event_tables import against_recorded, recording
 
 FOLDER = Path(__file__).parents[2] / "examples" / "gallery"
 SCRIPTS = sorted(FOLDER.glob("fig*.py"))
@@ -34,7 +36,9 @@ def test_figure(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     several = "space.png]" in script.read_text()
     names = ["figure.png", "space.png"] if several else ["figure.png"]
-    run(script, names, monkeypatch)
+    with recording() as tables:
+        run(script, names, monkeypatch)
+    assert not against_recorded(script.stem, tables)
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
