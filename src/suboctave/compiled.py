@@ -217,12 +217,13 @@ def kernel(
 
     def decorate(function: _Function) -> _Function:
         result = njit(cache=True, **options)(function)
-        if isinstance(result, CPUDispatcher):
-            if at_once or options.get("fastmath"):
-                result.__class__ = _Kernel
-            else:
-                result.__class__ = _Patient
-                result.patience, result.alone = patience, alone
+        if not isinstance(result, CPUDispatcher):  # NUMBA_DISABLE_JIT
+            return np.errstate(all="ignore")(function)
+        if at_once or options.get("fastmath"):
+            result.__class__ = _Kernel
+        else:
+            result.__class__ = _Patient
+            result.patience, result.alone = patience, alone
         return result
 
     return decorate

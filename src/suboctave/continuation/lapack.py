@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import types
+from numba import config, types
+from scipy.linalg import lapack
 
 from suboctave.compiled import kernel
 from suboctave.continuation.kernels import determinant_sign, log_modulus
@@ -101,7 +102,16 @@ def solve_transposed(transposed, pivots, right):
             right[i], right[other] = right[other], right[i]
 
 
-if _getrf is None:
+def _factorise_interpreted(transposed, pivots):
+    """As `factorise`, outside of compiled code: there the function of LAPACK that Numba names does nothing at all."""
+    lu, pivots[:], state = lapack.dgetrf(transposed.T, overwrite_a=True)
+    transposed[:] = lu.T
+    return state != 0
+
+
+if config.DISABLE_JIT:
+    factorise = _factorise_interpreted
+elif _getrf is None:
     factorise = factorise_plainly
 
 

@@ -12,12 +12,11 @@ import numpy as np
 
 from suboctave.model.coupled import as_coupled
 from suboctave.model.element import Array
+from suboctave.timedomain.elementary import CALLBACK
 from suboctave.timedomain.lanes import asked_states
 from suboctave.timedomain.structure import PlacedLaw
 
 __all__ = ["Answers"]
-
-_KIND = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 class Answers:
@@ -38,7 +37,7 @@ class Answers:
             )
             for placed in laws
         ]
-        self._function = _KIND(self._answer)
+        self._function = CALLBACK(self._answer)
         self.address = ctypes.cast(self._function, ctypes.c_void_p).value or 0 if laws else 0
 
     def _answer(self, which: int, lanes: int, address: int) -> None:

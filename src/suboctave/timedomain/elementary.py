@@ -11,14 +11,29 @@ In double precision both are right to about two units in the last place of the l
 
 from __future__ import annotations
 
+import ctypes
 import math
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import config, njit, types
 from numba.extending import intrinsic
 
-__all__ = ["absolute", "arctan_log", "call_back", "heaviside", "maximum", "sign", "sine_cosine"]
+__all__ = [
+    "CALLBACK", "absolute", "arccos", "arcsin", "arctan", "arctan_log", "call_back", "cos", "cosh", "exp", "heaviside",
+    "log", "maximum", "sign", "sin", "sine_cosine", "sinh", "sqrt", "tan", "tanh",
+]  # fmt: skip
+
+#: interpreted, the functions of `math` would raise where compiled ones give inf or nan
+_functions: Any = np if config.DISABLE_JIT else math
+sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, exp, log, sqrt = (
+    getattr(_functions, name)
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
+)
+
+#: the C function behind `call_back`: number of the law, trajectories, address of the block
+CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 ARCTAN = (
     1.0,
@@ -112,6 +127,18 @@ def call_back(typing_context: Any, address: Any, law: Any, lanes: Any, values: A
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64, values), generate
+
+
+if config.DISABLE_JIT:  # what intrinsics are to interpreted code
+
+    def _bits(x):
+        return int(np.float64(x).view(np.int64))
+
+    def _from_bits(bits):
+        return np.int64(bits).view(np.float64)
+
+    def call_back(address, law, lanes, values):
+        CALLBACK(address)(law, lanes, values.ctypes.data)
 
 
 @njit(inline="always")

@@ -10,13 +10,13 @@ __all__ = ["HEADER", "MOST_UNROLLED", "Lanes", "Rows", "add_asked", "asked_state
 
 HEADER = '''"""Generated: do not edit."""
 
-from math import acos as arccos, asin as arcsin, atan as arctan
-from math import cos, cosh, exp, log, pi, sin, sinh, sqrt, tan, tanh
+from math import pi
 
 import numpy as np
 from numba import njit
 
-from suboctave.timedomain.elementary import absolute, arctan_log, call_back, heaviside, maximum, sign, sine_cosine
+from suboctave.timedomain.elementary import absolute, arccos, arcsin, arctan, arctan_log, call_back, cos, cosh, exp
+from suboctave.timedomain.elementary import heaviside, log, maximum, sign, sin, sine_cosine, sinh, sqrt, tan, tanh
 '''
 #: products of matrices of this many rows or fewer are written out
 MOST_UNROLLED = 4
