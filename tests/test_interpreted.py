@@ -15,7 +15,7 @@ import suboctave as so
 
 
 def results() -> dict[str, list]:
-    """Numbers from every kind of kernel: curves, a tracked curve, two DOFs, trajectories of laws with and without code."""
+    """Numbers of every kind: bifurcations of one and two DOFs, a tracked curve, trajectories with and without code."""
     stops = so.library.reference_oscillator()
     doubling = so.frequency_response(stops, (0.63, 0.66), harmonics=5)
     fold = so.frequency_response(stops, (0.75, 0.79), harmonics=3)
