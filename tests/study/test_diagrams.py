@@ -72,6 +72,20 @@ analyses = ["diagram"]
 labels = ["computed"]
 quantity = "velocity"
 [[outputs.figures]]
+file = "mean.svg"
+analyses = ["diagram"]
+harmonic = 0
+[[outputs.figures]]
+file = "half.svg"
+analyses = ["diagram"]
+quantity = "harmonic"
+harmonic = 0.5
+[[outputs.figures]]
+file = "quarter.svg"
+analyses = ["diagram"]
+quantity = "harmonic"
+harmonic = "1/4"
+[[outputs.figures]]
 kind = "phase"
 file = "portrait.png"
 motions = [{ analysis = "diagram", label = "4T", bifurcation = "PD" }, { analysis = "diagram", branch = 1 }]
@@ -114,6 +128,13 @@ def ran(by_script, tmp_path_factory):
     path = tmp_path_factory.mktemp("cascade") / "study.toml"
     path.write_text(SYSTEM + DIAGRAM + LATER + MORE + OUTPUTS, encoding="utf-8")
     return run_study(read_study(path)), path.parent / "study_results"
+
+
+@pytest.mark.parametrize(("name", "harmonic"), [("mean", 0), ("half", 0.5), ("quarter", 0.25)])
+def test_components_are_drawn_as_by_a_script(ran, tmp_path, name, harmonic):
+    folder = ran[1]
+    so.plot(so.load(folder / "results.nc")["diagram"], tmp_path / "figure.svg", harmonic=harmonic)
+    assert (folder / f"{name}.svg").read_bytes() == (tmp_path / "figure.svg").read_bytes()
 
 
 def test_a_study_gives_what_a_script_gives_bit_for_bit(ran, by_script):
@@ -166,7 +187,7 @@ side = -1
 def test_what_is_written(ran):
     outcome, folder = ran
     tables = {f"{name}{part}.csv" for name in ("diagram", "other end", "along p") for part in ("", "_bifurcations")}
-    figures = {"tree.png", "named.svg", "portrait.png"}
+    figures = {"tree.png", "named.svg", "mean.svg", "half.svg", "quarter.svg", "portrait.png"}
     names = {"results.nc", "report.html", "witness.csv", "multipliers.csv"} | tables | figures
     assert {p.name for p in folder.iterdir()} == {p.name for p in outcome.files} == names
     assert "computed, 4T" in (folder / "named.svg").read_text()

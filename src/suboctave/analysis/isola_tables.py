@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.analysis.junction import period_name
+from suboctave.analysis.readings import shared
 from suboctave.errors import InputError, suggest
 from suboctave.store.isolas import isolas_dataset
 
@@ -106,13 +107,16 @@ def isolas_datasets(isolas: Isolas, readings: Iterable[str] | bool = False) -> d
     """See `Isolas.to_xarray`."""
     found = {"isolas": head_dataset(isolas)}
     words = {"LP": "limit points", "PD": "period doublings"}
+    named: dict[str, tuple[Any, dict[str, Any]]] = {}
     for number, curve in enumerate(_curves(isolas)):
-        found[f"{number}: {words[curve.kind]} of {period_name(curve.nu)}"] = curve.to_xarray(readings)
+        named[f"{number}: {words[curve.kind]} of {period_name(curve.nu)}"] = (curve, {})
     for number, isola in enumerate(isolas):
         which = f"isola {number}" if len(isolas) > 1 else "isola"
         for value, branch in isola.known.items():
-            told = f"{which} at {isolas.parameter} = {value:.6g}"
-            found[told] = branch.to_xarray(readings).assign_attrs(isola=number, at=value)
+            named[f"{which} at {isolas.parameter} = {value:.6g}"] = (branch, {"isola": number, "at": value})
+    chosen = shared(readings, [branch.nu for branch, _ in named.values()])
+    for (name, (branch, attributes)), names in zip(named.items(), chosen, strict=True):
+        found[name] = branch.to_xarray(names).assign_attrs(attributes)
     return found
 
 
@@ -143,5 +147,9 @@ def isola_datasets(isola: Isola, values: Sequence[float], readings: Iterable[str
     attributes |= {"omega_low": isola.omega[0], "omega_high": isola.omega[1]}
     closed = [(0, value) for value in values]
     head = isolas_dataset([isola_row(isola)], [edges_of(isola)], closed, attributes)
-    curves = [curve.to_xarray(readings) for curve in (isola.limit_points, *isola.further)]
-    return [head, *curves, *(isola.at(value).to_xarray(readings).assign_attrs(isola=0, at=value) for value in values)]
+    curves = [isola.limit_points, *isola.further, *(isola.at(value) for value in values)]
+    attributes_of: list[dict[str, Any]] = [{} for _ in range(len(curves) - len(values))]
+    attributes_of += [{"isola": 0, "at": value} for value in values]
+    chosen = shared(readings, [curve.nu for curve in curves])
+    datasets = (curve.to_xarray(names) for curve, names in zip(curves, chosen, strict=True))
+    return [head, *(data.assign_attrs(more) for data, more in zip(datasets, attributes_of, strict=True))]

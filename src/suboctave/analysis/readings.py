@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +22,12 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
+from suboctave.store.layout import check_component, has_component, reading_name
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["READINGS", "BranchReadings", "Reading", "read_reading", "with_readings"]
+__all__ = ["READINGS", "BranchReadings", "Reading", "read_reading", "shared", "with_readings"]
 
 
 class BranchReadings:
@@ -128,8 +130,8 @@ class BranchReadings:
     def reading(self, name: str) -> Array:
         """A read-off by the name under which `to_xarray` and `to_dataframe` store it, such as "velocity_rms".
 
-        With a number where it needs one: "harmonic_3", "phase_1", "peak_force_0" (element 0), and of another DOF than
-        the observed one with the ending "_dof2".
+        With a number where it needs one: "harmonic_3", "harmonic_1/2", "peak_force_0" (element 0), and of another DOF
+        than the observed one with the ending "_dof2".
         """
         return _on_points(self, read_reading(name))
 
@@ -159,8 +161,11 @@ class Reading:
     @property
     def name(self) -> str:
         """The name that it is stored under."""
-        number = "" if self.number is None else f"_{self.number:g}"
-        return f"{self.what}{number}" + ("" if self.dof is None else f"_dof{self.dof}")
+        return reading_name(self.what, self.number, self.dof)
+
+    def fits(self, nu: int) -> bool:
+        """Whether motions of nu load periods have it: not a component between the multiples of omega/nu."""
+        return READINGS[self.what].numbered != "harmonic" or has_component(self.number or 0.0, nu)
 
     def of(self, orbits: Sequence[PeriodicOrbit], observe: int) -> Array:
         """Its values, shape (len(orbits),)."""
@@ -251,7 +256,7 @@ READINGS: Mapping[str, _Kind] = {
 _OF_A_DOF = ("rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
 _OF_A_GAP = ("contact_share", "impacts")
 _OF_AN_ELEMENT = ("peak_force", *_OF_A_GAP)
-_NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+)?))?(?:_dof(?P<dof>\d+))?")
+_NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+|/0*[1-9]\d*)?))?(?:_dof(?P<dof>\d+))?")
 
 
 def read_reading(name: str) -> Reading:
@@ -269,10 +274,24 @@ def read_reading(name: str) -> Reading:
         raise InputError(f"the reading {what!r} is not one of a degree of freedom: write it without _dof{match['dof']}")
     if what == "amplitude" and match["dof"] is None:
         raise InputError("the amplitude of the observed DOF is there anyway; of another one it is 'amplitude_dof1'")
-    number = None if match["number"] is None else float(match["number"])
+    number = None if match["number"] is None else float(Fraction(match["number"]))
     if kind.numbered == "element" and number is not None and number % 1.0:
         raise InputError(f"the reading {name!r} needs the index of an element, a whole number")
     return Reading(what, None if match["dof"] is None else int(match["dof"]), number)
+
+
+def shared(names: Iterable[str] | bool, periods: Sequence[int]) -> list[list[str] | bool]:
+    """The names of read-offs for each of several branches, whose motions have these periods nu.
+
+    A component such as `harmonic_0.5` is one of those branches only whose motions have it; InputError if none has.
+    """
+    if isinstance(names, bool):
+        return [names for _ in periods]
+    chosen = {name: read_reading(name) for name in ([names] if isinstance(names, str) else names)}
+    for reading in chosen.values():
+        if READINGS[reading.what].numbered == "harmonic":
+            check_component(reading.number or 0.0, periods)
+    return [[name for name, reading in chosen.items() if reading.fits(nu)] for nu in periods]
 
 
 def with_readings(

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
 from suboctave.harmonic import instants
-from suboctave.harmonic.basis import Array, ComplexArray, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_complex
 from suboctave.harmonic.orbit import PeriodicOrbit
 
 __all__ = ["ground_and_load", "largest", "of_harmonic", "translation"]
@@ -54,10 +54,8 @@ def ground_and_load(orbit: PeriodicOrbit, r: Array) -> tuple[ComplexArray, Compl
 
 def of_harmonic(amplitudes: ComplexArray, k: float, nu: int) -> float:
     """Amplitude at `k omega` of a force or motion with these complex amplitudes; 0 beyond them."""
-    index = k * nu
-    if index < 0 or abs(index - round(index)) > 1e-9:
-        raise InputError(f"k={k:g} is no harmonic of a motion of {nu} load periods: k * {nu} must be whole")
-    return float(abs(amplitudes[round(index)])) if round(index) < len(amplitudes) else 0.0
+    index = harmonic_index(k, nu)
+    return float(abs(amplitudes[index])) if index < len(amplitudes) else 0.0
 
 
 def largest(amplitudes: ComplexArray) -> float:

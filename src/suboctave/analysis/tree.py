@@ -12,6 +12,7 @@ import numpy as np
 
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.junction import period_name
+from suboctave.analysis.readings import shared
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import InputError, suggest
 
@@ -176,8 +177,12 @@ class BifurcationDiagram:
         return list(dict.fromkeys(item.kind for item in met))
 
     def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
-        """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has."""
-        return self._joined([node.branch.to_dataframe(readings) for node in self])
+        """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has.
+
+        A read-off such as "harmonic_0.5" is nan on branches whose motions have no such component.
+        """
+        chosen = shared(readings, [node.branch.nu for node in self])
+        return self._joined([node.branch.to_dataframe(names) for node, names in zip(self, chosen, strict=True)])
 
     def bifurcations_frame(self) -> pandas.DataFrame:
         """One row per bifurcation: the number, period and depth of its branch, kind, place, amplitude."""
@@ -201,8 +206,16 @@ class BifurcationDiagram:
         return write_csv(frames[what](), path, overwrite)
 
     def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
-        """The datasets of all branches (`Branch.to_xarray`) by number and label: "1: 2T, PD 3.99 to PD 2.30"."""
-        return {f"{node.number}: {node.label}": node.branch.to_xarray(readings) for node in self if len(node.branch)}
+        """The datasets of all branches (`Branch.to_xarray`) by number and label: "1: 2T, PD 3.99 to PD 2.30".
+
+        A read-off such as "harmonic_0.5" is left out of branches whose motions have no such component.
+        """
+        nodes = [node for node in self if len(node.branch)]
+        chosen = shared(readings, [node.branch.nu for node in nodes])
+        return {
+            f"{node.number}: {node.label}": node.branch.to_xarray(names)
+            for node, names in zip(nodes, chosen, strict=True)
+        }
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """All of it as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).

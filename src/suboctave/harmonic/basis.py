@@ -15,6 +15,7 @@ the equations are fewer, those of the harmonics that are kept.
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -28,6 +29,22 @@ from suboctave.errors import InputError
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+
+def harmonic_index(k: float, nu: int) -> int:
+    """Which multiple of `omega / nu` the frequency `k omega` is, for motions of nu load periods.
+
+    Raises
+    ------
+    InputError
+        If it is none of them, with the nearest that is.
+    """
+    index = k * nu
+    if math.isfinite(index) and index > -1e-9 and abs(index - round(index)) <= 1e-9:
+        return round(index)
+    of, has = ("T", "whole multiples of omega") if nu == 1 else (f"{nu}T", f"multiples of omega/{nu}")
+    near = f": did you mean {max(round(index), 0)}/{nu}?" if nu > 1 and math.isfinite(index) else ""
+    raise InputError(f"k={k:g} is no harmonic of a motion of period {of}, which has {has}{near}")
 
 
 @dataclass(frozen=True, repr=False)

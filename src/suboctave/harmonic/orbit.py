@@ -12,7 +12,7 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.harmonic import instants
 from suboctave.harmonic.balance import HarmonicBalance
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex
 from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.system import System
@@ -124,12 +124,8 @@ class PeriodicOrbit:
         InputError
             If `k nu` is not a whole number, or dof is out of range.
         """
-        index = k * self.basis.nu
-        if abs(index - round(index)) > 1e-9 or index < 0:
-            raise InputError(
-                f"k={k:g} is no harmonic of a motion of {self.basis.nu} load periods: k * {self.basis.nu} must be whole"
-            )
-        amplitudes, at = self._along(dof), round(index)
+        at = harmonic_index(k, self.basis.nu)
+        amplitudes = self._along(dof)
         return complex(amplitudes[at]) if at <= self.basis.harmonics else 0.0 + 0.0j
 
     def amplitude(self, dof: int = 0) -> float:

@@ -60,7 +60,8 @@ def plot(
         "harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force", "transmissibility". A
         dataset must have it: `to_xarray(readings=...)`.
     harmonic, element, dof
-        Of which harmonic (alone: its amplitude), of which element, of which degree of freedom.
+        Of which harmonic (alone: its amplitude), of which element, of which degree of freedom. Harmonics are multiples
+        of omega: 0 is the mean, 0.5 a component of motions of two load periods, which is zero for those of one.
     x
         The horizontal axis: "omega" or a parameter; default what the curves were followed in.
     y
@@ -118,7 +119,9 @@ def plot(
 
 def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
     """The datasets of what `plot` takes, with the quantity that is drawn."""
-    return [dataset for item in _several(curves) for dataset in _datasets(item, view)]
+    datasets = [dataset for item in _several(curves) for dataset in _datasets(item, view)]
+    drawn = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
+    return [dataset if is_isolas(dataset) else next(drawn) for dataset in datasets]
 
 
 def _several(curves: Any) -> list[Any]:
@@ -138,5 +141,5 @@ def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
         return [item]
     if not hasattr(item, "to_xarray"):
         raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {type(item).__name__}")
-    found = item.to_xarray() if view.variable == "amplitude" else item.to_xarray(readings=[view.variable])
+    found = item.to_xarray(readings=view.readings(getattr(item, "nu", 0)))
     return list(found.values()) if isinstance(found, dict) else [found]

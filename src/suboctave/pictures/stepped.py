@@ -12,7 +12,7 @@ from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.in_time import _POINTING, _check, _colour, _dof, _finish, _frame, _name
 from suboctave.pictures.response import draw_response, dress
-from suboctave.pictures.view import View
+from suboctave.pictures.view import View, as_multiple, shown_multiple
 
 if TYPE_CHECKING:
     import xarray
@@ -56,6 +56,7 @@ def plot_stepped_sine(
 
     _check(test, "stepped sine")
     dof = _dof(test, dof)
+    harmonic = as_multiple(harmonic)
     data = _several(measured, harmonic)
     limits = View(xlim=xlim, ylim=ylim)
     values = _component(test, harmonic, dof)
@@ -84,7 +85,7 @@ def plot_stepped_sine(
         legend[one.label.replace("$", r"\$")] = axes.plot(
             one.omega, one.amplitude, "+", color=colour, markersize=5.0 * look.marker, zorder=4.2, gid="measured"
         )[0]
-    symbol = f"X_{{{harmonic:g}}}" if test.attrs["dofs"] == 1 else f"X_{{{harmonic:g}}}^{{({dof})}}"
+    symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
     dress(axes, r"$\omega$", f"$|{symbol}|$", look)
     every = np.concatenate([omega, *(one.omega for one in data)])
     spread = np.ptp(every) or abs(every[0])

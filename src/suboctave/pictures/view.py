@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from suboctave.errors import InputError, suggest
-from suboctave.store.layout import coordinate
+from suboctave.pictures.periods import period_of
+from suboctave.store.layout import check_component, coordinate, has_component, reading_name
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["QUANTITIES", "View", "check_units"]
+__all__ = ["QUANTITIES", "View", "as_multiple", "check_units", "shown_multiple"]
 
 # What the axis says, with {x} the observed displacement, {k} the harmonic, {e} the element.
 QUANTITIES = {
@@ -25,7 +27,7 @@ QUANTITIES = {
     "velocity_rms": r"RMS of $\dot{{{x}}}$",
     "acceleration": r"acceleration $\max\,|\ddot{{{x}}}|$",
     "acceleration_rms": r"RMS of $\ddot{{{x}}}$",
-    "harmonic": r"harmonic {k} of ${x}$",
+    "harmonic": r"harmonic {k} of ${x}$",  # of harmonic 0 see _MEAN
     "phase": r"phase of harmonic {k} of ${x}$",
     "peak_force": r"peak force, element {e}",
     "contact_share": r"share of period in contact, element {e}",
@@ -33,6 +35,7 @@ QUANTITIES = {
     "transmitted_force": "peak force on the ground",
     "transmissibility": "transmissibility",
 }
+_MEAN = r"mean of ${x}$, in modulus"
 _FREQUENCIES = ("rad/s", "Hz")
 _NUMBERED = {"harmonic": "harmonic", "phase": "harmonic"} | dict.fromkeys(
     ("peak_force", "contact_share", "impacts"), "element"
@@ -49,7 +52,8 @@ class View:
     quantity
         What is drawn upwards: "amplitude", or a reading such as "rms", "velocity", "harmonic", "phase", "peak_force".
     harmonic, element, dof
-        Of which harmonic (default 1), of which element, of which degree of freedom (default: the observed one).
+        Of which multiple of omega (default 1; 0 is the mean, 0.5 a component of motions of two load periods), of which
+        element, of which degree of freedom (default: the observed one).
     frequency
         "rad/s" or "Hz" (where time is in seconds); None leaves omega without a unit.
     omega_reference
@@ -86,6 +90,8 @@ class View:
         for name, given in (("harmonic", self.harmonic), ("element", self.element)):
             if given is not None and needs != name:
                 raise InputError(f"{name}={given!r} says nothing about the quantity {self.quantity!r}; leave it out")
+        if self.harmonic is not None:
+            object.__setattr__(self, "harmonic", as_multiple(self.harmonic))
         if needs == "element" and (isinstance(self.element, bool) or not isinstance(self.element, int | np.integer)):
             raise InputError(f"the quantity {self.quantity!r} is one of an element: give element=, its index")
         if self.dof is not None and self.quantity not in _OF_A_DOF:
@@ -101,8 +107,41 @@ class View:
     def variable(self) -> str:
         """The variable of the dataset that is drawn: the name of a reading."""
         needs = _NUMBERED.get(self.quantity)
-        number = "" if needs is None else f"_{(self.element if needs == 'element' else self.harmonic or 1):g}"
-        return f"{self.quantity}{number}" + ("" if self.dof is None else f"_dof{self.dof}")
+        number = {None: None, "element": self.element, "harmonic": self.multiple}[needs]
+        return reading_name(self.quantity, number, self.dof)
+
+    @property
+    def multiple(self) -> float:
+        """The harmonic that is drawn where one is."""
+        return 1.0 if self.harmonic is None else self.harmonic
+
+    def readings(self, nu: int) -> list[str]:
+        """The read-offs to lay out of motions of nu load periods so that they can be drawn."""
+        return [] if self.variable == "amplitude" or not self._has_component(nu) else [self.variable]
+
+    def _has_component(self, nu: int) -> bool:
+        return _NUMBERED.get(self.quantity) != "harmonic" or has_component(self.multiple, nu)
+
+    def completed(self, datasets: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
+        """The datasets with the component that is drawn, also where motions have none at that frequency.
+
+        It is zero there, and its phase nan. InputError where none of the motions has it.
+        """
+        periods = [period_of(dataset) for dataset in datasets]
+        if _NUMBERED.get(self.quantity) == "harmonic":
+            check_component(self.multiple, periods)
+        nothing = math.nan if self.quantity == "phase" else 0.0
+        return [
+            dataset
+            if self._has_component(nu)
+            else dataset.assign(
+                {
+                    f"{prefix}{self.variable}": (of, np.full(dataset.sizes[of], nothing))
+                    for prefix, of in (("", "point"), ("event_", "event"))
+                }
+            )
+            for dataset, nu in zip(datasets, periods, strict=True)
+        ]
 
     def check(self, dataset: xarray.Dataset) -> None:
         """Raises InputError where the dataset does not have what is drawn."""
@@ -152,8 +191,8 @@ class View:
             across = r"forcing frequency $\omega$" + (" (rad/s)" if self.frequency else "")
         dofs = observed(curves or (dataset,)) if self.dof is None else [self.dof]
         x = "x_i" if len(dofs) > 1 else "x" if int(dataset.attrs.get("dofs", 1)) == 1 else f"x_{{{dofs[0]}}}"
-        says = QUANTITIES[self.quantity]
-        upwards = says.format(x=x, k=f"{self.harmonic or 1:g}", e=self.element)
+        says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else QUANTITIES[self.quantity]
+        upwards = says.format(x=x, k=shown_multiple(self.multiple), e=self.element)
         if len(dofs) > 1 and "{x}" in says:
             upwards += f", $i$ = {', '.join(map(str, dofs))}"
         unit = "°" if self.quantity == "phase" and self.scale is None and self.unit is None else self.unit
@@ -165,6 +204,26 @@ class View:
 def observed(curves: Sequence[xarray.Dataset]) -> list[int]:
     """The degrees of freedom that curves observe, each once, in the order of the curves."""
     return list(dict.fromkeys(int(dataset.attrs.get("observed_dof", 0)) for dataset in curves))
+
+
+def as_multiple(given: Any) -> float:
+    """The multiple of omega that a harmonic is: a number, or a text such as "1/3"."""
+    try:
+        multiple = float(Fraction(given) if isinstance(given, str) else given)
+    except (TypeError, ValueError, ZeroDivisionError, OverflowError):
+        multiple = math.nan
+    if isinstance(given, bool) or not 0.0 <= multiple < math.inf:
+        raise InputError(
+            f"harmonic={given!r} is no multiple of omega: 0 (the mean), 1, 2, ..., or a fraction such as 0.5 of "
+            "motions of two load periods"
+        )
+    return multiple
+
+
+def shown_multiple(multiple: float) -> str:
+    """A multiple of omega as text: 3, 1/2, 1/3."""
+    fraction = Fraction(multiple).limit_denominator(999)
+    return str(fraction) if abs(fraction - Fraction(multiple)) <= 1e-9 else f"{multiple:g}"
 
 
 def _check_limits(name: str, limits: Any) -> None:

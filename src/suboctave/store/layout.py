@@ -40,7 +40,18 @@ if TYPE_CHECKING:
     from suboctave.harmonic.orbit import PeriodicOrbit
     from suboctave.model.system import System
 
-__all__ = ["LAYOUT", "EventRow", "branch_dataset", "check_layout", "coordinate", "curve_dataset", "events_met"]
+__all__ = [
+    "LAYOUT",
+    "EventRow",
+    "branch_dataset",
+    "check_component",
+    "check_layout",
+    "coordinate",
+    "curve_dataset",
+    "events_met",
+    "has_component",
+    "reading_name",
+]
 
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
 RESERVED = frozenset(
@@ -227,6 +238,30 @@ def _with_tracked(dataset: xarray.Dataset, branch: BranchLike, rows: Sequence[Ev
         coefficient=("point", np.asarray(getattr(branch, "coefficient", np.empty(0)), dtype=float), meaning),
         event_extreme=("event", np.array([row.extreme for row in rows], dtype=object)),
     )
+
+
+def reading_name(what: str, number: float | None = None, dof: int | None = None) -> str:
+    """The name that a read-off is stored under: "velocity", "harmonic_3", "harmonic_0.5", "peak_force_0_dof1".
+
+    `number` is exact in it: 1/3 is 0.3333333333333333.
+    """
+    if number is not None:
+        short = f"{number:g}"
+        what += f"_{short if float(short) == number else repr(float(number))}"
+    return what if dof is None else f"{what}_dof{dof}"
+
+
+def has_component(k: float, nu: int) -> bool:
+    """Whether motions of nu load periods have a component at `k omega`."""
+    return abs(k * nu - round(k * nu)) <= 1e-9
+
+
+def check_component(k: float, periods: Sequence[int]) -> None:
+    """Raises InputError, with the nearest one, where motions of none of these periods have a component at `k omega`."""
+    if periods and not any(has_component(k, nu) for nu in periods):
+        from suboctave.harmonic.basis import harmonic_index
+
+        harmonic_index(k, max(periods))
 
 
 def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from suboctave.analysis import BifurcationDiagram, Branch, Isolas
 from suboctave.analysis.contacts import check_element, gapped_elements
@@ -17,7 +17,9 @@ from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_response, plot_space
+from suboctave.pictures.regions import is_isolas
 from suboctave.pictures.style import size_in_inches
+from suboctave.pictures.view import as_multiple
 from suboctave.study.steps.base import Complaint
 
 __all__ = ["CURVE_FIGURES", "BoundaryFigure", "CurveFigure", "FigureSection", "SpaceFigure", "drawable"]
@@ -40,7 +42,7 @@ class CurveFigure(BaseModel):
     title: str | None = None
     size: Any = (6.4, 4.2)
     quantity: str = "amplitude"
-    harmonic: int | None = Field(default=None, ge=0)
+    harmonic: float | None = None
     element: int | None = None
     dof: int | None = None
     frequency: str | None = None
@@ -50,10 +52,18 @@ class CurveFigure(BaseModel):
     xlabel: str | None = None
     ylabel: str | None = None
 
+    @field_validator("harmonic", mode="before")
+    @classmethod
+    def _multiple(cls, given: Any) -> Any:
+        """A number, or a fraction as text: "1/3"."""
+        return None if given is None else as_multiple(given)
+
     @property
     def view(self) -> View:
         """Quantity and units; InputError where they do not go together."""
         given: dict[str, Any] = {name: getattr(self, name, None) for name in _VIEW}
+        if self.harmonic is not None and "quantity" not in self.model_fields_set:  # as `suboctave.plot`
+            given["quantity"] = "harmonic"
         return View(**given)
 
     @property
@@ -110,7 +120,6 @@ class CurveFigure(BaseModel):
         if not there:
             return False
         view = self.view
-        readings = [] if view.variable == "amplitude" else [view.variable]
         labels: Sequence[str] | None = None
         alone = results[there[0]] if len(there) == 1 else None
         given: list[str] | None = getattr(self, "labels", None)
@@ -121,17 +130,18 @@ class CurveFigure(BaseModel):
             labels = alone.legend
         if isinstance(alone, BifurcationDiagram) and view.marks is None:
             view = replace(view, marks=alone.marks)
-        datasets = [dataset for name in there for dataset in self.datasets(results[name], readings)]
+        datasets = [dataset for name in there for dataset in self.datasets(results[name], view)]
         if not datasets:
             return False
-        self.drawing(datasets, path, labels, view)
+        drawn = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
+        self.drawing([data if is_isolas(data) else next(drawn) for data in datasets], path, labels, view)
         return True
 
-    def datasets(self, item: Result, readings: Sequence[str]) -> list[Any]:
+    def datasets(self, item: Result, view: View) -> list[Any]:
         """What of a result is drawn."""
         if isinstance(item, Isolas):
-            return self.of_isolas(item.to_xarray(readings=readings))
-        return [branch.to_xarray(readings=readings) for branch in _branches_of(item)]
+            return self.of_isolas(item.to_xarray(readings=view.readings(0)))
+        return [branch.to_xarray(readings=view.readings(branch.nu)) for branch in _branches_of(item)]
 
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
         """What of isolas is drawn: everything."""
@@ -220,7 +230,7 @@ class BoundaryFigure(CurveFigure):
     @property
     def projected(self) -> bool:
         """Whether a quantity is drawn upwards."""
-        return "quantity" in self.model_fields_set
+        return "quantity" in self.model_fields_set or self.harmonic is not None
 
     def drawn(self, names: Drawable) -> list[str]:
         """The analyses that it shows: all curves of bifurcations, unless told."""
