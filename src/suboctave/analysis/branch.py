@@ -20,6 +20,7 @@ from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
 from suboctave.stability import FloquetResult
+from suboctave.store.columns import parameter_column
 
 if TYPE_CHECKING:
     import pandas
@@ -205,17 +206,27 @@ class Branch(BranchReadings):
         return with_readings(branch_dataset(self), self, events_met(self), readings)
 
     def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
-        """One row per point: parameters, amplitude, stability, leading multiplier, errors; read-offs on request.
+        """One row per point: free parameters, amplitude, stability, leading multiplier, errors; read-offs on request.
 
-        `readings` as in `to_xarray`.
+        `readings` as in `to_xarray`. A parameter that bears the name of another column is in "parameter.NAME".
         """
         import pandas as pd
 
-        leading = self.multipliers[:, 0]
+        own = self._columns(readings)
+        taken = ("omega", *own)
         table: dict[str, Any] = {"omega": self.omega}
-        if self.name != "omega":
-            table[self.name] = self.parameter(self.name)
-        table |= {
+        table |= {parameter_column(name, taken): self.parameter(name) for name in self._free if name != "omega"}
+        return pd.DataFrame(table | own)
+
+    @property
+    def _free(self) -> tuple[str, ...]:
+        """The parameters that it was followed in."""
+        return (self.name,)
+
+    def _columns(self, readings: Iterable[str] | bool) -> dict[str, Any]:
+        """The columns of `to_dataframe` but omega and the free parameters."""
+        leading = self.multipliers[:, 0]
+        return {
             "amplitude": self.amplitude,
             "stable": self.stable,
             "multiplier_real": leading.real,
@@ -224,8 +235,8 @@ class Branch(BranchReadings):
             "harmonics": self.harmonics,
             "truncation": self.truncation,
             "residual": [p.orbit.residual for p in self.points],
+            **columns(self, readings),
         }
-        return pd.DataFrame(table | columns(self, readings))
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
@@ -249,15 +260,21 @@ class Branch(BranchReadings):
         return write_csv(frames[what](), path, overwrite)
 
     def bifurcations_frame(self) -> pandas.DataFrame:
-        """One row per bifurcation, grazing and event, in the order met: place, parameters, multiplier, errors."""
+        """One row per bifurcation, grazing and event, in the order met: place, parameters, multiplier, errors.
+
+        A parameter that bears the name of another column is in "parameter.NAME".
+        """
         import pandas as pd
 
+        own = ["kind", "omega", "amplitude", "multiplier_real", "multiplier_imag"]
+        own += ["criticality", "residual", "uncertainty", "arclength", "remark"]
+        names = {name: parameter_column(name, own) for name in self.system.parameters}
         rows = []
         for item in sorted([*self.bifurcations.met, *self.events.met], key=lambda b: b.arclength):
             mu = item.critical_multiplier()
             rows.append(
                 {
-                    **item.parameters,
+                    **{names[name]: value for name, value in item.parameters.items() if name in names},
                     "kind": item.kind,
                     "omega": item.omega,
                     "amplitude": item.amplitude,
@@ -270,9 +287,7 @@ class Branch(BranchReadings):
                     "remark": item.remark(),
                 }
             )
-        names = ["kind", "omega", *self.system.parameters, "amplitude", "multiplier_real", "multiplier_imag"]
-        names += ["criticality", "residual", "uncertainty", "arclength", "remark"]
-        return pd.DataFrame(rows, columns=list(dict.fromkeys(names)))  # a parameter may bear one of these names
+        return pd.DataFrame(rows, columns=[*own[:2], *names.values(), *own[2:]])
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given.

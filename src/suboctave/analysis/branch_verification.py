@@ -26,6 +26,7 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.stability import FloquetResult
+from suboctave.store.columns import parameter_column
 
 if TYPE_CHECKING:
     import pandas
@@ -169,14 +170,16 @@ class BranchVerification(TimeResult):
         import pandas as pd
 
         names = ("index", "omega", "amplitude", "distance", "multiplier_error", "stable", "computed", "outcome")
+        more = ("multiplier_real", "multiplier_imag", "margin", "reason")
         rows = []
-        free = {} if self.branch.name == "omega" else {self.branch.name: self.branch.parameter(self.branch.name)}
+        name = self.branch.name
+        free = {} if name == "omega" else {parameter_column(name, (*names, *more)): self.branch.parameter(name)}
         for point in self.points:
             leading = point.multipliers[0] if len(point.multipliers) else complex("nan")
             row = {name: getattr(point, name) for name in names} | {n: v[point.index] for n, v in free.items()}
             rows.append(row | {"multiplier_real": leading.real, "multiplier_imag": leading.imag, "margin": point.margin,
                                "reason": point.reason})  # fmt: skip
-        columns = [*names[:2], *free, *names[2:], "multiplier_real", "multiplier_imag", "margin", "reason"]
+        columns = [*names[:2], *free, *names[2:], *more]
         return pd.DataFrame(rows, columns=columns)
 
     def bifurcations_frame(self) -> pandas.DataFrame:

@@ -23,6 +23,7 @@ from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
 from suboctave.model.element import Array
 from suboctave.model.system import System
+from suboctave.store.columns import parameter_column
 from suboctave.timedomain.batch import Flow, check_count
 from suboctave.version import __version__
 
@@ -134,7 +135,8 @@ class BruteForceDiagram(TimeResult):
             for value, one in zip(self.values, row, strict=True)
             if one is not None
         ]
-        return pd.DataFrame(rows, columns=[self.name, "start", "kind", "period", "amplitude", "defect"])
+        own = ("start", "kind", "period", "amplitude", "defect")
+        return pd.DataFrame(rows, columns=[parameter_column(self.name, own), *own])
 
     def plot(self, path: Any = None, curves: Any = None, **options: Any) -> Any:
         """Draw the motions found, one colour for each period, over branches if any are given; saved to a path.

@@ -18,6 +18,7 @@ from suboctave.analysis.results import Table
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError, suggest
 from suboctave.model.system import System
+from suboctave.store.columns import parameter_column
 
 if TYPE_CHECKING:
     import pandas
@@ -203,7 +204,8 @@ class IsolaMap:
                     side = "upper" if upper else "lower"
                     rows += [(number, side, nature, float(a), float(b)) for a, b in zip(first, second, strict=True)]
         columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * 5
-        names = ("region", "end", "border", self.second, self.parameter)
+        own = ("region", "end", "border")
+        names = (*own, *(parameter_column(name, own) for name in (self.second, self.parameter)))
         title = f"isolas over {self.second} and {self.parameter}"
         return Table(dict(zip(names, columns, strict=True)), title)
 

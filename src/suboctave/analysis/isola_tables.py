@@ -11,6 +11,7 @@ import numpy as np
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.readings import shared
 from suboctave.errors import InputError, suggest
+from suboctave.store.columns import led_by
 from suboctave.store.isolas import isolas_dataset
 
 if TYPE_CHECKING:
@@ -96,10 +97,11 @@ def _curves(isolas: Isolas) -> list[Any]:
 def _joined(frames: Sequence[pandas.DataFrame], isolas: Isolas) -> pandas.DataFrame:
     import pandas
 
-    for number, (curve, frame) in enumerate(zip(_curves(isolas), frames, strict=True)):
-        for name, value in (("nu", curve.nu), ("of", curve.kind), ("curve", number)):
-            frame.insert(0, name, value, allow_duplicates=True)
-    full = [frame for frame in frames if len(frame)]
+    full = [
+        led_by(frame, {"curve": number, "of": curve.kind, "nu": curve.nu})
+        for number, (curve, frame) in enumerate(zip(_curves(isolas), frames, strict=True))
+        if len(frame)
+    ]
     return pandas.concat(full, ignore_index=True) if full else pandas.DataFrame({"curve": []})
 
 

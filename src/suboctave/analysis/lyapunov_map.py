@@ -20,6 +20,7 @@ from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
+from suboctave.store.columns import parameter_column
 from suboctave.timedomain.batch import Flow, check_count
 from suboctave.version import __version__
 
@@ -98,9 +99,9 @@ class LyapunovMap(TimeResult):
         import pandas as pd
 
         value, omega = np.meshgrid(self.values, self.omega, indexing="ij")
-        columns = {"omega": omega, self.name: value, "exponent": self.exponent, "standard_error": self.standard_error}
-        told = {name: table.ravel() for name, table in columns.items()}
-        return pd.DataFrame({**told, "chaotic": self.chaotic.ravel()})
+        own = {"exponent": self.exponent, "standard_error": self.standard_error, "chaotic": self.chaotic}
+        columns = {"omega": omega, parameter_column(self.name, own): value, **own}
+        return pd.DataFrame({name: table.ravel() for name, table in columns.items()})
 
     def plot(self, path: Any = None, curves: Any = (), **options: Any) -> Any:
         """The map in colours, tracked curves of bifurcations over it if any are given; saved if a path is given.

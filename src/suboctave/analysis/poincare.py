@@ -16,6 +16,7 @@ from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
+from suboctave.store.columns import parameter_column
 from suboctave.timedomain.batch import Flow, check_count
 from suboctave.version import __version__
 
@@ -142,8 +143,10 @@ class PoincareSections(TimeResult):
 
         count, sections, size = self.points.shape
         names = [f"{kind}_{i}" for kind in "xv" for i in range(size // 2)]
+        taken = ("trajectory", "omega", "section", *names, "period")
+        varied = {"omega": self.omega} | {parameter_column(n, taken): v for n, v in self.varied.items()}
         columns: dict[str, Any] = {"trajectory": np.repeat(np.arange(count), sections)}
-        columns |= {n: np.repeat(values, sections) for n, values in {"omega": self.omega, **self.varied}.items()}
+        columns |= {n: np.repeat(values, sections) for n, values in varied.items()}
         columns["section"] = np.tile(np.arange(sections), count)
         columns |= {name: self.points[:, :, i].ravel() for i, name in enumerate(names)}
         return pd.DataFrame(columns | {"period": np.repeat(self.periods, sections)})

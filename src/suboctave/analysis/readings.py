@@ -22,6 +22,7 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
+from suboctave.store.columns import parameter_column
 from suboctave.store.layout import check_component, has_component, reading_name
 
 if TYPE_CHECKING:
@@ -300,8 +301,8 @@ def with_readings(
     """The dataset of a branch with read-offs on its points and, with the prefix `event_`, on its events."""
     for reading in _listed(branch, names):
         said = reading.attributes(branch.system)
-        if reading.name in dataset.coords:  # a free parameter of that name stays among the parameters
-            dataset = dataset.drop_vars(reading.name)
+        if reading.name in dataset.coords:  # a free parameter of that name
+            dataset = dataset.rename({reading.name: parameter_column(reading.name, (reading.name,))})
         dataset[reading.name] = ("point", _on_points(branch, reading), said)
         there = reading.of([event.orbit for event in events], branch.observe)
         if reading.what == "phase":  # of the same turn as the points beside it

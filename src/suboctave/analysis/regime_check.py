@@ -29,6 +29,7 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
+from suboctave.store.columns import parameter_column
 
 if TYPE_CHECKING:
     from suboctave.analysis.regime_map import RegimeMap
@@ -145,7 +146,8 @@ class RegimeCheck:
 
     def to_table(self) -> Table:
         """One row for each trajectory."""
-        names = ("omega", self.name, "start", "period", "amplitude", "expected", "verdict")
+        own = ("start", "period", "amplitude", "expected", "verdict")
+        names = ("omega", parameter_column(self.name, own), *own)
         rows = [(x.omega, x.value, x.start, x.period, x.amplitude, x.expected, x.verdict) for x in self.landings]
         columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * len(names)
         return Table(dict(zip(names, columns, strict=True)), "a regime map against time integration")

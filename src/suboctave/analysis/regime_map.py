@@ -21,6 +21,7 @@ from suboctave.analysis.results import Table
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.store.columns import parameter_column
 
 if TYPE_CHECKING:
     import pandas
@@ -253,7 +254,8 @@ class RegimeMap:
 
     def to_table(self) -> Table:
         """The borders of stable arcs, point by point: arc, period, whether on an isola, kind, parameter, both ends."""
-        names = ("strip", "arc", "period", "isola", "from kind", "to kind", self.parameter, "from omega", "to omega")
+        own = ("strip", "arc", "period", "isola", "from kind", "to kind")
+        names = (*own, parameter_column(self.parameter, own), "from omega", "to omega")
         rows = list(self._rows())
         columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * len(names)
         title = f"stable motions over omega and {self.parameter}"

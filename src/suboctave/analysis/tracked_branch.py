@@ -17,7 +17,7 @@ from suboctave.lazy import lazy
 from suboctave.stability import FloquetResult, StabilityMethod
 
 if TYPE_CHECKING:
-    import pandas
+    pass
 
 
 class TrackedPoint(BranchPoint):
@@ -141,16 +141,14 @@ class TrackedBranch(Branch):
             mu = np.delete(mu, np.argsort(distance, kind="stable")[: 2 if self.kind == "NS" else 1])
         return bool(np.all(np.abs(mu) < 1.0))
 
-    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
-        """As of any branch, with both parameters, `coefficient`, and `kappa` of an NS curve."""
-        frame = super().to_dataframe(readings)
-        for place, name in enumerate(self.names):
-            if name not in frame:
-                frame.insert(1 + place, name, self.parameter(name))
-        frame["coefficient"] = self.coefficient
-        if self.kind == "NS":
-            frame["kappa"] = self.kappa
-        return frame
+    @property
+    def _free(self) -> tuple[str, ...]:
+        return self.names
+
+    def _columns(self, readings: Iterable[str] | bool) -> dict[str, Any]:
+        """As of any branch, and `coefficient`, and `kappa` of an NS curve."""
+        own = super()._columns(readings) | {"coefficient": self.coefficient}
+        return own | {"kappa": self.kappa} if self.kind == "NS" else own
 
     def __repr__(self) -> str:
         ends = [", ".join(f"{n}={self.parameter(n)[i]:.6g}" for n in self.names) for i in (0, -1)]

@@ -15,6 +15,7 @@ from suboctave.analysis.junction import period_name
 from suboctave.analysis.readings import shared
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import InputError, suggest
+from suboctave.store.columns import led_by
 
 if TYPE_CHECKING:
     import pandas
@@ -191,10 +192,11 @@ class BifurcationDiagram:
     def _joined(self, frames: list[pandas.DataFrame]) -> pandas.DataFrame:
         import pandas as pd
 
-        for node, frame in zip(self, frames, strict=True):
-            for name, value in (("depth", node.depth), ("nu", node.branch.nu), ("branch", node.number)):
-                frame.insert(0, name, value, allow_duplicates=True)  # a parameter may bear one of these names
-        return pd.concat([f for f in frames if len(f)] or frames[:1], ignore_index=True)
+        told = [
+            led_by(frame, {"branch": node.number, "nu": node.branch.nu, "depth": node.depth})
+            for node, frame in zip(self, frames, strict=True)
+        ]
+        return pd.concat([frame for frame in told if len(frame)] or told[:1], ignore_index=True)
 
     def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
         """The points, or the "bifurcations", of all branches as comma-separated text (.csv)."""

@@ -32,6 +32,7 @@ from suboctave.pictures.report_isolas import IsolasPart, isolas_figures, isolas_
 from suboctave.pictures.report_text import cell, finite, html_table, number, safe, small, spelt
 from suboctave.pictures.response import plot_response
 from suboctave.pictures.saving import svg_text
+from suboctave.store.columns import parameter_column
 from suboctave.store.files import free_place, replace_file
 from suboctave.store.layout import check_layout, coordinate
 from suboctave.version import __version__
@@ -263,7 +264,8 @@ def _bifurcations(dataset: xarray.Dataset) -> tuple[list[tuple[str, str]], list[
     column = {name: dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier")}
     residual, doubt = dataset["event_residual"].to_numpy(), dataset["event_uncertainty"].to_numpy()
     contact, critical = dataset["event_contact"].to_numpy(), dataset["event_criticality"].to_numpy()
-    head = [("kind", _TEXT), ("ω", ""), *((name, "") for name in free)]
+    own = ("kind", "ω", "max |x|", "multiplier", "residual", "remark")
+    head = [("kind", _TEXT), ("ω", ""), *((parameter_column(name, own), "") for name in free)]
     head += [("max |x|", ""), ("multiplier", ""), ("residual", "")]
     remarks = []
     for i in range(len(residual)):

@@ -9,12 +9,12 @@ Dimensions
 
 Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, `error`, `residual`, `multipliers`,
 `multiplier_errors`, `stability_method`, `parameters` (point x parameter). A free parameter other than omega is a
-coordinate under its own name as well, unless the layout already uses that name. Variables on `event` carry the prefix
-`event_`; `event_after` is the index of the point after which the event lies, so that the curve with its events is one
-line: point `i`, the events with `event_after == i` in their order, point `i + 1`. `event_contact` names the contact
-that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the value of the free parameter at which
-it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...; docs/pictures.md) are further variables on
-`point`, each with its own on `event`.
+coordinate as well, under its own name, or as "parameter.NAME" where the layout or a file uses that name. Variables on
+`event` carry the prefix `event_`; `event_after` is the index of the point after which the event lies, so that the curve
+with its events is one line: point `i`, the events with `event_after == i` in their order, point `i + 1`.
+`event_contact` names the contact that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the
+value of the free parameter at which it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...;
+docs/pictures.md) are further variables on `point`, each with its own on `event`.
 
 Curves of bifurcations (`track`) have the attributes `tracked`, their kind, and `plane`, their two free parameters, one
 a line; `stable` means that all multipliers but the critical ones lie inside the unit circle; on `point` there is
@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from suboctave.errors import InputError, suggest
+from suboctave.store.columns import parameter_column
 from suboctave.store.events import BranchEvents, EventRow, event_rows, event_variables, events_met
 from suboctave.version import __version__
 
@@ -56,8 +57,11 @@ __all__ = [
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
 RESERVED = frozenset(
     {"point", "event", "parameter", "multiplier", "omega", "amplitude", "stable", "harmonics", "error", "residual"}
-    | {"multipliers", "multiplier_errors", "stability_method", "parameters"}
+    | {"multipliers", "multiplier_errors", "stability_method", "parameters", "coefficient"}
+    # what files add, and their dimensions (`analysis/saved.py`)
+    | {"arclength", "iterations", "coefficients", "record", "unknown", "multipliers_real", "multipliers_imag"}
 )
+RESERVED_PREFIXES = ("event_", "system_array_")
 
 
 class BranchLike(BranchEvents, Protocol):
@@ -176,8 +180,9 @@ def curve_dataset(
         "omega": ("point", frequency, {"long_name": "circular forcing frequency", "units": "rad per unit time"}),
         "parameter": ("parameter", np.array(names, dtype=object)),
     }
-    if free not in RESERVED and not free.startswith("event_"):
-        coords[free] = ("point", values[free].copy())
+    if free != "omega":
+        taken = (free,) if free in RESERVED or free.startswith(RESERVED_PREFIXES) else ()
+        coords[parameter_column(free, taken)] = ("point", values[free].copy())
     attributes: dict[str, Any] = {
         "layout": LAYOUT,
         "suboctave": __version__,

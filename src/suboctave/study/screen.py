@@ -15,6 +15,7 @@ from suboctave.analysis.junction import period_name
 from suboctave.analysis.results import Result
 from suboctave.analysis.tree_text import tree_text
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS
+from suboctave.store.columns import parameter_column
 from suboctave.store.layout import branch_dataset
 from suboctave.study.demo import event_lines
 
@@ -82,7 +83,9 @@ def print_events(
     if not lines:
         out.print("no bifurcation")
         return
-    names = ("kind", "omega", "max |x|", "multiplier", "residual") + ((free,) if free != "omega" else ())
+    names: tuple[str, ...] = ("kind", "omega", "max |x|", "multiplier", "residual")
+    if free != "omega":
+        names += (parameter_column(free, (*names, "criticality")),)
     if any(criticality):
         names += ("criticality",)
         lines = [[*line, word] for line, word in zip(lines, criticality, strict=True)]
