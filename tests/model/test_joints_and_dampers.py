@@ -41,6 +41,48 @@ def test_all_derivatives_to_third_order_agree_with_differences(element):
     assert ("f_vvv" in report.errors) == (own and element.depends_on_velocity)
 
 
+GIVEN = {
+    "drag": (lambda x, v: v * np.abs(v), lambda x, v: (0 * x, 2 * np.abs(v))),
+    "quadratic spring": (lambda x, v: x * np.abs(x), lambda x, v: (2 * np.abs(x), 0 * x)),
+    "power 3/2": (lambda x, v: np.sign(x) * np.abs(x) ** 1.5, lambda x, v: (1.5 * np.sqrt(np.abs(x)), 0 * x)),
+    "friction": (lambda x, v: np.tanh(v / 0.01), lambda x, v: (0 * x, 100 / np.cosh(v / 0.01) ** 2)),
+    "stop": (lambda x, v: 5 * np.maximum(x - 0.3, 0), lambda x, v: (5.0 * (x > 0.3), 0.0)),
+    "mixed": (lambda x, v: np.abs(x) * v, lambda x, v: (np.sign(x) * v, np.abs(x))),
+}
+NOT_THEIRS = {
+    "half of it": ("quadratic spring", lambda x, v: (np.abs(x), 0 * x)),
+    "right on one side": ("quadratic spring", lambda x, v: (2 * x, 0 * x)),
+    "exchanged": ("drag", lambda x, v: (2 * np.abs(v), 0 * x)),
+    "the other sign": ("drag", lambda x, v: (0 * x, -2 * np.abs(v))),
+    "without the inner derivative": ("friction", lambda x, v: (0 * x, 1 / np.cosh(v / 0.01) ** 2)),
+    "another gap": ("stop", lambda x, v: (5.0 * (x > 0.5), 0.0)),
+    "no number": ("drag", lambda x, v: (0 * x, np.nan * v)),
+    "only one": ("drag", lambda x, v: 2 * np.abs(v)),
+    "failing": ("drag", lambda x, v: (0 * x, [1] + v)),
+}
+
+
+@pytest.mark.parametrize("law", GIVEN)
+def test_given_derivatives_of_laws_with_corners_are_taken(law):
+    force, derivatives = GIVEN[law]
+    system_with(so.Callable(0, force, derivatives=derivatives))
+
+
+@pytest.mark.parametrize("case", NOT_THEIRS)
+def test_given_derivatives_that_are_not_the_laws_are_refused(case):
+    law, derivatives = NOT_THEIRS[case]
+    with pytest.raises(so.InputError, match=r"from derivatives= is not|derivatives= must return"):
+        system_with(so.Callable(0, GIVEN[law][0], derivatives=derivatives))
+
+
+def test_a_function_with_its_derivatives_gives_what_the_text_gives():
+    """x |x|^3 as a function of NumPy's `abs`, which bears no complex steps, and as a text: the same motion."""
+    function = so.Callable(0, lambda x, v: x * np.abs(x) ** 3, derivatives=lambda x, v: (4 * np.abs(x) ** 3, 0 * x))
+    text = so.Expression(0, "x*abs(x)**3")
+    one, other = (so.frequency_response(system_with(law), (1.0, 1.02), 7).orbits[0] for law in (function, text))
+    np.testing.assert_allclose(one.coefficients, other.coefficients, rtol=1e-9, atol=1e-11)
+
+
 def test_third_derivatives_of_elements_that_do_not_know_them():
     """Differences of the second ones, in steps that follow the law's width."""
 

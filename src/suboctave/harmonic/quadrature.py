@@ -164,7 +164,8 @@ def samples_for(element: Element, motion: ComplexArray, rate: float, coefficient
         count *= 2
     raise ConvergenceError(
         f"{element.label}: the force does not settle with {_MOST} samples per period. Tell where its law is sharp "
-        f"(Element.sampling returning SharpSampling(points, widths)), or use an exact piecewise-linear element"
+        f"(Element.sampling returning SharpSampling(points, widths)), write it as a text (Expression), whose corners "
+        "are located, or use an exact piecewise-linear element"
     )
 
 

@@ -21,16 +21,23 @@ Number = float | str | Coefficient
 #: step of complex differences; step of real ones of fourth order, as a share of the size of the argument
 _COMPLEX, _REAL = 1e-30, 2e-3
 _CHECKED, _AGREE = 9, 1e-6
+#: by which factors that step is shortened until two differences agree, which they do not while a corner lies between
+_SHORTER = (1.0, 0.1, 0.01)
+#: scales of the motions at which given derivatives are checked: what is sharp about zero is seen at the small ones
+_SCALES = (1.0, 0.1, 0.01, 0.001)
+#: how far given derivatives may be from differences, relative to the largest force and slope
+_GIVEN = 1e-5
 
 
 class Callable(Element):
     """A force given as a Python function `f(x, v, *coefficients)` of arrays (N,), at `dof` or along `direction`.
 
     `coefficients` are handed over after displacement and velocity, in their order: `{name: number or expression}`.
-    `derivatives` may give `(f_x, f_v)` as a function of the same arguments. Otherwise they are taken by complex steps,
-    exact to rounding, if the function is found to bear them, else by differences of fourth order (`accuracy` tells,
-    relative to the force's own scale: 1e-15 or about 1e-10). Second derivatives are differences of the first, good
-    for about nine (six) digits: enough for Newton's method at bifurcations, not for normal forms of high order.
+    `derivatives` may give `(f_x, f_v)` as a function of the same arguments; they are held against differences where
+    these settle, which they do not across a corner (`x |x|`). Otherwise they are taken by complex steps, exact to
+    rounding, if the function is found to bear them, else by differences of fourth order (`accuracy` tells, relative to
+    the force's own scale: 1e-15 or about 1e-10). Second derivatives are differences of the first, good for about nine
+    (six) digits: enough for Newton's method at bifurcations, not for normal forms of high order.
 
     The function must be smooth or at least continuous, depend on its arguments alone, and return real arrays of the
     shape of x. It is called often; a law that can be written as text is faster as `Expression`.
@@ -57,7 +64,7 @@ class Callable(Element):
         assert function is not None
         self.function, self.derivatives = function, derivatives
         self._complex = False
-        self._complex = self._bears_complex()
+        self._complex = derivatives is None and self._bears_complex()
 
     @property
     def label(self) -> str:
@@ -79,14 +86,28 @@ class Callable(Element):
         if not np.all(np.isfinite(f)):
             raise InputError(f"{self.label}: the force is not finite for displacements and velocities between -1 and 1")
         if self.derivatives is not None:
-            given = self._given(u, v, c)
-            self.derivatives, kept = None, self.derivatives
-            own = self._slopes(u, v, c)
-            self.derivatives = kept
-            for name, one, other in zip("xv", given, own, strict=True):
-                size = max(float(np.abs(f).max()), float(np.abs(other).max()))
-                if float(np.abs(one - other).max()) > 1e-5 * size:
-                    raise InputError(f"{self.label}: f_{name} from derivatives= is not the derivative of the force")
+            scales = np.repeat(_SCALES, len(u))
+            self._check_given(scales * np.tile(u, len(_SCALES)), scales * np.tile(v, len(_SCALES)), c)
+
+    def _check_given(self, u: Array, v: Array, c: Array) -> None:
+        """Refuse derivatives that are not those of the force wherever differences settle: not across a corner."""
+        f = self._value(u, v, c)
+        finer = [self._differences(u, v, c, factor) for factor in _SHORTER]
+        for i, (name, given) in enumerate(zip("xv", self._given(u, v, c), strict=True)):
+            if not np.all(np.isfinite(given)):
+                raise InputError(f"{self.label}: f_{name} from derivatives= is not finite between -1 and 1")
+            steps = np.array([pair[i] for pair in finer])
+            apart = np.abs(np.diff(steps, axis=0))
+            best = np.argmin(apart, axis=0)
+            settled, doubt = (np.take_along_axis(x, best[None], axis=0)[0] for x in (steps[1:], apart))
+            size = max(float(np.abs(f).max()), float(np.nanmax(np.abs(given))))
+            wrong = np.flatnonzero(np.abs(given - settled) > _GIVEN * size + doubt)
+            if wrong.size:
+                k = wrong[0]
+                raise InputError(
+                    f"{self.label}: f_{name} from derivatives= is not the derivative of the force: at x = {u[k]:.4g}, "
+                    f"v = {v[k]:.4g} it gives {given[k]:.6g}, differences give {settled[k]:.6g}"
+                )
 
     def _draws(self) -> tuple[Array, Array]:
         angles = np.arange(1, _CHECKED + 1)
@@ -131,8 +152,14 @@ class Callable(Element):
 
     def _given(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
         assert self.derivatives is not None
-        f_u, f_v = self.derivatives(u, v, *c)
-        return np.broadcast_to(np.asarray(f_u, float), u.shape), np.broadcast_to(np.asarray(f_v, float), u.shape)
+        try:
+            f_u, f_v = self.derivatives(u, v, *c)
+            return np.broadcast_to(np.asarray(f_u, float), u.shape), np.broadcast_to(np.asarray(f_v, float), u.shape)
+        except Exception as error:
+            raise InputError(
+                f"{self.label}: derivatives= must return (f_x, f_v), two real arrays of shape {u.shape}; "
+                f"{type(error).__name__}: {error}"
+            ) from error
 
     def _slopes(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
         """`(f_u, f_v)`."""
@@ -144,9 +171,13 @@ class Callable(Element):
                 np.imag(self.function(u + 1j * h, v, *c)) / h * np.ones_like(u),
                 np.imag(self.function(u, v + 1j * h, *c)) / h * np.ones_like(u),
             )
+        return self._differences(u, v, c)
+
+    def _differences(self, u: Array, v: Array, c: Array, factor: float = 1.0) -> tuple[Array, Array]:
+        """`(f_u, f_v)` by differences of the force, their steps shortened by a factor."""
         return (
-            _difference(lambda h: self._value(u + h, v, c), u),
-            _difference(lambda h: self._value(u, v + h, c), v),
+            _difference(lambda h: self._value(u + h, v, c), u, factor),
+            _difference(lambda h: self._value(u, v + h, c), v, factor),
         )
 
     def sampling(self, c: Array) -> AdaptiveSampling:
@@ -193,8 +224,8 @@ class Callable(Element):
         return 0.5 * (out + out.transpose(1, 0, 2))
 
 
-def _difference(law: Function[[float], Any], at: Any) -> Array:
-    """Central differences of fourth order; the step is a share of the size of the argument."""
-    h = _REAL * (float(np.max(np.abs(at), initial=0.0)) or 1.0)
+def _difference(law: Function[[float], Any], at: Any, factor: float = 1.0) -> Array:
+    """Central differences of fourth order; the step is a share of the size of the argument, times the factor."""
+    h = factor * _REAL * (float(np.max(np.abs(at), initial=0.0)) or 1.0)
     result: Array = (8.0 * (law(h) - law(-h)) - (law(2.0 * h) - law(-2.0 * h))) / (12.0 * h)
     return result
