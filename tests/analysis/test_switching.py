@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.analysis.identity import relation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation, doubled_direction
 from suboctave.errors import InputError
@@ -203,7 +204,7 @@ def test_mirror_images_have_bifurcations_of_their_own():
         for one, other in zip(found[:half], reversed(found[half:]), strict=True):
             assert one.kind == other.kind
             assert one.omega == pytest.approx(other.omega, rel=1e-9)
-            assert not one.orbit.matches(other.orbit, 1e-3)
+            assert not relation(one.orbit, other.orbit, 1e-3).one
             # half a period later with the other sign
             turned = one.orbit.amplitudes * -((-1.0) ** np.arange(one.orbit.basis.harmonics + 1))[:, None]
             top = min(len(turned), len(other.orbit.amplitudes))

@@ -107,6 +107,12 @@ class Branch(BranchReadings):
         return self.points[0].orbit.basis.nu if self.points else 1
 
     @property
+    def junctions(self) -> list[tuple[Junction, PeriodicOrbit]]:
+        """Where it leaves or meets another branch, each with its own motion right beside."""
+        ends = ((self.departs, 0), (self.arrives, -1))
+        return [(end, self.points[i].orbit) for end, i in ends if end is not None and self.points]
+
+    @property
     def grazings(self) -> list[Bifurcation]:
         """Where contacts begin or cease to touch, in the order met."""
         return self.bifurcations["grazing"]

@@ -6,6 +6,7 @@ leave these, as deep as asked. A branch that meets its parent at another bifurca
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Callable, Sequence
 from time import perf_counter
@@ -23,6 +24,7 @@ from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.formulation import Formulation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.store.layout import events_met
@@ -123,6 +125,13 @@ def bifurcation_diagram(
     return BifurcationDiagram(root, stopped)
 
 
+def grown_from(branch: Branch, depth: int, options: dict[str, Any]) -> DiagramBranch:
+    """A branch that is known with what bifurcates from it, so many bifurcations deep; `options` of the verbs."""
+    root = DiagramBranch(branch)
+    _grown(root, depth, sys.maxsize, None, 0.0, dict(options), _Told(None), None)
+    return root
+
+
 def _grown(
     root: DiagramBranch,
     depth: int,
@@ -142,7 +151,7 @@ def _grown(
         known = _shared(node)
         span = _span(node.branch)
         for number, item in enumerate(switched):
-            if any(end.same_place(item, span) for end in known):
+            if any(end.same_place(item, span, beside) for end, beside in known):
                 continue
             if not out_of and count >= most:
                 out_of = f"max_branches={most} reached"
@@ -195,14 +204,14 @@ def _interrupted(branch: Branch) -> bool:
     return branch.interrupted
 
 
-def _shared(node: DiagramBranch) -> list[Junction]:
-    """Where a branch meets its parent: there is nothing new to switch to for either."""
+def _shared(node: DiagramBranch) -> list[tuple[Junction, PeriodicOrbit]]:
+    """Where a branch meets its parent, with the motion there: there is nothing new to switch to for either."""
     branch, origin = node.branch, node.origin
-    found = [j for j in (branch.arrives, branch.departs) if j is not None]
+    found = branch.junctions
     if origin is not None and origin.kind == "BP":
         # a branch that crosses its parent lists the points where it does, among others
-        crossed = [Junction.of(b) for b in branch.bifurcations["BP"]]
-        found += [j for j in crossed if any(j.same_place(b, _span(branch)) for b in node.met)]
+        crossed = [(Junction.of(b), b.orbit) for b in branch.bifurcations["BP"]]
+        found += [(j, here) for j, here in crossed if any(j.same_place(b, _span(branch), here) for b in node.met)]
     return found
 
 

@@ -12,6 +12,7 @@ from suboctave.analysis.count import CountCheck
 from suboctave.analysis.doublings import DoublingWatch
 from suboctave.analysis.guard import Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
+from suboctave.analysis.identity import relation
 from suboctave.analysis.junction import UNSEEN, Meeting, meeting
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
@@ -31,8 +32,6 @@ from suboctave.errors import ConvergenceError, InputError
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point
 _APART = 1e-5
-#: share of a motion's size by which one located twice may differ
-_SAME = 1e-4
 #: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
 _NOTHING = 1e-12
 _NOT_FOUND = {
@@ -361,7 +360,7 @@ def same_event(a: Bifurcation, b: Bifurcation) -> bool:
     if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
         return False
     # the mirror image of a motion has its amplitude; at rest there is nothing to compare
-    return max(a.amplitude, b.amplitude) <= _NOTHING or a.orbit.matches(b.orbit, _SAME)
+    return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
 
 
 def _element(item: Bifurcation) -> int | None:

@@ -14,8 +14,9 @@ from typing import Any
 
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.diagram import bifurcation_diagram
+from suboctave.analysis.identity import Relation, lies_on, relation
 from suboctave.analysis.isola import closed_branch
-from suboctave.analysis.limit_curves import Leg, legs_of, same_motion
+from suboctave.analysis.limit_curves import Leg, legs_of
 from suboctave.analysis.making import Harmonics
 from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch
@@ -151,7 +152,7 @@ class Survey:
                 there = leg.limit_point(value)
             except ConvergenceError:
                 continue
-            if _beside(there, item) and same_motion(there.orbit, item.orbit):
+            if _alike(there, item):
                 return leg
         return None
 
@@ -175,11 +176,11 @@ class Survey:
         """Whether a curve is one that is known, met where the known one was not found again."""
         turns = [event for event in curve.bifurcations.met if isinstance(event, TrackedEvent) and event.isola]
         known = (e for c in self.curves if c.nu == curve.nu for e in c.bifurcations.met)
-        return any(_beside(a, b) and same_motion(a.orbit, b.orbit) for b in known for a in turns)
+        return any(_alike(a, b) for b in known for a in turns)
 
     def doubling(self, item: Bifurcation, value: float) -> None:
         """Follow a period doubling over the parameter, unless its curve is known."""
-        if any(_passes(curve, self.name, item, value) for curve in self.doublings):
+        if any(lies_on(item.orbit, curve.tracked, self.name, images=True) for curve in self.doublings):
             return
         curve = self._tracked(item, value)
         if curve is not None:
@@ -260,14 +261,6 @@ def _beside(a: Bifurcation, b: Bifurcation) -> bool:
     return abs(a.omega - b.omega) <= SAME_OMEGA * b.omega
 
 
-def _passes(curve: TrackedBranch, name: str, item: Bifurcation, value: float) -> bool:
-    """Whether a curve of bifurcations passes through one at a value of the parameter."""
-    values, omega = curve.parameter(name), curve.omega
-    for i in range(len(values) - 1):
-        if (values[i] - value) * (values[i + 1] - value) > 0.0:
-            continue
-        share = (value - values[i]) / ((values[i + 1] - values[i]) or 1.0)
-        reach = 0.3 * abs(omega[i + 1] - omega[i]) + 1e-5 * item.omega
-        if abs(omega[i] + share * (omega[i + 1] - omega[i]) - item.omega) <= reach:
-            return True
-    return False
+def _alike(a: Bifurcation, b: Bifurcation) -> bool:
+    """Whether two limit points are one, or mirror images: what is true of the one is of the other."""
+    return _beside(a, b) and relation(a.orbit, b.orbit) is not Relation.OTHER

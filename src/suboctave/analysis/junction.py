@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from suboctave.analysis.identity import apart
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.branching import doubled_direction
@@ -24,6 +25,7 @@ from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.stability import FloquetResult, floquet_multipliers
 
@@ -42,6 +44,8 @@ __all__ = [
 
 #: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+#: share of a motion by which the first or last motion of a branch may differ from that of the bifurcation beside it
+_BESIDE = 0.02
 #: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
 _CLOSE = 0.02
 #: share of its odd part with which a step leaves a motion right beside its parent, on whose doublings what follows lies
@@ -76,11 +80,16 @@ class Junction:
         value = item.parameter(item.parameter_name)
         return cls(item.kind, value, item.omega, item.amplitude, item.orbit.basis.nu)
 
-    def same_place(self, item: Bifurcation, span: float) -> bool:
-        """Whether a located bifurcation is this one, located anew; `span` is the range of the free parameter."""
+    def same_place(self, item: Bifurcation, span: float, beside: PeriodicOrbit) -> bool:
+        """Whether a located bifurcation is this one, located anew.
+
+        `span` is the range of the free parameter, `beside` the motion at which a branch leaves or meets this one: the
+        mirror image of a bifurcation has its place and its amplitude.
+        """
         there = Junction.of(item)
         near = abs(self.parameter - there.parameter) <= 1e-5 * span and there.kind == self.kind
-        return near and abs(self.amplitude - there.amplitude) <= 1e-3 * max(self.amplitude, there.amplitude)
+        alike = abs(self.amplitude - there.amplitude) <= 1e-3 * max(self.amplitude, there.amplitude)
+        return near and alike and apart(beside, item.orbit) <= _BESIDE
 
     def __str__(self) -> str:
         return f"the {self.kind} of the {period_name(self.nu)} motion at omega = {self.omega:.9g}"

@@ -31,7 +31,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit
 
-__all__ = ["Leg", "as_point", "bifurcation_at_value", "legs_of", "same_motion", "turns_at"]
+__all__ = ["Leg", "as_point", "bifurcation_at_value", "legs_of", "turns_at"]
 
 #: a solved limit point lies at most this many distances between its neighbours away from where it was expected
 _AWAY = 3.0
@@ -39,8 +39,6 @@ _AWAY = 3.0
 _ASIDE = 1e-2
 #: share of the way between two nodes below which steps are not halved again
 _SMALLEST = 0.02
-#: harmonics of two motions that are one differ by less, relative to their size
-_SAME = 1e-4
 
 
 def bifurcation_at_value(
@@ -267,12 +265,3 @@ def turns_at(event: TrackedEvent, name: str) -> bool:
 def as_point(item: Bifurcation) -> TrackedPoint:
     """A located bifurcation as a point of a tracked curve."""
     return TrackedPoint(item.orbit, item.arclength, 0, None, known=item.floquet)
-
-
-def same_motion(a: PeriodicOrbit, b: PeriodicOrbit) -> bool:
-    """Whether two motions are one up to a shift by load periods, by the moduli of their harmonics."""
-    first, second = (np.abs(orbit.amplitudes) for orbit in (a, b))
-    if a.basis.nu != b.basis.nu:
-        return False
-    top = min(len(first), len(second))
-    return bool(np.linalg.norm(first[:top] - second[:top]) <= _SAME * np.linalg.norm(second))

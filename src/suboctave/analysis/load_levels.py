@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from suboctave.analysis.branch import Branch
-from suboctave.analysis.isola_survey import SAME_OMEGA, Survey
-from suboctave.analysis.limit_curves import same_motion
+from suboctave.analysis.identity import lies_on
+from suboctave.analysis.isola_survey import Survey
 from suboctave.analysis.making import own_linear_part
-from suboctave.analysis.subharmonics import lies_on
 from suboctave.analysis.verbs import continue_branch
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
@@ -45,7 +44,7 @@ def branches_by_load(survey: Survey, value: float, level: float) -> Iterator[Bra
             continue
         try:
             orbit = _own(leg.limit_point(1.0).orbit, system)
-            if any(_met_on(branch, orbit) for branch in known):
+            if any(lies_on(orbit, branch.points, images=True) for branch in known):
                 continue
             low, high = min(*survey.omega, orbit.omega), max(*survey.omega, orbit.omega)
             known.append(continue_branch(orbit, "omega", (low, high), **survey.options))
@@ -53,14 +52,6 @@ def branches_by_load(survey: Survey, value: float, level: float) -> Iterator[Bra
             survey.note(f"at {survey.name} = {value:.6g}, a limit point from stronger loads: {failure}")
             continue
         yield known[-1]
-
-
-def _met_on(branch: Branch, orbit: PeriodicOrbit) -> bool:
-    """Whether a limit point lies on a branch: it is one of its own, or lies between two of its points."""
-    if branch.nu != orbit.basis.nu:
-        return False
-    near = (b.orbit for b in branch.bifurcations["LP"] if abs(b.omega - orbit.omega) <= SAME_OMEGA * orbit.omega)
-    return any(same_motion(other, orbit) for other in near) or lies_on(branch, orbit)
 
 
 def _own(orbit: PeriodicOrbit, system: System) -> PeriodicOrbit:

@@ -14,15 +14,12 @@ import numpy as np
 
 from suboctave.analysis.borders import Border
 from suboctave.analysis.branch import Branch, BranchPoint
+from suboctave.analysis.identity import lies_on
 from suboctave.analysis.junction import Junction
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
-from suboctave.harmonic.orbit import PeriodicOrbit
 
-__all__ = ["Arc", "Edge", "Stretch", "lies_on", "lies_on_orbit", "same_branch", "stretches"]
-
-#: amplitudes of a motion on two branches that are one differ by less, relatively
-_SAME = 5e-3
+__all__ = ["Arc", "Edge", "Stretch", "same_branch", "stretches"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +109,7 @@ class Arc:
 
 def stretches(branch: Branch, others: Iterable[Bifurcation]) -> list[Stretch]:
     """The stretches of a branch, in order; `others` are the bifurcations at which it may leave or meet its parent."""
-    places, omega = branch.arclength, branch.omega
+    places = branch.arclength
     changes = sorted(branch.bifurcations, key=lambda b: b.arclength)
     whole = float(places[-1])
     points = branch.points
@@ -124,9 +121,9 @@ def stretches(branch: Branch, others: Iterable[Bifurcation]) -> list[Stretch]:
         marks.append((marks[0][0] + whole, marks[0][1]))
     elif not branch.closed:
         known = list(others)
-        start, stop = (_met(j, known, branch) for j in (branch.departs, branch.arrives))
-        first: Bifurcation | float = float(omega[0]) if start is None else start
-        last: Bifurcation | float = float(omega[-1]) if stop is None else stop
+        first, last = (
+            _met(j, known, branch, i) or float(branch.omega[i]) for j, i in ((branch.departs, 0), (branch.arrives, -1))
+        )
         marks = [(-1.0, first), *marks, (whole + 1.0, last)]
     found = []
     for (begin, one), (end, other) in pairwise(marks):
@@ -137,41 +134,16 @@ def stretches(branch: Branch, others: Iterable[Bifurcation]) -> list[Stretch]:
     return found
 
 
-def _met(junction: Junction | None, known: Sequence[Bifurcation], branch: Branch) -> Bifurcation | None:
-    """The bifurcation of another branch at which one leaves or meets it."""
+def _met(junction: Junction | None, known: Sequence[Bifurcation], branch: Branch, end: int) -> Bifurcation | None:
+    """The bifurcation of another branch at which one leaves or meets it, at its first (0) or last (-1) point."""
     if junction is None:
         return None
     first, last = branch.options["bounds"][branch.name]
-    found = [b for b in known if b.orbit.basis.nu == junction.nu and junction.same_place(b, abs(last - first))]
+    span, beside = abs(last - first), branch.points[end].orbit
+    found = [b for b in known if b.orbit.basis.nu == junction.nu and junction.same_place(b, span, beside)]
     return min(found, key=lambda b: abs(b.omega - junction.omega), default=None)
 
 
 def same_branch(one: Branch, other: Branch) -> bool:
     """Whether the middle motion of a branch lies on another branch of the same period."""
-    return one.nu == other.nu and bool(len(one)) and lies_on(one.points[len(one) // 2], other.points)
-
-
-def lies_on(point: BranchPoint, points: Sequence[BranchPoint]) -> bool:
-    """Whether a motion lies on a curve through others of its period, told by its harmonics."""
-    return _passes(point.orbit, points)
-
-
-def lies_on_orbit(orbit: PeriodicOrbit, branch: Branch) -> bool:
-    """Whether a motion lies on a branch of motions of its period."""
-    return _passes(orbit, branch.points)
-
-
-def _passes(orbit: PeriodicOrbit, points: Sequence[BranchPoint]) -> bool:
-    target = np.abs(orbit.amplitudes)
-    for a, b in pairwise(points):
-        first, last = a.orbit.omega, b.orbit.omega
-        if (first - orbit.omega) * (last - orbit.omega) > 0.0 or first == last:
-            continue
-        share = (orbit.omega - first) / (last - first)
-        before, after = np.abs(a.orbit.amplitudes), np.abs(b.orbit.amplitudes)
-        top = min(len(target), len(before), len(after))
-        between = (1.0 - share) * before[:top] + share * after[:top]
-        room = _SAME * np.linalg.norm(target) + 0.3 * np.linalg.norm(after[:top] - before[:top])
-        if np.linalg.norm(between - target[:top]) <= room:
-            return True
-    return False
+    return one.nu == other.nu and bool(len(one)) and lies_on(one.points[len(one) // 2].orbit, other.points)

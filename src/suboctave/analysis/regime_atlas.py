@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.analysis.borders import Border, borders_of
+from suboctave.analysis.identity import gap_to
 from suboctave.analysis.limit_curves import bifurcation_at_value
 from suboctave.analysis.making import Harmonics
 from suboctave.analysis.track import track
@@ -28,10 +29,8 @@ from suboctave.model.system import System
 
 __all__ = ["Atlas"]
 
-#: a bifurcation lies on a border if it is off by less: in shares of the way between two points of it
-_BESIDE = 0.3
-#: and in shares of its frequency, of its motion
-_NEAR, _ALIKE = 2e-5, 1e-2
+#: frequencies of one bifurcation located twice differ by less, relatively
+_NEAR = 2e-5
 #: events closer to each other, in shares of the parameter's range, are one
 _TOGETHER = 1e-9
 
@@ -89,20 +88,12 @@ class Atlas:
         return min(near, key=lambda pair: pair[0] or 0.0)[1] if near else None
 
     def _distance(self, border: Border, item: Bifurcation, value: float) -> float | None:
-        """How far off a bifurcation lies, in units of what is allowed; None if too far, or something else."""
+        """How far off a bifurcation, or its mirror image, lies, in units of what is allowed; None if too far, or
+        something else.
+        """
         if border.kind != item.kind or border.nu != item.orbit.basis.nu or not border.contains(value):
             return None
-        index, share = border.around(value)
-        way = abs(float(border.positions[index + 1] - border.positions[index]))
-        off = abs(float(border.across(value)) - item.omega) / (_BESIDE * way + _NEAR * item.omega)
-        if off > 1.0:
-            return None
-        a, b = (np.abs(node.orbit.amplitudes) for node in border.nodes[index : index + 2])
-        there = np.abs(item.orbit.amplitudes)
-        top = min(len(a), len(b), len(there))
-        gap = np.linalg.norm((1.0 - share) * a[:top] + share * b[:top] - there[:top])
-        room = _BESIDE * np.linalg.norm(b[:top] - a[:top]) + _ALIKE * np.linalg.norm(there)
-        return off + float(gap / room) if gap <= room else None
+        return gap_to(item.orbit, border.nodes, self.name, images=True)
 
     def known(self, item: Bifurcation, value: float) -> Border | None:
         """The border that a bifurcation lies on, followed over the parameter if it is new; None if that fails."""

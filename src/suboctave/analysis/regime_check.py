@@ -2,7 +2,7 @@
 
 At every point trajectories begin at random states and beside the stable motions that the map knows. What each settles
 on is told by its stroboscopic points (`poincare_sections`), which know nothing of harmonic balance, and compared with
-the motions that the map has there: the same period, and the same amplitude within a hundredth.
+the motions that the map has there: the same period, and the same stroboscopic point within a hundredth.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Landing", "RegimeCheck", "check_regimes"]
 
-#: amplitudes of one motion by both ways differ by less, relatively
+#: stroboscopic points of one motion by both ways differ by less, in shares of its largest displacements and velocities
 _SAME = 1e-2
 #: by how much a start beside a known motion is disturbed, relative to it
 _DISTURBED = 1e-4
@@ -122,18 +122,15 @@ class RegimeCheck:
         return [one for one in self.landings if one.verdict not in (AGREES, BEYOND)]
 
     def unknown(self) -> list[PeriodicOrbit]:
-        """The motions that the map does not have, solved by harmonic balance, one for each point and amplitude.
+        """The motions that the map does not have, solved by harmonic balance, each once at every point.
 
         `regime_map(..., motions=check.unknown())` maps the branches that they lie on.
         """
-        found: list[tuple[float, float, int, float]] = []
-        orbits = []
+        orbits: list[PeriodicOrbit] = []
         for one in self.landings:
-            here = (one.omega, one.value, one.period, one.amplitude)
-            told = any(k[:3] == here[:3] and abs(k[3] - here[3]) <= _SAME * abs(here[3]) for k in found)
-            if one.verdict != UNKNOWN or told:
+            here = (o for o in orbits if (o.omega, o.values[self.name]) == (one.omega, one.value))
+            if one.verdict != UNKNOWN or any(_passes(orbit, one.state) for orbit in here):
                 continue
-            found.append(here)
             system = self.system.with_parameters({self.name: one.value})
             with suppress(ConvergenceError):
                 orbits.append(periodic_orbit(system, one.omega, one.state, one.period))
@@ -193,7 +190,7 @@ def check_regimes(
     with reporting(progress, "integrating at points of the map") as report:
         sizes = _sizes(regimes)
         starts: list[_Start] = []
-        known: list[dict[int, tuple[Arc, float]]] = []
+        known: list[dict[int, tuple[Arc, PeriodicOrbit]]] = []
         landings: list[Landing] = []
         for number, (omega, value) in enumerate(places):
             if report is not None:
@@ -221,10 +218,10 @@ def _begin(
     sizes: tuple[Array, Array],
     draw: np.random.Generator,
     landings: list[Landing],
-) -> tuple[list[_Start], dict[int, tuple[Arc, float]]]:
-    """Starts at a point, and its known motions with their amplitudes."""
+) -> tuple[list[_Start], dict[int, tuple[Arc, PeriodicOrbit]]]:
+    """Starts at a point, and its known motions."""
     starts: list[_Start] = []
-    known: dict[int, tuple[Arc, float]] = {}
+    known: dict[int, tuple[Arc, PeriodicOrbit]] = {}
     strip = regimes.strip(value)
     n = regimes.system.n
     arcs = regimes.arcs(omega, value)
@@ -247,8 +244,8 @@ def _begin(
                 )
             )
             continue
-        extent = np.array([orbit.amplitude(i) for i in range(n)] + [orbit.velocity_amplitude(i) for i in range(n)])
-        known[id(arc)] = (arc, orbit.amplitude(_observed(regimes)))
+        extent = _extent(orbit)
+        known[id(arc)] = (arc, orbit)
         starts.append(_Start(number, arc, orbit.start() + _DISTURBED * extent * draw.uniform(-1.0, 1.0, 2 * n)))
     for _ in range(states):
         # of every order of magnitude between the smallest motion and the largest
@@ -264,7 +261,7 @@ def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
     """
     system, n = regimes.system, regimes.system.n
     sizes = [
-        np.array([point.orbit.amplitude(i) for i in range(n)] + [point.orbit.velocity_amplitude(i) for i in range(n)])
+        _extent(point.orbit)
         for strip in regimes.strips
         for arc in strip.arcs
         for point in (arc.points[0], arc.points[len(arc.points) // 2], arc.points[-1])
@@ -320,17 +317,28 @@ def _settled(
     return found
 
 
+def _passes(orbit: PeriodicOrbit, state: Array) -> bool:
+    """Whether a motion has a state (2n,) at the beginning of some period of the load."""
+    t = np.linspace(0.0, orbit.period, orbit.basis.nu, endpoint=False, dtype=np.float64)
+    states = np.concatenate((orbit.displacement(t), orbit.velocity(t)))
+    extent = _extent(orbit)
+    off = np.linalg.norm((states - state[:, None]) / np.where(extent > 0.0, extent, 1.0)[:, None], axis=0)
+    return bool(off.min() <= _SAME)
+
+
+def _extent(orbit: PeriodicOrbit) -> Array:
+    """Largest displacement and velocity of every DOF, shape (2n,)."""
+    dofs = range(orbit.balance.system.n)
+    return np.array([orbit.amplitude(i) for i in dofs] + [orbit.velocity_amplitude(i) for i in dofs])
+
+
 def _judged(
-    regimes: RegimeMap, places: Array, start: _Start, found: Attractor, known: dict[int, tuple[Arc, float]]
+    regimes: RegimeMap, places: Array, start: _Start, found: Attractor, known: dict[int, tuple[Arc, PeriodicOrbit]]
 ) -> Landing:
     """A trajectory with its verdict."""
     omega, value = (float(v) for v in places[start.point])
     label = regimes.label(omega, value)
-    alike = [
-        arc
-        for arc, amplitude in known.values()
-        if arc.nu == found.period and abs(amplitude - found.amplitude) <= _SAME * max(amplitude, found.amplitude)
-    ]
+    alike = [arc for arc, orbit in known.values() if arc.nu == found.period and _passes(orbit, found.state)]
     beyond = [nu for nu, _ in label.beyond]
     if alike and (start.arc is None or start.arc in alike):
         verdict = AGREES

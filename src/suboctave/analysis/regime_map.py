@@ -44,7 +44,7 @@ class Regime:
 
     @property
     def count(self) -> int:
-        """How many stable motions are known; two that differ by a shift in time only are one."""
+        """How many stable motions are known; two that differ by a shift in time only are one, mirror images two."""
         return len(self.motions)
 
     @property

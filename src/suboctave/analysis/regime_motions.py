@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.analysis.identity import apart
 from suboctave.analysis.making import make_curve, own_linear_part
 from suboctave.analysis.regime_arcs import Arc
 from suboctave.analysis.response import ResponseCurve
@@ -77,13 +78,7 @@ def _range(arc: Arc, value: float, within: tuple[float, float]) -> tuple[float, 
 def _follows(orbit: PeriodicOrbit, found: PeriodicOrbit) -> bool:
     """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
     lasting = _own(found) >= _KEPT * _own(orbit)
-    return lasting and _changed(orbit, found) <= _MOST and bool(floquet_multipliers(found.state()).stable)
-
-
-def _changed(one: PeriodicOrbit, other: PeriodicOrbit) -> float:
-    a, b = np.abs(one.amplitudes), np.abs(other.amplitudes)
-    top = min(len(a), len(b))
-    return float(np.linalg.norm(a[:top] - b[:top]) / np.linalg.norm(b))
+    return lasting and apart(orbit, found) <= _MOST and bool(floquet_multipliers(found.state()).stable)
 
 
 def _own(orbit: PeriodicOrbit) -> float:

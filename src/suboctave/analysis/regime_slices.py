@@ -6,17 +6,18 @@ limit point of a known curve that lies on none of these: isolas, and branches th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 from suboctave.analysis.borders import Border
 from suboctave.analysis.branch import Branch
-from suboctave.analysis.diagram import bifurcation_diagram
+from suboctave.analysis.diagram import bifurcation_diagram, grown_from
+from suboctave.analysis.identity import lies_on, mirrored
 from suboctave.analysis.junction import period_name
-from suboctave.analysis.regime_arcs import Arc, Edge, Stretch, lies_on, same_branch, stretches
+from suboctave.analysis.regime_arcs import Arc, Edge, Stretch, same_branch, stretches
 from suboctave.analysis.regime_atlas import Atlas
-from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import ConvergenceError, InputError
@@ -134,7 +135,7 @@ def _responses(found: Slice, atlas: Atlas, depth: int) -> Iterator[Branch]:
 
 
 def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slice) -> Iterator[tuple[Branch, bool]]:
-    """The branch through a limit point, and what bifurcates from it."""
+    """The branch through a limit point, its mirror image where that is another one, and what bifurcates from them."""
     where = f"omega = {float(border.across(value)):.6g}, {atlas.name} = {value:.6g}"
     places = [float(v) for b in atlas.borders if b.kind == "LP" and b.contains(value) for v in [b.across(value)]]
     low, high = min([*places, *atlas.omega]), max([*places, *atlas.omega])
@@ -147,35 +148,28 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
             # it may close where no limit point is known yet
             wider = continue_branch(start, "omega", (0.5 * low, 2.0 * high), **atlas.options)
             branch = wider if wider.closed else branch
+        met = [branch]
+        image = mirrored(branch.points[len(branch) // 2].orbit)
+        if image is not None and not lies_on(image, branch.points):
+            met.append(continue_branch(image, "omega", branch.options["bounds"]["omega"], **atlas.options))
     except (ConvergenceError, InputError) as failure:
         atlas.note(f"the branch through the limit point at {where} could not be followed: {failure}")
         return
-    if branch.interrupted:
-        raise KeyboardInterrupt
-    if any(same_branch(branch, other) for other, _ in found.branches):
-        found.explained.append(border)
-        return
-    detached = branch.closed and branch.departs is None and branch.arrives is None
-    yield branch, detached
-    waiting = [branch]
-    while waiting:
-        parent = waiting.pop(0)
-        if 2 * parent.nu > 2**depth:
+    levels = max(0, math.floor(math.log2(2**depth / branch.nu)))
+    for one in met:
+        if one.interrupted:
+            raise KeyboardInterrupt
+        if any(same_branch(one, other) for other, _ in found.branches):
+            found.explained.append(border)
             continue
-        met = [j for j in (parent.departs, parent.arrives) if j is not None]
-        for item in parent.bifurcations["PD"]:
-            if any(j.nu == item.orbit.basis.nu and j.same_place(item, high - low) for j in met):
-                continue
-            try:
-                child = switch_branch(item, **atlas.options)
-            except (ConvergenceError, InputError) as failure:
-                atlas.note(f"at {atlas.name} = {value:.6g}, PD at omega = {item.omega:.6g}: {failure}")
-                continue
-            met += [j for j in (child.departs, child.arrives) if j is not None]
-            if any(same_branch(child, other) for other, _ in found.branches):
-                continue
-            waiting.append(child)
-            yield child, detached
+        detached = one.closed and one.departs is None and one.arrives is None
+        for node in grown_from(one, levels, atlas.options):
+            for item, why in node.failures:
+                atlas.note(f"at {atlas.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+            if not any(same_branch(node.branch, other) for other, _ in found.branches):
+                yield node.branch, detached
+            if node.branch.interrupted:
+                raise KeyboardInterrupt
 
 
 def introduce(branch: Branch, value: float, atlas: Atlas) -> None:
@@ -248,7 +242,7 @@ def _shared(one: Arc, other: Arc) -> bool:
     """Whether two arcs of one period have motions in common."""
     pairs = ((one.points, other.points), (other.points, one.points))
     return any(
-        lies_on(points[min(round(share * len(points)), len(points) - 1)], others)
+        lies_on(points[min(round(share * len(points)), len(points) - 1)].orbit, others)
         for points, others in pairs
         for share in _SAMPLES
     )

@@ -27,11 +27,11 @@ from suboctave.analysis.checks import (
     is_number,
     make_settings,
 )
+from suboctave.analysis.identity import lies_on
 from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.making import Harmonics, rule_of
 from suboctave.analysis.progress import reporting, timed
-from suboctave.analysis.regime_arcs import lies_on_orbit
 from suboctave.analysis.regime_atlas import Atlas
 from suboctave.analysis.regime_map import RegimeMap, Strip
 from suboctave.analysis.regime_slices import Slice, beyond, introduce, looked
@@ -186,7 +186,7 @@ def _introduced(
     known: list[tuple[float, Branch]] = []
     for orbit in motions:
         value = orbit.values[atlas.name]
-        if any(v == value and b.nu == orbit.basis.nu and lies_on_orbit(orbit, b) for v, b in known):
+        if any(v == value and lies_on(orbit, b.points) for v, b in known):
             continue
         atlas.say(0.0, f"{period_name(orbit.basis.nu)} at {atlas.name} = {value:.6g}")
         try:

@@ -21,6 +21,7 @@ import numpy as np
 
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_range, check_system, is_number, make_settings
+from suboctave.analysis.identity import lies_on, relation
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
 from suboctave.analysis.progress import reporting
@@ -45,7 +46,7 @@ from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.timedomain import integrate
 
-__all__ = ["Seeds", "find_subharmonics", "isolated_branches", "lies_on", "periodic_orbit", "subharmonic_start"]
+__all__ = ["Seeds", "find_subharmonics", "isolated_branches", "periodic_orbit", "subharmonic_start"]
 
 #: part of a motion at fractions of omega below which it is taken for a motion of the load's period
 _SUBHARMONIC = 1e-3
@@ -164,7 +165,7 @@ def _branches(
     first, last = bounds
     found = list(known)
     for point in _motions(curve, bounds, seeds, settings):
-        if any(lies_on(branch, _orbit(point)) for branch in found):
+        if any(lies_on(_orbit(point), branch.points) for branch in found):
             continue
         trace = both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
         if trace.points:
@@ -267,17 +268,17 @@ def _motions(
     for number, value in enumerate(values):
         if settings.report is not None:
             settings.report(number / len(values), f"looking at {curve.where(np.array([value]))}")
-        met: list[Array] = []
+        met: list[PeriodicOrbit] = []
         for guess in _guesses(curve, float(value), seeds):
             try:
                 solved: Solved = solve_at(curve, guess, 0.0, patient)
             except ConvergenceError:
                 continue
-            if not _lasts(curve, solved.u) or any(_same(curve, solved.u, u) for u in met):
-                continue
-            met.append(solved.u)
             x = curve.split(solved.u)[0]
             start = PeriodicOrbit(curve.balance, x, float(value), curve.balance.values, 0.0, 0.0, curve.adaptive)
+            if not _lasts(curve, solved.u) or any(relation(start, other).one for other in met):
+                continue
+            met.append(start)
             try:
                 point = start_point(curve, float(value), start, settings.newton)
             except ConvergenceError:
@@ -375,26 +376,3 @@ def _lasts(curve: ResponseCurve, u: Array) -> bool:
 
 def _primes(number: int) -> list[int]:
     return [p for p in range(2, number + 1) if number % p == 0 and all(p % q for q in range(2, p))]
-
-
-def _same(curve: ResponseCurve, u: Array, other: Array) -> bool:
-    """Whether two motions are one, up to a shift by load periods."""
-    size = length(u[:-1])
-    return any(length(image[:-1] - other[:-1]) <= 1e-4 * size for image in curve.images(u))
-
-
-def lies_on(branch: Branch, orbit: PeriodicOrbit) -> bool:
-    """Whether a motion lies on a branch over omega: between two of its points, by the moduli of its harmonics."""
-    moduli, omega = np.abs(orbit.amplitudes), orbit.omega
-    values = branch.omega
-    size = length(moduli)
-    for i in np.flatnonzero((values[:-1] - omega) * (values[1:] - omega) <= 0.0):
-        a, b = (np.abs(orbit.amplitudes) for orbit in branch.orbits[i : i + 2])
-        top = min(len(a), len(b), len(moduli))
-        span = values[i + 1] - values[i]
-        share = (omega - values[i]) / span if span else 0.5
-        middle = (1.0 - share) * a[:top] + share * b[:top]
-        reach = 0.2 * length(b[:top] - a[:top]) + 1e-3 * size
-        if length(middle - moduli[:top]) <= reach:
-            return True
-    return False

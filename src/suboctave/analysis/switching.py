@@ -17,6 +17,7 @@ import numpy as np
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_bounds, make_settings
 from suboctave.analysis.follow import follow, same_event
+from suboctave.analysis.identity import relation
 from suboctave.analysis.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
@@ -285,7 +286,7 @@ def _is_turn(item: Bifurcation, here: Bifurcation) -> bool:
     """
     name = here.parameter_name
     near = math.isclose(item.parameter(name), here.parameter(name), rel_tol=_TURN)
-    return item.kind == "LP" and near and item.orbit.matches(here.orbit, math.sqrt(_TURN))
+    return item.kind == "LP" and near and relation(item.orbit, here.orbit, math.sqrt(_TURN)).one
 
 
 def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:

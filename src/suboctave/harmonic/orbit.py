@@ -86,18 +86,6 @@ class PeriodicOrbit:
         """Complex amplitudes `c_k = a_k - i b_k`, shape (H + 1, n): `x = Re sum_k c_k exp(i k omega t / nu)`."""
         return to_complex(self.coefficients)
 
-    def matches(self, other: PeriodicOrbit, tolerance: float) -> bool:
-        """Whether another motion is this one up to a shift by load periods, but for a share of its size."""
-        nu, scale = self.basis.nu, self.balance.scales()[0]
-        if other.basis.nu != nu:
-            return False
-        own, there = self.amplitudes * scale, other.amplitudes * scale
-        top = max(len(own), len(there))
-        own, there = (np.pad(c, ((0, top - len(c)), (0, 0))) for c in (own, there))
-        turns = np.exp(2j * np.pi / nu * np.outer(np.arange(nu), np.arange(top)))
-        apart = min(float(np.linalg.norm(own * turn[:, None] - there)) for turn in turns)
-        return bool(apart <= tolerance * np.linalg.norm(there))
-
     def displacement(self, t: Array | float) -> Array:
         """x at the times t; shape (n,) for a number, (n, len(t)) for an array (a `Trajectory` has time first)."""
         return self._series(t, 0)
