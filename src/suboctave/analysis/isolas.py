@@ -252,7 +252,9 @@ def _live(survey: Survey, lives: list[Life], places: Sequence[float]) -> None:
 
 
 def _consider(survey: Survey, lives: list[Life], loop: Loop) -> None:
-    """A branch that is detached lives over some range; any other is known from now on."""
+    """A branch that is detached lives over some range, unless it is known; any other is known from now on."""
+    if any(life.covers(leg, loop.value) for life in lives for leg in loop.legs):
+        return
     if loop.detached and loop.legs:
         survey.say(_SHARE, f"closed branch at {survey.name} = {loop.value:.6g}")
         life = Life.of(loop)
@@ -326,6 +328,5 @@ def _met(survey: Survey, lives: list[Life], branch: Branch, value: float) -> Non
     if branch.interrupted:
         raise KeyboardInterrupt
     loop = survey.loop_of(branch, value)
-    if not any(life.covers(leg, value) for life in lives for leg in loop.legs):
-        _consider(survey, lives, loop)
-        _live(survey, lives, ())
+    _consider(survey, lives, loop)
+    _live(survey, lives, ())
