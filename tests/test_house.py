@@ -28,7 +28,7 @@ ROOMS = [
     "study",
 ]
 # Modules beside the rooms. The first two belong to everybody and import nothing of ours but each other.
-COMMON = {"compiled", "errors", "lazy", "version"}
+COMMON = {"compiled", "errors", "interruption", "lazy", "version"}
 # Rooms that are kept even further apart than the order asks.
 APART = {
     # Vibration-free: it follows any curve.

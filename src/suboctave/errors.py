@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["ConvergenceError", "InputError", "SuboctaveError", "suggest"]
+__all__ = ["ConvergenceError", "InputError", "SuboctaveError", "TimeLimitError", "suggest"]
 
 
 class SuboctaveError(Exception):
@@ -21,6 +21,10 @@ class InputError(SuboctaveError, ValueError):
 
 class ConvergenceError(SuboctaveError, ArithmeticError):
     """An iteration that did not arrive; the message says where on the curve and what to change."""
+
+
+class TimeLimitError(SuboctaveError):
+    """A time limit (`seconds=`) that was reached before there was anything to keep."""
 
 
 def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:

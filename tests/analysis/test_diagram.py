@@ -95,7 +95,6 @@ def test_wrong_choices_of_a_branch(pitchfork):
     [
         ({"depth": 0}, 1, "depth=0 reached: 2 bifurcations"),
         ({"max_branches": 2}, 2, "max_branches=2 reached: 2 bifurcations"),
-        ({"seconds": 1e-9}, 1, "1e-09 seconds are over: 2 bifurcations"),
     ],
 )
 def test_depth_and_budgets_end_it_and_say_what_is_left(strong, options, branches, said):

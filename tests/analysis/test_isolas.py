@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import fsolve
 
 import suboctave as so
+from suboctave.interruption import Interruption
 
 OMEGA = (1.3, 4.5)
 
@@ -215,7 +216,8 @@ def test_ends_can_be_tracked_again(isolas):
 def test_a_budget_ends_it_politely():
     isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), seconds=1e-6)
     assert list(isolas) == []
-    assert any("seconds are over" in note for note in isolas.notes)
+    assert isolas.interruption == Interruption(1e-6)
+    assert any("time limit of 1e-06 s" in note for note in isolas.notes)
 
 
 def test_ctrl_c_keeps_what_is_there():
@@ -226,6 +228,7 @@ def test_ctrl_c_keeps_what_is_there():
     isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), values=2, progress=stop)
     assert list(isolas) == []
     assert isolas.limit_points
+    assert isolas.interruption == Interruption()
     assert any("interrupted" in note for note in isolas.notes)
 
 

@@ -23,7 +23,7 @@ def planted(branch, index, **changes):
     points = list(branch.points)
     points[index] = replace(points[index], **changes)
     return Branch(
-        branch.system, branch.name, points, list(branch.bifurcations.met), [], branch.closed, branch.ended,
+        branch.system, branch.name, points, list(branch.bifurcations.met), [], branch.closed, branch.endings,
         branch.observe, branch.options,
     )  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,7 +94,7 @@ def test_ctrl_c_keeps_what_was_computed(monkeypatch, tmp_path, capsys):
     def interrupted(case, progress=None):
         curve = curve_of(case)
         curve.dataset.attrs["ended"] = "interrupted at omega = 2; what was computed is kept"
-        return curve
+        return replace(curve, interrupted=True)
 
     monkeypatch.setattr(demo, "compute", interrupted)
     with pytest.raises(KeyboardInterrupt):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from suboctave.analysis.attractors import attractor_of
 from suboctave.analysis.basin_attractors import Catalogue, Given, enter_attractors
 from suboctave.errors import InputError
+from suboctave.interruption import pass_on
 from suboctave.model.description import describe
 from suboctave.model.element import Array
 from suboctave.store.journal import Journal
@@ -175,8 +176,7 @@ class BasinRun:
         motions = self.flow.over(
             states, c.omega, periods, c.values, skip=periods - last, measure=measure, workers=c.workers
         )
-        if not motions.finished.all():
-            raise KeyboardInterrupt
+        pass_on(motions.interruption)
         return motions
 
     def _settle(self, states: Array, told: Callable[[float], None]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:

@@ -218,6 +218,7 @@ def basins(
     keep: Any = None,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> Basins:
     """The basins of attraction on a plane of states at phase 0 of the load.
 
@@ -245,7 +246,7 @@ def basins(
         A file in which what is done is kept as it comes (a journal): called again with the same arguments after a kill
         or Ctrl-C, only the rest is computed, and the result is the same. Finished ones are read from it. With other
         arguments, other `attractors` among them, it is refused.
-    observe, workers, progress
+    observe, workers, progress, seconds
         As in `poincare_sections`. The result does not depend on the number of workers.
 
     A trajectory is stopped as soon as it lies in an ellipsoid about a stroboscopic point of a stable motion in which

@@ -14,10 +14,12 @@ from suboctave.analysis.audit import Audit
 from suboctave.analysis.junction import Junction, period_name
 from suboctave.analysis.readings import BranchReadings, columns, with_readings
 from suboctave.bifurcation import Bifurcation, BifurcationList
+from suboctave.continuation.ending import Ending, interruption_of, sentence
 from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import Interruption
 from suboctave.model.system import System
 from suboctave.stability import FloquetResult
 from suboctave.store.columns import parameter_column
@@ -53,6 +55,11 @@ class Branch(BranchReadings):
         events, in the order met.
     closed, ended
         Whether the curve closed on itself, and a sentence saying why it ended.
+    endings
+        The same as data: an `Ending` with its `reason` for the first and for the last point.
+    interruption
+        What stopped it before its end in one of its directions, Ctrl-C or a time limit (`seconds`); None if nothing
+        did.
     departs, arrives
         Where it leaves the branch that it bifurcates from, and where it meets it again at its end (`Junction`); None
         where it does not.
@@ -70,7 +77,7 @@ class Branch(BranchReadings):
         bifurcations: list[Bifurcation],
         events: list[Bifurcation],
         closed: bool,
-        ended: str,
+        endings: tuple[Ending, ...],
         observe: int,
         options: Mapping[str, Any],
         warnings: tuple[str, ...] = (),
@@ -84,7 +91,7 @@ class Branch(BranchReadings):
         self.bifurcations = BifurcationList(bifurcations)
         self.events = BifurcationList(events, tuple({e.kind for e in events}))
         self.closed = closed
-        self.ended = ended
+        self.endings = endings
         self.observe = observe
         self.options = dict(options)
         self.warnings = warnings
@@ -98,8 +105,18 @@ class Branch(BranchReadings):
 
     @property
     def interrupted(self) -> bool:
-        """Whether its user stopped it; what had been computed is there."""
-        return self.ended.startswith("interrupted")
+        """Whether Ctrl-C or a time limit stopped it, in whichever direction; what had been computed is there."""
+        return self.interruption is not None
+
+    @property
+    def interruption(self) -> Interruption | None:
+        """What stopped it, None if nothing did."""
+        return interruption_of(self.endings)
+
+    @property
+    def ended(self) -> str:
+        """Why it ended, in words."""
+        return sentence(self.endings)
 
     @property
     def nu(self) -> int:

@@ -180,6 +180,7 @@ def brute_force_diagram(
     observe: int | None = None,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> BruteForceDiagram:
     """Integrate in time over a range of the frequency or of a parameter, and tell what the motion settles on.
 
@@ -199,7 +200,7 @@ def brute_force_diagram(
     transient, periods
         Periods of the load that are left out at every value, and those that are kept. A motion of period nT is told
         if `periods` is at least 3 n.
-    method, steps_per_period, tolerance, period_tolerance, observe, workers, progress
+    method, steps_per_period, tolerance, period_tolerance, observe, workers, progress, seconds
         As in `poincare_sections`.
 
     Raises
@@ -273,7 +274,7 @@ class _Scan:
             motions = flow.over(
                 states, *self._at(self.grid[columns]), skip=self.transient, measure=True, workers=1
             )  # fmt: skip
-            if not motions.finished.all():
+            if motions.interruption is not None:
                 return False
             assert motions.peaks is not None
             for i, (row, column) in enumerate(zip(rows, columns, strict=True)):

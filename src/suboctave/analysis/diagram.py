@@ -9,11 +9,9 @@ from __future__ import annotations
 import sys
 from collections import deque
 from collections.abc import Callable, Sequence
-from time import perf_counter
 from typing import Any, Protocol
 
 from suboctave.analysis.branch import Branch
-from suboctave.analysis.checks import is_number
 from suboctave.analysis.junction import Junction
 from suboctave.analysis.making import Harmonics
 from suboctave.analysis.progress import reporting, timed
@@ -25,6 +23,7 @@ from suboctave.bifurcation.formulation import Formulation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import Interruption
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.store.layout import events_met
@@ -83,7 +82,7 @@ def bifurcation_diagram(
     max_branches
         Branches after which no more are followed.
     seconds
-        Time after which no new branch is begun; None for as long as it takes.
+        Time limit, after which what has been found is given.
     keeper
         Keeps branches as they are found, and knows those that an earlier run with the same arguments has found.
 
@@ -100,9 +99,6 @@ def bifurcation_diagram(
         raise InputError(f"depth must be a whole number, 0 or more, not {depth!r}")
     if isinstance(max_branches, bool) or not isinstance(max_branches, int) or max_branches < 1:
         raise InputError(f"max_branches must be a whole number of at least 1, not {max_branches!r}")
-    if seconds is not None and not (is_number(seconds) and seconds > 0.0):
-        raise InputError(f"seconds must be a positive number, not {seconds!r}")
-    begin = perf_counter()
     with reporting(progress, "bifurcation diagram") as report:
         told = _Told(report)
         options: dict[str, Any] = {
@@ -118,33 +114,32 @@ def bifurcation_diagram(
         first = None if keeper is None else keeper.known(-1, -1)
         if first is None:
             first = frequency_response(system, omega, harmonics, start=start, **options)
-            if keeper is not None and not _interrupted(first):
+            if keeper is not None and not first.interrupted:
                 keeper.keep(-1, -1, first)
         root = DiagramBranch(first)
-        stopped = _grown(root, depth, max_branches, seconds, begin, options, told, keeper)
-    return BifurcationDiagram(root, stopped)
+        stopped, interruption = _grown(root, depth, max_branches, options, told, keeper)
+    return BifurcationDiagram(root, stopped, interruption)
 
 
-def grown_from(branch: Branch, depth: int, options: dict[str, Any]) -> DiagramBranch:
+def grown_from(branch: Branch, depth: int, options: dict[str, Any]) -> BifurcationDiagram:
     """A branch that is known with what bifurcates from it, so many bifurcations deep; `options` of the verbs."""
     root = DiagramBranch(branch)
-    _grown(root, depth, sys.maxsize, None, 0.0, dict(options), _Told(None), None)
-    return root
+    stopped, interruption = _grown(root, depth, sys.maxsize, dict(options), _Told(None), None)
+    return BifurcationDiagram(root, stopped, interruption)
 
 
 def _grown(
     root: DiagramBranch,
     depth: int,
     most: int,
-    seconds: float | None,
-    begin: float,
     options: dict[str, Any],
     told: _Told,
     keeper: Keeper | None,
-) -> str:
-    """Follow what leaves the branches, level by level; why that ended early, in words."""
+) -> tuple[str, Interruption | None]:
+    """Follow what leaves the branches, level by level; why that ended early, in words, and what interrupted it."""
     waiting = deque([root])
-    count, out_of = 1, "interrupted" if _interrupted(root.branch) else ""
+    count, full = 1, False
+    interruption = root.branch.interruption
     while waiting:
         node = waiting.popleft()
         switched = [b for b in node.branch.bifurcations if b.kind in _SWITCHED]
@@ -153,11 +148,8 @@ def _grown(
         for number, item in enumerate(switched):
             if any(end.same_place(item, span, beside) for end, beside in known):
                 continue
-            if not out_of and count >= most:
-                out_of = f"max_branches={most} reached"
-            if not out_of and seconds is not None and perf_counter() - begin > seconds:
-                out_of = f"{seconds:g} seconds are over"
-            if out_of or node.depth >= depth:
+            full = full or count >= most
+            if full or interruption is not None or node.depth >= depth:
                 node.left.append(item)
                 continue
             if told.report is not None:
@@ -168,23 +160,24 @@ def _grown(
             except (ConvergenceError, InputError) as failure:
                 node.failures.append((item, str(failure)))
                 continue
-            except KeyboardInterrupt:
+            except KeyboardInterrupt as cause:
                 node.left.append(item)
-                out_of = "interrupted"
+                interruption = Interruption.of(cause)
                 continue
             child = DiagramBranch(branch, item, node.depth + 1, count, met=node.branch.bifurcations["BP"])
             count += 1
             node.children.append(child)
             waiting.append(child)
             known += _shared(child)
-            if _interrupted(branch):
-                out_of = "interrupted"
+            interruption = branch.interruption
     left = [(node, item) for node in root for item in node.left]
-    if out_of:
-        return f"{out_of}: {len(left)} bifurcations were not switched at (see node.left)"
+    if full or interruption is not None:
+        why = f"max_branches={most} reached" if full else interruption
+        return f"{why}: {len(left)} bifurcations were not switched at (see node.left)", interruption
     if left:
-        return f"depth={depth} reached: {len(left)} bifurcations of the deepest branches were not switched at"
-    return ""
+        why = f"depth={depth} reached: {len(left)} bifurcations of the deepest branches were not switched at"
+        return why, None
+    return "", None
 
 
 def _switched(node: DiagramBranch, item: Bifurcation, options: dict[str, Any], keeper: Keeper | None) -> Branch:
@@ -195,13 +188,9 @@ def _switched(node: DiagramBranch, item: Bifurcation, options: dict[str, Any], k
     branch = keeper.known(node.number, event)
     if branch is None:
         branch = switch_branch(item, **options)
-        if not _interrupted(branch):
+        if not branch.interrupted:
             keeper.keep(node.number, event, branch)
     return branch
-
-
-def _interrupted(branch: Branch) -> bool:
-    return branch.interrupted
 
 
 def _shared(node: DiagramBranch) -> list[tuple[Junction, PeriodicOrbit]]:

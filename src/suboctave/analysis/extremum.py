@@ -37,6 +37,7 @@ from suboctave.continuation.linear import Factor, length, one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.interruption import check_time, limited
 
 __all__ = ["locate_extremum", "newton_extremum"]
 
@@ -47,11 +48,13 @@ _ROUNDING = 1e-11
 _ITERATIONS = 12
 
 
+@limited
 def locate_extremum(
     extremum: TrackedEvent,
     *,
     formulation: Formulation | str | None = None,
     newton: NewtonOptions | None = None,
+    seconds: float | None = None,
 ) -> TrackedEvent:
     """An extremum of a parameter along a curve of bifurcations, solved for by Newton's method from one that is known.
 
@@ -63,6 +66,8 @@ def locate_extremum(
         "bordered" (default) or "alcorta2019", the system of Alcorta et al. (Nonlinear Dynamics 98, 2019, Eq. 32).
     newton
         Tolerances and number of iterations.
+    seconds
+        Time limit, after which a TimeLimitError is raised.
 
     Raises
     ------
@@ -113,6 +118,7 @@ def newton_extremum(
     solve = _Published(curve, u, turning, weights) if published else _Bordered(curve, u, turning, weights)
     size = np.inf
     for _ in range(newton.iterations + 1):
+        check_time()
         step, error = solve.step(u)
         before, size = size, length(weights * step)
         if error <= newton.tolerance and (size <= _ROUNDING or (size <= newton.correction and size > 0.1 * before)):

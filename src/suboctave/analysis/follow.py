@@ -16,19 +16,21 @@ from suboctave.analysis.identity import relation
 from suboctave.analysis.junction import UNSEEN, Meeting, meeting
 from suboctave.analysis.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
-from suboctave.analysis.trace import Settings, Trace
-from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
+from suboctave.analysis.trace import Doubt, Settings, Trace
+from suboctave.bifurcation import CONTACT_KINDS, Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings, touches
 from suboctave.bifurcation.kinds import BRANCH_POINT, PERIOD_DOUBLING, changes, solved_by
 from suboctave.bifurcation.layer import behind_their_grazings
 from suboctave.continuation import CurvePoint, Event, March
+from suboctave.continuation.ending import Ending
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point, point_between
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import Interruption
 
 #: a limit point closer to a branch point than this, in scaled arclength, is the branch point
 _APART = 1e-5
@@ -49,8 +51,6 @@ def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], set
 class _Follower:
     def __init__(self, start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> None:
         self.settings = settings
-        self.bounds = bounds
-        self.direction = direction
         self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear, self._arrived)
         self.trace = Trace()
         self.previous: Sample | None = None
@@ -62,40 +62,42 @@ class _Follower:
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._turned: Bifurcation | None = None
         self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
-        self._done = 0.0
         self._kinds = solved_by(settings.formulation)
         #: looks for period doublings in place of det J_half, where the formulation has tests of its own
         self._watch: DoublingWatch | None = None
         if settings.formulation.doubling_test is not None:
             self._watch = DoublingWatch(settings.formulation.doubling_test, self._kinds["PD"], self._located)
         #: somebody who keeps what has been found (`progress.reporting`)
-        self._found: Callable[[Trace], None] | None = getattr(settings.report, "found", None)
+        self._found: Callable[[Trace], None] | None = None
+        if settings.report is not None:
+            self._found = getattr(settings.report.report, "found", None)
 
     def run(self) -> Trace:
         trace = self.trace
         try:
+            if self.settings.report is not None:
+                self.settings.report.begins()
             # in a fresh installation the first verdict on stability waits for its kernels to be compiled
             self._report(self.march.start)
             for point in self.march:
                 self._accept(point)
                 if self._turned is not None and self.settings.half:
                     break
-            trace.closed, trace.ended = self.march.closed, self.march.ended
+            trace.closed = self.march.closed
+            trace.ends(self.march.ending)
             trace.arrives = self._arrival()
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as cause:
             if self.previous is None:
                 self.previous = start = self._sample(self.march.start)
                 trace.points.append(BranchPoint(orbit_of(start), start.floquet, 0.0, start.point.iterations))
+            # of the step that was under way nothing counts
+            trace.cut(trace.points[-1].arclength)
             where = self.previous.point.curve.where(self.previous.point.u)
-            trace.interrupted = True
-            trace.ended = f"interrupted at {where}; what was computed is kept"
+            trace.ends(Ending.stopped(Interruption.of(cause), where))
         self._say_missed(everything=True)
         trace.audit = self._guard.audit
         if self._turned is not None and self.settings.half:
             trace.end_at(self._turned)
-        trace.warnings += [
-            f"{stretch}; a smaller max_step or more harmonics may settle it" for stretch in trace.audit.unsettled
-        ]
         if trace.closed:
             _drop_seam(trace.bifurcations)
             _drop_seam(trace.events)
@@ -129,7 +131,7 @@ class _Follower:
         if self._meeting is None or not self.trace.points:
             return None
         met, arclength = self._meeting[2], self.trace.points[-1].arclength
-        if self.march.ended != met.arrival.reason:
+        if self.march.ending is not met.arrival.ending:
             return None
         if met.doubt:
             self.trace.warnings.append(f"{met.doubt}: {UNSEEN}")
@@ -193,14 +195,17 @@ class _Follower:
     def _report(self, point: CurvePoint) -> None:
         if self.settings.report is None:
             return
-        low, high = self.bounds
-        share = (point.parameter - low) / (high - low)
-        # where the branch folds back the share done does not
-        self._done = max(self._done, min(1.0, share if self.direction > 0 else 1.0 - share))
-        self.settings.report(self._done, point.curve.where(point.u))
+        curve, trace = point.curve, self.trace
+        assert isinstance(curve, ResponseCurve)
+        basis, located = curve.balance.basis, sum(b.kind not in CONTACT_KINDS for b in trace.bifurcations)
+        where = curve.where(point.u)
+        self.settings.report.at(point.parameter, where, len(trace.points), located, basis.harmonics // basis.nu)
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
-        return bifurcation_at(located, a, b, self.settings.observe, self.trace.warnings)
+        sentences: list[str] = []
+        item = bifurcation_at(located, a, b, self.settings.observe, sentences)
+        self.trace.doubts += [Doubt(item.kind, item.arclength, text) for text in sentences]
+        return item
 
     def _look_behind(self, passage: Passage) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""

@@ -12,6 +12,7 @@ from suboctave.analysis.checks import is_number
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow, check_count
@@ -144,6 +145,7 @@ def integrate(
     method: str = "accurate",
     tolerance: float | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> Trajectory:
     """Integrate the equation of motion in time, from phase 0 of the load over whole periods.
 
@@ -168,6 +170,8 @@ def integrate(
         solved in each step.
     progress
         True for a bar, or a callable (share, text).
+    seconds
+        Time limit, after which a TimeLimitError is raised.
 
     Raises
     ------
@@ -186,8 +190,7 @@ def integrate(
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
         )
-    if not motions.finished.all():
-        raise KeyboardInterrupt
+    pass_on(motions.interruption)
     check_motions(motions)
     assert motions.peaks is not None
     states, peaks = motions.states[0], motions.peaks[0]

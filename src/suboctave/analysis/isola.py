@@ -19,7 +19,9 @@ from suboctave.analysis.tracked_branch import TrackedBranch, TrackedPoint
 from suboctave.analysis.verbs import continue_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation.ending import Ending, EndReason
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import limited
 from suboctave.model.system import System
 
 __all__ = ["Isola", "IsolaEnd"]
@@ -130,8 +132,11 @@ class Isola:
     def __contains__(self, value: float) -> bool:
         return self.range[0] <= value <= self.range[1]
 
-    def at(self, value: float, *, progress: Any = None) -> Branch:
+    @limited
+    def at(self, value: float, *, progress: Any = None, seconds: float | None = None) -> Branch:
         """The closed branch at a value of the parameter, over omega.
+
+        `seconds`: time limit, after which what was computed is given and not kept in `known`, as after Ctrl-C.
 
         Raises
         ------
@@ -291,10 +296,11 @@ def _joined(chain: Sequence[Leg], bounds: tuple[float, float]) -> TrackedBranch:
         points += inside[1:] if points and inside and inside[0].orbit is points[-1].orbit else inside
     curve = chain[0].curve
     met = [e for e in curve.bifurcations.met if any(e.orbit is p.orbit for p in points) or _within(e, points)]
-    text = f"cut to {chain[0].name} from {low:.7g} to {high:.7g}"
+    ending = Ending(EndReason.CUT, detail=f"cut to {chain[0].name} from {low:.7g} to {high:.7g}")
+    endings = (ending, ending)
     options = curve.options
     return TrackedBranch(
-        curve.kind, curve.names, curve.system, curve.name, points, met, [], False, text, curve.observe, options
+        curve.kind, curve.names, curve.system, curve.name, points, met, [], False, endings, curve.observe, options
     )
 
 

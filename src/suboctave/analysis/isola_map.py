@@ -26,6 +26,7 @@ from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch, TrackedPoint
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import Interruption, pass_on
 
 __all__ = ["isola_map"]
 
@@ -48,6 +49,7 @@ def isola_map(
     probes: int | Sequence[float] = 3,
     max_step: float | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> IsolaMap:
     """Where in two design parameters an isola exists: its birth and its merging followed in a second parameter.
 
@@ -62,6 +64,8 @@ def isola_map(
         middle of it, evenly spread; 0 for none; or these values.
     max_step
         As in `track`.
+    seconds
+        Time limit, after which the map holds the curves that are complete.
 
     Returns
     -------
@@ -97,6 +101,7 @@ def isola_map(
     if max_step is not None:
         options["max_step"] = max_step
     notes: list[str] = []
+    interruption: Interruption | None = None
     regions: list[IsolaRegion] = []
     cache: list[tuple[IsolaEnd, TrackedBranch]] = []
     with reporting(progress, f"isolas over {name} and {parameter}") as report:
@@ -107,10 +112,11 @@ def isola_map(
                 region = _region(isola, parameter, (low, high), options, cache, notes)
                 if region is not None:
                     regions.append(_probed(region, isola, probes, options))
-        except KeyboardInterrupt:
-            notes.append("interrupted: what is here is what had been found by then")
+        except KeyboardInterrupt as cause:
+            interruption = Interruption.of(cause)
+            notes.append(f"{interruption}: what is here is what had been found by then")
     within = isolas.bounds if isinstance(isolas, Isolas) else None
-    return IsolaMap(regions, system, name, parameter, within, (low, high), notes)
+    return IsolaMap(regions, system, name, parameter, within, (low, high), notes, interruption)
 
 
 def _checked(isolas: Any) -> list[Isola]:
@@ -192,6 +198,7 @@ def _tracked(
         else:
             return curve
     curve = track(end, parameter, bounds, **options)
+    pass_on(curve.interruption)
     cache.append((end, curve))
     return curve
 
@@ -230,11 +237,13 @@ def _probe(region: IsolaRegion, border: Border, node: TrackedPoint, isola: Isola
     width = high - low
     try:
         curve = track(start, name, (low - 0.5 * width, high + 0.5 * width), **options)
+        pass_on(curve.interruption)
         legs = [leg for leg in legs_of(curve, name) if leg.contains(middle)]
         if not legs:
             return Probe(place, middle, (low, high), None, "no limit points there")
         at = legs[int(np.argmin([abs(leg.omega_near(middle)[0] - node.orbit.omega) for leg in legs]))]
         branch = closed_branch(at.limit_point(middle), isola.omega, name, legs, options)
+        pass_on(branch.interruption)
     except (ConvergenceError, InputError) as failure:
         return Probe(place, middle, (low, high), None, str(failure))
     turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]

@@ -17,6 +17,7 @@ from suboctave.analysis.junction import period_name
 from suboctave.analysis.results import Table
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import Interruption
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
 
@@ -107,6 +108,8 @@ class IsolaMap:
         One `IsolaRegion` for each isola.
     notes
         What is not settled; empty if nothing is.
+    interruption
+        What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
     def __init__(
@@ -118,6 +121,7 @@ class IsolaMap:
         within: tuple[float, float] | None,
         bounds: tuple[float, float],
         notes: Sequence[str],
+        interruption: Interruption | None = None,
     ) -> None:
         self.regions = tuple(regions)
         self.system = system
@@ -125,6 +129,7 @@ class IsolaMap:
         self.second = second
         self.within = within
         self.bounds = bounds
+        self.interruption = interruption
         doubts = [
             f"at {second} = {probe.second:.6g}, {parameter} = {probe.middle:.6g}: {probe.said}"
             for region in regions

@@ -6,10 +6,8 @@ from them. Each limit point is followed over the parameter unless it lies on a c
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -26,9 +24,10 @@ from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import pass_on
 from suboctave.model.system import System
 
-__all__ = ["SAME_OMEGA", "Loop", "OutOfTime", "Survey"]
+__all__ = ["SAME_OMEGA", "Loop", "Survey"]
 
 #: frequencies that differ by less, relatively, are one
 SAME_OMEGA = 1e-6
@@ -38,10 +37,6 @@ _TOGETHER = 1e-7
 _CLEAR = 1e-4
 #: a limit point lies at most this many distances between neighbours away from the curve's chord
 _BESIDE = 3.0
-
-
-class OutOfTime(Exception):
-    """The time that a search was given is over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +67,6 @@ class Survey:
         Curves of limit points over the parameter, their legs, curves of period doublings.
     met
         Branches that bifurcate from a response, or are one, by the value of the parameter.
-    until
-        When `perf_counter` has passed this nothing new is begun.
     """
 
     system: System
@@ -90,7 +83,6 @@ class Survey:
     notes: list[str] = field(default_factory=list)
     met: dict[float, list[Branch]] = field(default_factory=dict)
     report: Callable[[float, str], None] | None = None
-    until: float = math.inf
     _explained: set[tuple[float, int]] = field(default_factory=set)
     _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
 
@@ -106,25 +98,18 @@ class Survey:
 
     def say(self, share: float, where: str) -> None:
         """Tell whoever wants to know."""
-        self.check_time()
         if self.report is not None:
             self.report(share, where)
-
-    def check_time(self) -> None:
-        """Raise `OutOfTime` where no more is to be begun."""
-        if perf_counter() > self.until:
-            raise OutOfTime
 
     # ---------------------------------------------------------------------------------------------------- responses
     def look(self, value: float) -> None:
         """Follow responses at a value and what bifurcates from them; limit points and doublings over the parameter."""
         for branch, level in self._branches(value):
+            pass_on(branch.interruption)
             if level < self.depth:
                 for item in branch.bifurcations["PD"]:
                     self.doubling(item, value)
             self.attach(Loop(value, branch, self._legs_on(branch, value), False))
-            if branch.interrupted:
-                raise KeyboardInterrupt
 
     def _branches(self, value: float) -> Iterator[tuple[Branch, int]]:
         """Branches at a value, and how many bifurcations lead to them from the response, which begins at both ends."""
@@ -140,6 +125,7 @@ class Survey:
                 yield node.branch, node.depth
                 for item, why in node.failures:
                     self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+            pass_on(diagram.interruption)
             root = diagram.root.branch
             if len(root) and root.points[-1].orbit.omega == ends[1]:
                 return
@@ -192,22 +178,22 @@ class Survey:
             self.doublings.append(curve)
 
     def _tracked(self, item: Bifurcation, value: float) -> TrackedBranch | None:
-        self.check_time()
         where = f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}"
         if len(self.curves) + len(self.doublings) >= self.most:
             self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
             return None
         try:
             around = 0.5 * self.omega[0], 2.0 * self.omega[1]
-            return track(item, self.name, self.bounds, omega=around, **self.options)
+            curve = track(item, self.name, self.bounds, omega=around, **self.options)
         except (ConvergenceError, InputError) as failure:
             self.note(f"the {where} could not be followed over {self.name}: {failure}")
             return None
+        pass_on(curve.interruption)
+        return curve
 
     # --------------------------------------------------------------------------------------------------------- loops
     def loop(self, leg: Leg, value: float) -> Loop | None:
         """The branch through a leg's limit point at a value; None where it cannot be followed."""
-        self.check_time()
         try:
             found = leg.limit_point(value)
             same = [other for other in self.legs if other.curve is leg.curve]
@@ -216,6 +202,7 @@ class Survey:
             omega, _ = leg.omega_near(value)
             self.note(f"the branch at omega = {omega:.6g}, {self.name} = {value:.6g} could not be followed: {failure}")
             return None
+        pass_on(branch.interruption)
         return self.loop_of(branch, value, leg)
 
     def loop_of(self, branch: Branch, value: float, *known: Leg) -> Loop:
@@ -249,7 +236,6 @@ class Survey:
                     return None
                 if any(lies_on(item.orbit, other.points) for other in connected if other is not one):
                     continue
-                self.check_time()
                 try:
                     crossing = switch_branch(item, **self.options)
                 except (ConvergenceError, InputError) as failure:
@@ -258,8 +244,7 @@ class Survey:
                         f"{value:.6g}, which could not be followed: whether it is isolated is open ({failure})"
                     )
                     return None
-                if crossing.interrupted:
-                    raise KeyboardInterrupt
+                pass_on(crossing.interruption)
                 if not any(lies_on(crossing.points[len(crossing) // 2].orbit, other.points) for other in connected):
                     connected.append(crossing)
         crossed = (one for one in connected if not any(_turns_back(one, item) for item in one.bifurcations["BP"]))

@@ -13,9 +13,7 @@ there).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -31,7 +29,7 @@ from suboctave.analysis.checks import (
 )
 from suboctave.analysis.isola import Isola
 from suboctave.analysis.isola_life import Life, extend
-from suboctave.analysis.isola_survey import Loop, OutOfTime, Survey
+from suboctave.analysis.isola_survey import Loop, Survey
 from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.limit_curves import Leg
@@ -42,6 +40,7 @@ from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import Interruption, pass_on
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 
@@ -108,7 +107,7 @@ def find_isolas(
     max_curves
         Curves of bifurcations after which no more are followed.
     seconds
-        Time after which nothing new is begun and what has been found is given; None for as long as it takes.
+        Time limit, after which what has been found is given.
     max_step
         As in `frequency_response` and `track`.
 
@@ -144,8 +143,6 @@ def find_isolas(
     for name, number, least in (("depth", depth, 0), ("max_curves", max_curves, 1)):
         if isinstance(number, bool) or not isinstance(number, int) or number < least:
             raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
-    if seconds is not None and not (is_number(seconds) and seconds > 0.0):
-        raise InputError(f"seconds must be a positive number, not {seconds!r}")
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
     options = {
@@ -159,8 +156,8 @@ def find_isolas(
         survey = Survey(
             system, parameter, (low, high), (first, last), harmonics, depth, options, max_curves, report=report
         )
-        survey.until = math.inf if seconds is None else perf_counter() + seconds
         lives: list[Life] = []
+        interruption: Interruption | None = None
         few = sorted({places[0], places[len(places) // 2], places[-1]})
         try:
             for number, value in enumerate(places):
@@ -177,10 +174,9 @@ def find_isolas(
                 for value in places if orders else few:
                     for order in orders or _SEARCHED:
                         _by_resonance(survey, lives, value, order, seeds or _SEEDS)
-        except OutOfTime:
-            survey.note(f"{seconds:g} seconds are over: what is here is what had been found by then")
-        except KeyboardInterrupt:
-            survey.note("interrupted: what is here is what had been found by then")
+        except KeyboardInterrupt as cause:
+            interruption = Interruption.of(cause)
+            survey.note(f"{interruption}: what is here is what had been found by then")
     found = [
         Isola(
             system,
@@ -198,7 +194,16 @@ def find_isolas(
     ]
     said = _said(found, survey, places)
     return Isolas(
-        found, system, parameter, (low, high), (first, last), survey.curves, survey.doublings, survey.notes, said
+        found,
+        system,
+        parameter,
+        (low, high),
+        (first, last),
+        survey.curves,
+        survey.doublings,
+        survey.notes,
+        said,
+        interruption,
     )
 
 
@@ -325,8 +330,7 @@ def _by_resonance(survey: Survey, lives: list[Life], value: float, order: int, s
 
 def _met(survey: Survey, lives: list[Life], branch: Branch, value: float) -> None:
     """A branch that a search has met: an isola unless it is attached, or one that is known."""
-    if branch.interrupted:
-        raise KeyboardInterrupt
+    pass_on(branch.interruption)
     loop = survey.loop_of(branch, value)
     _consider(survey, lives, loop)
     _live(survey, lives, ())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.isola import Isola
 from suboctave.analysis.tracked_branch import TrackedBranch
+from suboctave.interruption import Interruption, limited
 from suboctave.model.system import System
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ class Isolas(Sequence[Isola]):
         All curves of limit points and of period doublings that were followed, in (omega, parameter).
     notes
         What could not be settled; empty if nothing was left open.
+    interruption
+        What stopped the search, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
     def __init__(
@@ -42,6 +45,7 @@ class Isolas(Sequence[Isola]):
         doublings: Sequence[TrackedBranch] = (),
         notes: Iterable[str] = (),
         said: str = "",
+        interruption: Interruption | None = None,
     ) -> None:
         self._items = tuple(sorted(isolas, key=lambda isola: (isola.born is None, isola.born or isola.range[1])))
         self.system = system
@@ -52,6 +56,7 @@ class Isolas(Sequence[Isola]):
         self.doublings = tuple(doublings)
         self.notes = tuple(notes)
         self.said = said
+        self.interruption = interruption
         self.seconds = float("nan")
 
     def __len__(self) -> int:
@@ -67,9 +72,14 @@ class Isolas(Sequence[Isola]):
     def __iter__(self) -> Iterator[Isola]:
         return iter(self._items)
 
-    def at(self, value: float) -> list[Branch]:
-        """The closed branches that exist at a value of the parameter."""
-        return [isola.at(value) for isola in self if value in isola]
+    @limited
+    def at(self, value: float, *, seconds: float | None = None) -> list[Branch]:
+        """The closed branches that exist at a value of the parameter; `seconds`: time limit of all of them."""
+        found: list[Branch] = []
+        for isola in self:
+            if value in isola and not (found and found[-1].interrupted):
+                found.append(isola.at(value))
+        return found
 
     @property
     def plane(self) -> tuple[str, str]:
@@ -78,12 +88,13 @@ class Isolas(Sequence[Isola]):
 
     @property
     def interrupted(self) -> bool:
-        """Whether its user stopped the search."""
-        return any(note.startswith("interrupted") for note in self.notes)
+        """Whether Ctrl-C or a time limit stopped the search."""
+        return self.interruption is not None
 
-    def noting(self, notes: Iterable[str]) -> Isolas:
-        """The same with more that could not be settled."""
+    def noting(self, notes: Iterable[str], interruption: Interruption | None = None) -> Isolas:
+        """The same with more that could not be settled, and with what stopped it."""
         self.notes = (*self.notes, *notes)
+        self.interruption = self.interruption or interruption
         return self
 
     def to_dataframe(self) -> pandas.DataFrame:

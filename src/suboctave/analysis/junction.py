@@ -18,6 +18,7 @@ from suboctave.bifurcation.branching import doubled_direction
 from suboctave.bifurcation.finder import position
 from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.bifurcation.solve import Guess, Singular, locate_singular
+from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -143,7 +144,12 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
         return None
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
     last, doubt = _last_before(a, b, there, found, newton)
-    return Meeting(found, parent.with_balance(state.balance), Arrival(last, reason), doubt)
+    return Meeting(
+        found,
+        parent.with_balance(state.balance),
+        Arrival(last, Ending(EndReason.MET_BRANCH, curve.where(there), reason)),
+        doubt,
+    )
 
 
 def _odd(u: Array, curve: ResponseCurve, weights: Array) -> Array:

@@ -36,7 +36,6 @@ def branches_by_load(survey: Survey, value: float, level: float) -> Iterator[Bra
     scaled = system.with_scaled_loads(_LEVEL)
     bounds = (min(1.0, level), max(1.0, level))
     around = Survey(scaled, _LEVEL, bounds, survey.omega, survey.harmonics, survey.depth, survey.options, survey.most)
-    around.until = survey.until
     around.look(level)
     known = list(survey.met.get(value, []))
     for leg in around.legs:

@@ -25,6 +25,7 @@ from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
 from suboctave.analysis.two_trajectories import Separation, TwoTrajectories, separate
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow, check_count
@@ -191,6 +192,7 @@ def lyapunov_exponents(
     tolerance: float | None = None,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> LyapunovExponents: ...
 
 
@@ -204,6 +206,7 @@ def lyapunov_exponents(
     method: Literal["two_trajectories"] | TwoTrajectories,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> Separation: ...
 
 
@@ -222,6 +225,7 @@ def lyapunov_exponents(
     tolerance: float | None = None,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> LyapunovExponents | Separation:
     """The Lyapunov exponents of the motion that a trajectory settles on, with their standard errors.
 
@@ -247,6 +251,8 @@ def lyapunov_exponents(
         Local error relative to the size of the motion (default 1e-10).
     workers, progress
         As in `poincare_sections`.
+    seconds
+        Time limit, after which a TimeLimitError is raised.
 
     Forces must be continuous: where one jumps, neighbours part by a jump of their own that the derivative of the flow
     does not contain. Laws of this package and forces given as text are; those of one's own are looked at along the
@@ -279,8 +285,7 @@ def lyapunov_exponents(
         check_forces(system, first, float(omega), values)
         starts = _starts(flow, first, omega, values, transient, trajectories)
         motions = flow.over(starts, omega, transient + periods, values, transient, workers=workers, report=report)
-    if not motions.finished.all():
-        raise KeyboardInterrupt
+    pass_on(motions.interruption)
     check_motions(motions)
     assert motions.growth is not None
     rates = motions.growth * (float(omega) / (2.0 * np.pi))
@@ -347,8 +352,7 @@ def _starts(flow: Flow, first: Array, omega: float, values: Mapping[str, float],
     """States (count, 2n): the end of a transient, and others about it."""
     system = flow.system
     motions = flow.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True)
-    if not motions.finished.all():
-        raise KeyboardInterrupt
+    pass_on(motions.interruption)
     check_motions(motions)
     assert motions.peaks is not None
     mass = np.diagonal(system.mass.value({**system.parameters, **values}))

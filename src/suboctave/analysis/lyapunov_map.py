@@ -147,6 +147,7 @@ def lyapunov_map(
     tolerance: float = 1e-8,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> LyapunovMap:
     """The largest Lyapunov exponent over the frequency and a parameter; all processors work.
 
@@ -162,7 +163,7 @@ def lyapunov_map(
         Periods of the load that are left out, and those averaged over.
     tolerance
         Local error relative to the size of the motion.
-    parameters, workers, progress
+    parameters, workers, progress, seconds
         As in `poincare_sections`. The result does not depend on the number of workers.
 
     Raises

@@ -106,7 +106,7 @@ def _written(method: StabilityMethod) -> str:
 
 def make_branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
     with one_thread():
-        trace = with_verdicts(trace, settings.stability, name)
+        trace = with_verdicts(replace(trace, warnings=trace.sentences, doubts=[]), settings.stability, name)
     context = {"system": system, "parameter": name, **options}
     bifurcations, events = (
         [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
@@ -118,7 +118,7 @@ def make_branch(system: System, name: str, trace: Trace, settings: Settings, opt
         bifurcations,
         events,
         trace.closed,
-        trace.ended,
+        trace.endings,
         settings.observe,
         options,
         tuple(trace.warnings),

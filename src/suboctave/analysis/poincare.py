@@ -14,6 +14,7 @@ from suboctave.analysis.integration import _not_negative, _samples, start_state
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
+from suboctave.interruption import Interruption
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
@@ -45,7 +46,9 @@ class PoincareSections(TimeResult):
         (B,): trajectories that left the range of numbers (their points are NaN), or some steps of which Newmark's
         method did not solve.
     finished
-        (B,): False for those that an interruption (Ctrl-C) left out; their points are NaN.
+        (B,): False for those that an interruption left out; their points are NaN.
+    interruption
+        What stopped them, Ctrl-C or a time limit (`seconds`); None if nothing did.
     tolerance
         Relative tolerance of the recognition of periods.
     """
@@ -62,6 +65,7 @@ class PoincareSections(TimeResult):
     observed: int
     system: System
     seconds: float = 0.0
+    interruption: Interruption | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -181,6 +185,7 @@ def poincare_sections(
     observe: int | None = None,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> PoincareSections:
     """Follow many trajectories and keep their states once in every period of the load, on all processors.
 
@@ -202,6 +207,8 @@ def poincare_sections(
         Threads; default as many as there are processors. Results do not depend on it.
     progress
         True for a bar, or a callable (share, text).
+    seconds
+        Time limit. What is finished by then is given, as after Ctrl-C.
 
     Raises
     ------
@@ -231,6 +238,7 @@ def poincare_sections(
         },
         failed=motions.failed | (motions.unsettled > 0.0),
         finished=motions.finished,
+        interruption=motions.interruption,
         tolerance=period_tolerance,
         transient=transient,
         method=method,

@@ -10,11 +10,45 @@ from time import perf_counter
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import limited
 
 #: objects made between two looks of the garbage collector while a verb runs
 _OBJECTS = 50_000
 
 Report = Callable[[float, str], None]
+
+
+class CurveProgress:
+    """Progress of a curve that is followed in one direction or both: the share of its parameter's range that it has
+    covered, and in words what it costs.
+    """
+
+    def __init__(self, report: Report, bounds: tuple[float, float], located: str = "bifurcation") -> None:
+        self.report = report
+        self.bounds = bounds
+        #: what is counted besides points
+        self.located = located
+        self._covered: tuple[float, float] | None = None
+        #: points and bifurcations of the directions that are over, and of this one
+        self._before = (0, 0)
+        self._now = (0, 0)
+
+    def begins(self) -> None:
+        """Another direction is begun."""
+        self._before, self._now = (self._before[0] + self._now[0], self._before[1] + self._now[1]), (0, 0)
+
+    def at(self, value: float, where: str, points: int, bifurcations: int, harmonics: int) -> None:
+        """The curve has come to a value of its parameter, with so many points and bifurcations in this direction."""
+        low, high = self._covered or (value, value)
+        self._covered = low, high = min(low, value), max(high, value)
+        self._now = points, bifurcations
+        share = min(1.0, (high - low) / (self.bounds[1] - self.bounds[0]))
+        self.report(share, f"{where}, {self._counted(harmonics)}" if points else where)
+
+    def _counted(self, harmonics: int) -> str:
+        numbers = (self._before[0] + self._now[0], self._before[1] + self._now[1], harmonics)
+        names = ("point", self.located, "harmonic")
+        return ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for n, name in zip(numbers, names, strict=True))
 
 
 Arguments = ParamSpec("Arguments")
@@ -28,7 +62,11 @@ class Timed(Protocol):
 
 
 def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
-    """A verb whose result says in `seconds` how long it took, and whose failures are told in words."""
+    """A verb with a time limit (`limited`) whose result says in `seconds` how long it took, and whose failures are told
+    in words.
+    """
+
+    within = limited(verb)
 
     @functools.wraps(verb)
     def measured(*positional: Arguments.args, **named: Arguments.kwargs) -> Curve:
@@ -38,7 +76,7 @@ def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
             # a curve makes thousands of small objects that stay: looking through them again and again finds nothing
             gc.set_threshold(max(before[0], _OBJECTS), *before[1:])
         try:
-            result = verb(*positional, **named)
+            result = within(*positional, **named)
         except (ZeroDivisionError, OverflowError) as failure:
             raise ConvergenceError(
                 f"the numbers left the range of floating point ({failure}): look at the sizes of parameters, loads and "

@@ -25,6 +25,7 @@ from suboctave.bifurcation.kinds import LIMIT_POINT
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import Interruption, pass_on
 from suboctave.model.system import System
 
 __all__ = ["Atlas"]
@@ -45,6 +46,8 @@ class Atlas:
         For the verbs that follow branches.
     most
         Curves after which no more are followed.
+    interruption
+        What stopped the work before its end.
     """
 
     system: System
@@ -58,6 +61,7 @@ class Atlas:
     borders: list[Border] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     report: Callable[[float, str], None] | None = None
+    interruption: Interruption | None = None
     _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
 
     @property
@@ -107,7 +111,9 @@ class Atlas:
         self.say(-1.0, where)
         around = 0.5 * self.omega[0], 2.0 * self.omega[1]
         try:
-            self.add(track(item, self.name, self.bounds, omega=around, **self.options))
+            curve = track(item, self.name, self.bounds, omega=around, **self.options)
+            pass_on(curve.interruption)
+            self.add(curve)
             border = self.border_of(item, value)
             if border is None:
                 self.note(f"the {where} is not on its curve")

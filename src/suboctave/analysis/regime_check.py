@@ -28,6 +28,7 @@ from suboctave.analysis.subharmonics import periodic_orbit
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import pass_on
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
 
@@ -305,6 +306,7 @@ def _settled(
             observe=_observed(regimes),
             progress=progress,
         )
+        pass_on(sections.interruption)
         return [sections.attractor(i) for i in range(len(sections))]
 
     everyone = list(range(len(starts)))

@@ -21,6 +21,7 @@ from suboctave.analysis.results import Table
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.errors import InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import limited
 from suboctave.store.columns import parameter_column
 
 if TYPE_CHECKING:
@@ -111,6 +112,8 @@ class RegimeMap:
         The stretches of the parameter within which the order of the regimes is the same.
     notes
         What could not be settled; empty if nothing was left open.
+    interruption
+        What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
     def __init__(self, atlas: Atlas, strips: Sequence[Strip], depth: int, resolution: float) -> None:
@@ -124,7 +127,13 @@ class RegimeMap:
         self.depth = depth
         self.resolution = resolution
         self.notes = tuple(atlas.notes)
+        self.interruption = atlas.interruption
         self.seconds = float("nan")
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C or a time limit stopped it."""
+        return self.interruption is not None
 
     def strip(self, value: float) -> Strip:
         """The strip that a value of the parameter lies in; InputError outside the bounds."""
@@ -160,6 +169,7 @@ class RegimeMap:
             if arc.followed
         ]
 
+    @limited
     def check(
         self,
         points: int = 200,
@@ -168,6 +178,7 @@ class RegimeMap:
         states: int = 4,
         transient: int = 400,
         progress: Any = None,
+        seconds: float | None = None,
     ) -> RegimeCheck:
         """Integrate in time at points of the plane drawn at random, and compare what is reached with the labels.
 
@@ -181,6 +192,8 @@ class RegimeMap:
             are starts as well.
         transient
             Periods of the load before a motion is recognised; those that have not settled get ten times as many.
+        seconds
+            Time limit; what is not complete then is no check, and a TimeLimitError says so.
         """
         from suboctave.analysis.regime_check import check_regimes
 

@@ -21,6 +21,7 @@ from suboctave.analysis.regime_atlas import Atlas
 from suboctave.analysis.verbs import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import pass_on
 
 __all__ = ["Slice", "beyond", "introduce", "looked"]
 
@@ -124,10 +125,10 @@ def _responses(found: Slice, atlas: Atlas, depth: int) -> Iterator[Branch]:
         for node in diagram:
             for item, why in node.failures:
                 atlas.note(f"at {atlas.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+            pass_on(node.branch.interruption)
             if len(node.branch) and not any(same_branch(node.branch, other) for other in known):
                 yield node.branch
-            if node.branch.interrupted:
-                raise KeyboardInterrupt
+        pass_on(diagram.interruption)
         root = diagram.root.branch
         known += diagram.branches
         if len(root) and root.points[-1].orbit.omega == ends[1]:
@@ -144,9 +145,11 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
     try:
         start = atlas.limit_point(border, value)
         branch = continue_branch(start, "omega", bounds, **atlas.options)
+        pass_on(branch.interruption)
         if branch.nu > 1 and not branch.closed and branch.departs is None and branch.arrives is None:
             # it may close where no limit point is known yet
             wider = continue_branch(start, "omega", (0.5 * low, 2.0 * high), **atlas.options)
+            pass_on(wider.interruption)
             branch = wider if wider.closed else branch
         met = [branch]
         image = mirrored(branch.points[len(branch) // 2].orbit)
@@ -157,19 +160,18 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
         return
     levels = max(0, math.floor(math.log2(2**depth / branch.nu)))
     for one in met:
-        if one.interrupted:
-            raise KeyboardInterrupt
+        pass_on(one.interruption)
         if any(same_branch(one, other) for other, _ in found.branches):
             found.explained.append(border)
             continue
         detached = one.closed and one.departs is None and one.arrives is None
-        for node in grown_from(one, levels, atlas.options):
+        diagram = grown_from(one, levels, atlas.options)
+        for node in diagram:
             for item, why in node.failures:
                 atlas.note(f"at {atlas.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
             if not any(same_branch(node.branch, other) for other, _ in found.branches):
                 yield node.branch, detached
-            if node.branch.interrupted:
-                raise KeyboardInterrupt
+        pass_on(diagram.interruption)
 
 
 def introduce(branch: Branch, value: float, atlas: Atlas) -> None:
@@ -195,8 +197,7 @@ def beyond(value: float, atlas: Atlas) -> None:
     except ConvergenceError as failure:
         atlas.note(f"at {atlas.name} = {value:.6g} the response beside the range of omega was not found: {failure}")
         return
-    if wide.interrupted:
-        raise KeyboardInterrupt
+    pass_on(wide.interruption)
     folds = wide.bifurcations["LP"]
     places = [float(wide.omega[0]), *(b.omega for b in folds), float(wide.omega[-1])]
     for number, (one, other) in enumerate(pairwise(places)):

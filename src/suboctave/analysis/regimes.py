@@ -40,6 +40,7 @@ from suboctave.analysis.verbs import continue_branch
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import Interruption, pass_on
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 
@@ -73,6 +74,7 @@ def regime_map(
     max_step: float | None = None,
     observe: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
@@ -100,6 +102,8 @@ def regime_map(
         Motions that are known from elsewhere, as from `RegimeCheck.unknown`: the branches that they lie on are mapped.
     max_curves, max_slices
         Curves, and values of the parameter, after which no more are followed.
+    seconds
+        Time limit, after which the map holds what is known by then.
 
     Other parameters as `frequency_response`.
 
@@ -148,8 +152,9 @@ def regime_map(
                     atlas.add(curve)
             _introduced(atlas, orders, seeds or _SEEDS, given, values)
             _fill(atlas, slices, depth, values, resolution, max_slices)
-        except KeyboardInterrupt:
-            atlas.note("interrupted: the map holds what had been found by then")
+        except KeyboardInterrupt as cause:
+            atlas.interruption = Interruption.of(cause)
+            atlas.note(f"{atlas.interruption}: the map holds what had been found by then")
     return RegimeMap(atlas, _strips(atlas, slices), depth, resolution)
 
 
@@ -194,6 +199,7 @@ def _introduced(
         except ConvergenceError as failure:
             atlas.note(f"the branch through {orbit!r} could not be followed: {failure}")
             continue
+        pass_on(branch.interruption)
         known.append((value, branch))
         introduce(branch, value, atlas)
     for value in (low + (i + 0.5) / count * (high - low) for i in range(count)):

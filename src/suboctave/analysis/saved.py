@@ -24,6 +24,7 @@ from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.normal_form import NormalForm
 from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation.ending import Ending, read_endings
 from suboctave.errors import InputError
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
@@ -43,7 +44,8 @@ if TYPE_CHECKING:
 __all__ = ["branch_from_dataset", "branch_to_dataset", "system_arrays", "written_system"]
 
 _CLASSES = {
-    c.__name__: c for c in (Audit, Unsettled, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
+    c.__name__: c
+    for c in (Audit, Unsettled, Ending, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
 }
 _MEANINGS = {
     "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
@@ -87,6 +89,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "audit": branch.audit,
         "closed": bool(branch.closed),
         "ended": branch.ended,
+        "endings": branch.endings,
         "departs": branch.departs,
         "arrives": branch.arrives,
         "observe": int(branch.observe),
@@ -313,7 +316,8 @@ class _Reader:
             bifurcations,
             own,
             record["closed"],
-            record["ended"],
+            # older files hold the sentence alone
+            record.get("endings") or read_endings(record["ended"]),
             record["observe"],
             record["options"],
             record["warnings"],

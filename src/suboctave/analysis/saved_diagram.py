@@ -17,6 +17,7 @@ from suboctave.analysis.saved import branch_from_dataset, branch_to_dataset
 from suboctave.analysis.tree import BifurcationDiagram, DiagramBranch
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
+from suboctave.interruption import Interruption
 from suboctave.store.layout import events_met
 from suboctave.store.plain import from_json, to_json
 
@@ -53,6 +54,7 @@ def diagram_to_datasets(diagram: BifurcationDiagram) -> dict[str, xarray.Dataset
         "failures_of": [node.number for node in nodes for _ in node.failures],
         "left": [place[id(item)] for node in nodes for item in node.left],
         "left_of": [node.number for node in nodes for _ in node.left],
+        "interruption": diagram.interruption,
     }
     variables: dict[str, Any] = {
         name: ("branch", values, {"long_name": _MEANINGS[name]}) for name, values in columns.items()
@@ -86,7 +88,7 @@ def diagram_from_datasets(
             crossed = parent.branch.bifurcations["BP"]
             nodes.append(DiagramBranch(branches[number], origin, parent.depth + 1, number, met=crossed))
             parent.children.append(nodes[-1])
-        record = from_json(str(head["record"].item()))
+        record = from_json(str(head["record"].item()), {"Interruption": Interruption})
         for number, (event, why) in zip(record["failures_of"], record["failures"], strict=True):
             nodes[number].failures.append((met[number][event], why))
         for number, event in zip(record["left_of"], record["left"], strict=True):
@@ -95,6 +97,9 @@ def diagram_from_datasets(
         raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"this is no diagram of suboctave: {type(error).__name__}: {error}") from None
-    diagram = BifurcationDiagram(nodes[0], str(head.attrs.get("stopped", "")))
+    stopped = str(head.attrs.get("stopped", ""))
+    # older files hold the words alone
+    told = Interruption() if stopped.startswith("interrupted") else None
+    diagram = BifurcationDiagram(nodes[0], stopped, record.get("interruption", told))
     diagram.seconds = float(head.attrs.get("seconds", np.nan))
     return diagram

@@ -23,6 +23,7 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
+from suboctave.interruption import Interruption
 from suboctave.model.description import build
 from suboctave.model.system import System
 from suboctave.stability import Arbitration, Hill, KoopmanHill, Monodromy, StabilityMethod
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
 
 __all__ = ["isolas_from_datasets", "isolas_to_datasets"]
 
-_CLASSES = {c.__name__: c for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, KoopmanHill, Monodromy)}
+_CLASSES = {
+    c.__name__: c for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, KoopmanHill, Monodromy, Interruption)
+}
 
 
 def isolas_to_datasets(isolas: Isolas) -> dict[str, xarray.Dataset]:
@@ -54,6 +57,7 @@ def isolas_to_datasets(isolas: Isolas) -> dict[str, xarray.Dataset]:
         "bounds": tuple(isolas.bounds),
         "omega": tuple(isolas.omega),
         "notes": isolas.notes,
+        "interruption": isolas.interruption,
         "isolas": [_written(isola, names, curves) for isola in isolas],
     }
     head = head_dataset(isolas)
@@ -137,6 +141,7 @@ def isolas_from_datasets(
             [parts[name] for name in names if name.startswith("doublings_")],
             record["notes"],
             str(head.attrs["said"]),
+            record["interruption"] if "interruption" in record else _told(record["notes"]),
         )
     except InputError:  # which is a ValueError
         raise
@@ -144,6 +149,11 @@ def isolas_from_datasets(
         raise InputError(f"these are no isolas of suboctave: {type(error).__name__}: {error}") from None
     isolas.seconds = float(head.attrs.get("seconds", np.nan))
     return isolas
+
+
+def _told(notes: Sequence[str]) -> Interruption | None:
+    """The interruption that notes tell: older files hold nothing else."""
+    return Interruption() if any(note.startswith("interrupted") for note in notes) else None
 
 
 def _isola(

@@ -26,6 +26,7 @@ from suboctave.analysis.progress import Report, reporting, timed
 from suboctave.analysis.stepped_result import SteppedSine
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow, check_count
@@ -55,6 +56,7 @@ def stepped_sine(
     period_tolerance: float = TOLERANCE,
     observe: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> SteppedSine:
     """Step a sine through a range of frequencies and measure the response, as a rig does.
 
@@ -76,7 +78,7 @@ def stepped_sine(
         Multiples of omega whose components are measured; `measure` times each must be whole. The fundamental always is.
     noise, seed
         Standard deviation of white noise on the samples of the response, in its unit, and the seed of the generator.
-    tolerance, period_tolerance, observe, progress
+    tolerance, period_tolerance, observe, progress, seconds
         As in `poincare_sections`.
 
     Raises
@@ -217,8 +219,7 @@ def _over(flow: Flow, states: Array, omega: Array, periods: int, measured: bool 
     """Follow states; their samples and the largest displacements in between are kept of what is measured."""
     skip = 0 if measured else periods * flow.samples
     motions = flow.over(states, omega, periods, skip=skip, measure=measured, workers=1)
-    if not motions.finished.all():
-        raise KeyboardInterrupt
+    pass_on(motions.interruption)
     check_motions(motions)
     return motions
 

@@ -24,7 +24,7 @@ from suboctave.analysis.checks import check_range, check_system, is_number, make
 from suboctave.analysis.identity import lies_on, relation
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
-from suboctave.analysis.progress import reporting
+from suboctave.analysis.progress import Report, reporting
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.trace import Settings, Trace
@@ -42,6 +42,7 @@ from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.selection import truncation
+from suboctave.interruption import Interruption, limited, pass_on
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 from suboctave.timedomain import integrate
@@ -83,6 +84,7 @@ def check_order(order: Any) -> int:
     return int(order)
 
 
+@limited
 def find_subharmonics(
     system: System,
     omega: tuple[float, float],
@@ -94,6 +96,7 @@ def find_subharmonics(
     observe: int | None = None,
     events: Sequence[Event] = (),
     progress: Any = None,
+    seconds: float | None = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
@@ -111,6 +114,8 @@ def find_subharmonics(
         Period of the motions in periods of the load, at least 2.
     seeds
         How finely it is looked for, a `Seeds`.
+    seconds
+        Time limit. What was found by then is given, as after Ctrl-C: the list's `interruption` says so.
 
     Other parameters, and errors, as `frequency_response`.
     """
@@ -125,8 +130,28 @@ def find_subharmonics(
     options = options_of(settings, harmonics, {"omega": (first, last)})
     computation_begins()
     with one_thread(), reporting(progress, f"{period_name(order)} motions") as report:
-        settings = replace(settings, report=report)
-        return list(_branches(curve, (first, last), seeds or Seeds(), settings, options))
+        search = None if report is None else _Search(report)
+        return Branches.of(_branches(curve, (first, last), seeds or Seeds(), settings, options, search=search))
+
+
+class Branches(list[Branch]):
+    """Branches that a search has found; `interruption` says what stopped it, Ctrl-C or a time limit; None: nothing."""
+
+    interruption: Interruption | None = None
+
+    @classmethod
+    def of(cls, search: Iterator[Branch]) -> Branches:
+        """What a search finds until it ends or is interrupted. One that is interrupted empty-handed is no answer."""
+        found = cls()
+        try:
+            for branch in search:
+                found.append(branch)
+                found.interruption = branch.interruption
+        except KeyboardInterrupt as cause:
+            if not found:
+                raise
+            found.interruption = Interruption.of(cause)
+        return found
 
 
 def isolated_branches(
@@ -150,7 +175,10 @@ def isolated_branches(
     curve.reference = max(curve.size(linear_response(curve, v)) for v in omega)
     options = options_of(settings, harmonics, {"omega": omega})
     with one_thread():
-        return list(_branches(curve, omega, seeds or Seeds(), settings, options, known))
+        found = list(_branches(curve, omega, seeds or Seeds(), settings, options, known))
+    for branch in found:
+        pass_on(branch.interruption)
+    return found
 
 
 def _branches(
@@ -160,11 +188,14 @@ def _branches(
     settings: Settings,
     options: dict[str, Any],
     known: Sequence[Branch] = (),
+    search: _Search | None = None,
 ) -> Iterator[Branch]:
     """The branches of the motions that a search meets, each once, without those that are known."""
     first, last = bounds
     found = list(known)
-    for point in _motions(curve, bounds, seeds, settings):
+    for point in _motions(curve, bounds, seeds, settings, None if search is None else search.at):
+        if search is not None:
+            settings = settings.reporting_to(search.along, bounds)
         if any(lies_on(_orbit(point), branch.points) for branch in found):
             continue
         trace = both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
@@ -184,7 +215,9 @@ def subharmonic_start(
     """
     first, last = bounds
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
-    point = next(_motions(curve, bounds, seeds or Seeds(), settings), None)
+    report = None if settings.report is None else settings.report.report
+    look = None if report is None else lambda share, where: report(0.0, where)
+    point = next(_motions(curve, bounds, seeds or Seeds(), settings, look), None)
     if point is None:
         raise ConvergenceError(
             f"no motion of {curve.balance.basis.nu} load periods was found between {curve.name} = {first:g} and "
@@ -194,6 +227,7 @@ def subharmonic_start(
     return both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
 
 
+@limited
 def periodic_orbit(
     system: System,
     omega: float,
@@ -203,6 +237,7 @@ def periodic_orbit(
     *,
     settle: int = 0,
     newton: NewtonOptions | None = None,
+    seconds: float | None = None,
 ) -> PeriodicOrbit:
     """The periodic motion near a state `(x, dx/dt)` in time, of one or several load periods, by harmonic balance.
 
@@ -216,6 +251,8 @@ def periodic_orbit(
         Period of the motion in periods of the load; one that repeats earlier is returned with its own period.
     settle
         Periods of the motion that are integrated in time before, to come closer to an attracting one.
+    seconds
+        Time limit, after which a TimeLimitError is raised.
 
     Raises
     ------
@@ -256,8 +293,25 @@ def _orbit(point: CurvePoint) -> PeriodicOrbit:
 
 
 # ------------------------------------------------------------------------------------------------------------- search
+class _Search:
+    """Progress of a search: the share of the range that was searched; following branches on the way adds nothing."""
+
+    def __init__(self, report: Report) -> None:
+        self.report = report
+        self.share = 0.0
+
+    def at(self, share: float, where: str) -> None:
+        """The search has come so far."""
+        self.share = share
+        self.report(share, where)
+
+    def along(self, share: float, where: str) -> None:
+        """A branch is followed."""
+        self.report(self.share, where)
+
+
 def _motions(
-    curve: ResponseCurve, bounds: tuple[float, float], seeds: Seeds, settings: Settings
+    curve: ResponseCurve, bounds: tuple[float, float], seeds: Seeds, settings: Settings, report: Report | None
 ) -> Iterator[CurvePoint]:
     """Solved sub-harmonic motions over the range, as the search meets them."""
     nu = curve.balance.basis.nu
@@ -266,8 +320,8 @@ def _motions(
     # away from the ends, where branches may just end
     values = first + (last - first) * (np.arange(seeds.frequencies) + 0.5) / seeds.frequencies
     for number, value in enumerate(values):
-        if settings.report is not None:
-            settings.report(number / len(values), f"looking at {curve.where(np.array([value]))}")
+        if report is not None:
+            report(number / len(values), f"looking at {curve.where(np.array([value]))}")
         met: list[PeriodicOrbit] = []
         for guess in _guesses(curve, float(value), seeds):
             try:

@@ -62,6 +62,7 @@ def switch_branch(
     observe: int | None = None,
     events: Sequence[Event] = (),
     progress: Any = None,
+    seconds: float | None = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
@@ -131,7 +132,7 @@ def switch_branch(
     computation_begins()
     title = f"{period_name(nu)} branch along {name}"
     with one_thread(), reporting(progress, title) as report:
-        settings = replace(settings, report=report)
+        settings = settings.reporting_to(report, (low, high))
         if kind == "PD":
             trace = _doubled(bifurcation, curve, 1.0 if side is None else float(side), (low, high), settings)
         else:
@@ -267,8 +268,7 @@ def leave_along(
         turns = [b for b in forward.bifurcations if _is_turn(b, here)]
         met = [b for b in forward.bifurcations if not (same_event(b, here) or _is_turn(b, here))]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
-        doubts = tuple(f"LP near {b.parameter_name} = {b.parameter(b.parameter_name):.6g} " for b in turns)
-        forward.warnings[:] = [words for words in forward.warnings if not (turns and words.startswith(doubts))]
+        forward.doubts = [d for d in forward.doubts if not any(d.concerns(turn) for turn in turns)]
         forward.settle_end(2.0 * _distance(one, u, curve))
         return forward
     back = follow(other, 0.0, bounds, settings)

@@ -47,6 +47,7 @@ def track(
     max_step: float | None = None,
     observe: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
@@ -138,7 +139,7 @@ def track(
     box = Box(None if ranges[0] is None else (min(ranges[0]), max(ranges[0])), (min(second), max(second)), between)
     computation_begins()
     with one_thread(), reporting(progress, f"{kind} over {names[-1]}") as report:
-        settings = replace(settings, report=report)
+        settings = settings.reporting_to(report, box.second, "event")
         if bifurcation.kind in CURVES_THROUGH:
             assert isinstance(bifurcation, TrackedEvent)
             bifurcation = start_onto(bifurcation, kind, names, box, settings.newton)
@@ -164,7 +165,7 @@ def track(
         [replace(event, context=context) for event in trace.events],
         [],
         trace.closed,
-        trace.ended,
+        trace.endings,
         settings.observe,
         options,
         tuple(trace.warnings),

@@ -25,10 +25,12 @@ from suboctave.analysis.tracked_tests import CurveTest, Extremum, PairCrossing, 
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March, kernels
 from suboctave.continuation.bounds import Bounds
+from suboctave.continuation.ending import Ending, EndReason, interruption_of
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
 from suboctave.continuation.problem import Curve
 from suboctave.errors import ConvergenceError
+from suboctave.interruption import Interruption
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 2e-6
@@ -51,8 +53,16 @@ class TrackedTrace:
     events: list[TrackedEvent] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     closed: bool = False
-    ended: str = ""
-    interrupted: bool = False
+    endings: tuple[Ending, Ending] = (Ending(EndReason.START), Ending(EndReason.NOT_STARTED))
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped in one of its directions before it came to an end."""
+        return interruption_of(self.endings) is not None
+
+    def ends(self, ending: Ending) -> None:
+        """Why it ends at its last point."""
+        self.endings = (self.endings[0], ending)
 
     def reversed_before(self, other: TrackedTrace) -> TrackedTrace:
         """This trace walked backwards, then `other`, which started from the same point."""
@@ -61,10 +71,8 @@ class TrackedTrace:
         points += [p.at(whole + p.arclength) for p in other.points[1:]]
         events = [replace(e, arclength=whole - e.arclength) for e in reversed(self.events)]
         events += [replace(e, arclength=whole + e.arclength) for e in other.events]
-        same = self.ended == other.ended
-        ended = other.ended if same else f"{self.ended} in one direction, {other.ended} in the other"
-        warnings = self.warnings + other.warnings
-        return TrackedTrace(points, events, warnings, False, ended, other.interrupted)
+        endings = (self.endings[1], other.endings[1])
+        return TrackedTrace(points, events, self.warnings + other.warnings, False, endings)
 
 
 def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> TrackedTrace:
@@ -99,10 +107,13 @@ class _Tracker:
 
     def run(self) -> TrackedTrace:
         trace = self.trace
+        if self.settings.report is not None:
+            self.settings.report.begins()
         try:
             while True:
-                trace.ended = self._march()
-                beyond = None if trace.ended != self.march.ended or self.march.closed else self._beyond_corner()
+                ending = self._march()
+                trace.ends(ending)
+                beyond = self._beyond_corner() if ending.reason is EndReason.STEP_TOO_SMALL else None
                 if beyond is None:
                     break
                 stepping = self.settings.stepping
@@ -114,27 +125,26 @@ class _Tracker:
             trace.closed = self.march.closed
             self._say_doubts()
             self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
-            trace.events.sort(key=lambda event: event.arclength)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as cause:
             where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
-            trace.interrupted = True
-            trace.ended = f"interrupted at {where}; what was computed is kept"
+            trace.ends(Ending.stopped(Interruption.of(cause), where))
+        trace.events.sort(key=lambda event: event.arclength)
         if trace.closed:
             _drop_seam(trace.events)
         return trace
 
-    def _march(self) -> str:
+    def _march(self) -> Ending:
         """Take in points until the curve ends; why it does."""
         for point in self.march:
             stop = self._accept(point)
             if stop is not None:
                 return stop
-        return self.march.ended
+        return self.march.ending
 
     def _beyond_corner(self) -> CurvePoint | None:
         """A point behind a corner that the steps could not get around, None if there is none."""
         last = self.previous
-        if last is None or not self.march.ended.startswith("step size fell") or self.corners >= _CORNERS:
+        if last is None or self.corners >= _CORNERS:
             return None
         self.corners += 1
         before = (p.orbit for p in reversed(self.trace.points))
@@ -177,19 +187,21 @@ class _Tracker:
             return False
         return keeps_subharmonics(a, b)
 
-    def _accept(self, point: CurvePoint) -> str | None:
-        """Take a point in; a sentence if the curve ends there or before it."""
+    def _accept(self, point: CurvePoint) -> Ending | None:
+        """Take a point in; why the curve ends there or before it, if it does."""
         settings, new = self.settings, TrackedSample(point)
         self.home = self.home or point
         if self.previous is not None:
             # by now the choice of harmonics has asked for what it needs
             self._note_doubt(self.previous)
             if self.untold >= _UNTOLD:
-                largest, where = np.abs(self.previous.evaluation.floquet.multipliers).max(), self.previous.curve.where
-                return (
-                    f"multipliers of up to {largest:.0e} at {where(self.previous.point.u)} leave the critical one "
-                    "untold: the motions are so unstable there that their bifurcations have no meaning"
+                largest = np.abs(self.previous.evaluation.floquet.multipliers).max()
+                where = self.previous.curve.where(self.previous.point.u)
+                detail = (
+                    f"multipliers of up to {largest:.0e} at {where} leave the critical one untold: the motions are so "
+                    "unstable there that their bifurcations have no meaning"
                 )
+                return Ending(EndReason.NO_MEANING, where, detail)
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
             for watch in (self.hidden, self.pairs):
@@ -204,11 +216,11 @@ class _Tracker:
         end = end_between(a, new, settings.newton, self.lopsided)
         if end is not None:
             self._take_end(a, end)
-            return end.reason
+            return Ending(EndReason.MOTIONS_END, detail=end.reason)
         try:
             left = self._left(a, new)
-        except ConvergenceError as failure:
-            return str(failure)
+        except ConvergenceError:
+            return Ending(EndReason.LEFT_RANGE, a.curve.where(a.point.u))
         new = self._smooth(a, left or new)
         warnings = self.trace.warnings
         found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
@@ -216,15 +228,16 @@ class _Tracker:
         self._add(new)
         self.previous = new
         if settings.report is not None:
-            low, high = self.box.second
-            settings.report(min(1.0, max(0.0, (point.parameter - low) / (high - low))), point.curve.where(point.u))
+            basis, where, trace = new.curve.balance.basis, point.curve.where(point.u), self.trace
+            numbers = len(trace.points), len(trace.events), basis.harmonics // basis.nu
+            settings.report.at(point.parameter, where, *numbers)
         if left is not None:
-            return f"reached the end of the range at {new.curve.where(new.point.u)}"
+            return Ending(EndReason.RANGE_END, new.curve.where(new.point.u))
         ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
         if ahead is None:
             return None
         self._take_end(new, ahead)
-        return ahead.reason
+        return Ending(EndReason.MOTIONS_END, detail=ahead.reason)
 
     def _take(self, found: list[Found]) -> None:
         settings, warnings = self.settings, self.trace.warnings

@@ -24,6 +24,7 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import SteppingOptions
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.interruption import pass_on
 
 __all__ = ["limit_point_beside"]
 
@@ -116,6 +117,7 @@ def _limit_point(event: TrackedEvent, way: float) -> tuple[float, Bifurcation] |
     context: dict[str, Any] = {**(event.context or {}), "bounds": {free: (there - width, there + width)}}
     stepping = SteppingOptions(max_step=0.03, max_points=60)
     branch = switch_branch(replace(doubling, context=context), stepping=stepping)
+    pass_on(branch.interruption)
     limits = branch.bifurcations["LP"]
     if not limits:
         return None

@@ -11,6 +11,7 @@ import numpy as np
 
 from suboctave.analysis.branch import Branch, BranchPoint
 from suboctave.bifurcation import Bifurcation
+from suboctave.continuation.ending import sentence
 from suboctave.continuation.problem import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
@@ -83,6 +84,11 @@ class TrackedBranch(Branch):
         self.kind = kind
         self.names = names
         self.turning = turning
+
+    @property
+    def ended(self) -> str:
+        """Why it ended, in words."""
+        return sentence(self.endings, go_on="")
 
     @property
     def plane(self) -> tuple[str, str]:

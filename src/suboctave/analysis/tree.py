@@ -15,6 +15,7 @@ from suboctave.analysis.junction import period_name
 from suboctave.analysis.readings import shared
 from suboctave.bifurcation import Bifurcation
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import Interruption
 from suboctave.store.columns import led_by
 
 if TYPE_CHECKING:
@@ -104,9 +105,10 @@ class BifurcationDiagram:
         How long it took.
     """
 
-    def __init__(self, root: DiagramBranch, stopped: str = "") -> None:
+    def __init__(self, root: DiagramBranch, stopped: str = "", interruption: Interruption | None = None) -> None:
         self.root = root
         self.stopped = stopped
+        self.interruption = interruption
         self.seconds = float("nan")
         for number, node in enumerate(root):
             node.number = number
@@ -147,8 +149,8 @@ class BifurcationDiagram:
 
     @property
     def interrupted(self) -> bool:
-        """Whether its user stopped it."""
-        return self.stopped.startswith("interrupted")
+        """Whether Ctrl-C or a time limit stopped it."""
+        return self.interruption is not None
 
     def of_period(self, nu: int) -> list[Branch]:
         """The branches of motions of `nu` load periods."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import METHODS, Flow, Report, check_count
@@ -185,8 +186,7 @@ def separate(
         else:
             flow = Flow(system, "accurate", tolerance=float(setting), lanes=8)
         motions = flow.over(starts, omega, how.periods, values, workers=workers)
-        if not motions.finished.all():
-            raise KeyboardInterrupt
+        pass_on(motions.interruption)
         if motions.failed.any():
             check_motions(motions)
         states = np.concatenate([starts[:, None], motions.states], axis=1) * metric

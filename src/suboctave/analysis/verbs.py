@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +40,7 @@ def frequency_response(
     observe: int | None = None,
     events: Sequence[Event] = (),
     progress: Any = None,
+    seconds: float | None = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
@@ -73,6 +73,8 @@ def frequency_response(
         User's events, located along the branch.
     progress
         None, True (a bar), or a callable taking (share done, text).
+    seconds
+        Time limit. What was computed by then is given, as after Ctrl-C (`interrupted`), and `ended` says how to go on.
     stability
         How the multipliers of points and bifurcations are found: `Monodromy()`, `Hill()`, `KoopmanHill()`, or their
         names "monodromy", "hill", "koopman-hill". Default: the monodromy matrix, and where a verdict is open the others
@@ -93,6 +95,8 @@ def frequency_response(
         Wrong input, before any work.
     ConvergenceError
         If no motion is found at the first frequency.
+    TimeLimitError
+        If the time limit was reached before that.
     """
     first, last = check_range("omega", omega, positive=True)
     check_system(system, (first, last))
@@ -108,7 +112,7 @@ def frequency_response(
     curve = make_curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
     computation_begins()
     with one_thread(), reporting(progress, "frequency response") as report:
-        settings = replace(settings, report=report)
+        settings = settings.reporting_to(report, (first, last))
         if report is not None:
             # in a fresh installation the start waits for kernels to be compiled
             report(0.0, f"omega = {first:.6g}")
@@ -139,6 +143,7 @@ def continue_branch(
     observe: int | None = None,
     events: Sequence[Event] = (),
     progress: Any = None,
+    seconds: float | None = None,
     newton: NewtonOptions | None = None,
     stepping: SteppingOptions | None = None,
     stability: StabilityMethod | str | None = None,
@@ -189,7 +194,7 @@ def continue_branch(
     curve = make_curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, own_linear_part(orbit))
     computation_begins()
     with one_thread(), reporting(progress, f"along {parameter}") as report:
-        settings = replace(settings, report=report)
+        settings = settings.reporting_to(report, (low, high))
         ahead = float(np.sign(last - first))
         if crossing is not None and crossing.tangent is not None:
             # two branches cross: go on along that on which the point was found
@@ -243,7 +248,7 @@ def _from_system(
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
     computation_begins()
     with one_thread(), reporting(progress, f"along {parameter}") as report:
-        settings = replace(settings, report=report)
+        settings = settings.reporting_to(report, (first, last))
         point = start_point(curve, first, None, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
     return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))

@@ -17,6 +17,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import limited
 from suboctave.model.coupled import reads
 from suboctave.stability import FloquetResult, StabilityMethod, method_of
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
@@ -83,7 +84,9 @@ class Verification:
 
 
 @overload
-def verify(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3) -> Verification: ...
+def verify(
+    what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3, *, seconds: float | None = None
+) -> Verification: ...
 @overload
 def verify(
     what: Branch,
@@ -94,7 +97,9 @@ def verify(
     bifurcations: bool = True,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> BranchVerification: ...
+@limited
 def verify(
     what: PeriodicOrbit | BranchPoint | Bifurcation | Branch,
     tolerance: float = 1e-3,
@@ -104,6 +109,7 @@ def verify(
     bifurcations: bool = True,
     workers: int | None = None,
     progress: Any = None,
+    seconds: float | None = None,
 ) -> Verification | BranchVerification:
     """Contradict a motion, a located bifurcation, or all of a branch, by shooting from the states at t = 0.
 
@@ -123,6 +129,8 @@ def verify(
     workers, progress
         Of a branch: threads (default: one for each processor); True for a bar, or a callable (share, text). Ctrl-C
         keeps what is done.
+    seconds
+        Time limit: of a branch what is done by then is given; a single motion raises a TimeLimitError.
 
     Raises
     ------

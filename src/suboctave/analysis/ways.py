@@ -6,8 +6,11 @@ from suboctave.analysis.follow import follow
 from suboctave.analysis.response import ResponseCurve
 from suboctave.analysis.trace import Settings, Trace
 from suboctave.continuation import CurvePoint
+from suboctave.continuation.ending import Ending, EndReason
 
 __all__ = ["both_ways"]
+
+START = Ending(EndReason.START)
 
 
 def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:
@@ -18,7 +21,7 @@ def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], sett
         return follow(point, ahead, bounds, settings)
     if abs(point.parameter - (high if ahead > 0 else low)) <= slack:
         back = follow(point, -ahead, bounds, settings)
-        only = Trace(back.points[:1], ended=back.ended)
+        only = Trace(back.points[:1], endings=(START, START))
         return back.reversed_before(only)
     forward = follow(point, ahead, bounds, settings)
     if forward.closed or forward.interrupted:

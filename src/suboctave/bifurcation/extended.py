@@ -38,6 +38,7 @@ from suboctave.harmonic.perturbation_rate import operator_along
 from suboctave.harmonic.second import Direction
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
+from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 
 #: residual and step at which an iteration has arrived, as for the bordered system
@@ -146,6 +147,7 @@ def solve_extended(
     state, tangent, steepest = begin, None, 0.0
     lengths: list[float] = []
     for iteration in range(iterations + 1):
+        check_time()
         if iteration > 0:
             omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
             if omega <= 0.0:

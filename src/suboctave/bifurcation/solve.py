@@ -27,6 +27,7 @@ from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.selection import motion_size
 from suboctave.harmonic.state import BalanceState
+from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 from suboctave.stability import FloquetResult, floquet_multipliers
 
@@ -162,6 +163,7 @@ def newton(
     nearest: tuple[BalanceState, Array, float, int] | None = None
     linear: tuple[Factor, Array, Array, list[float], float] | None = None
     for iteration in range(iterations + 1):
+        check_time()
         omega, values = at_values(guess.values, guess.name, parameter, guess.omega)
         if omega <= 0.0:
             raise ConvergenceError(_ENDS[OFF_AXIS])
@@ -256,6 +258,7 @@ def locate_singular(guess: Guess, kind: Kind) -> Singular:
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
+    check_time()
     begin = guess.state()
     found = _at_once(guess, kind, begin)
     if found is not None:

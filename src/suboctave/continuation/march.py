@@ -16,6 +16,7 @@ import numpy as np
 
 from suboctave.continuation import kernels
 from suboctave.continuation.bounds import Bounds
+from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.place import Place
@@ -42,14 +43,14 @@ _SPARED = 2e-4
 
 @dataclass(frozen=True)
 class Arrival:
-    """A curve meets another one and ends there: its last point before that (None: the one it has), and why in words."""
+    """A curve meets another one and ends there: its last point before that (None: the one it has), and the ending."""
 
     point: CurvePoint | None
-    reason: str
+    ending: Ending
 
 
 class March:
-    """Follows a curve from a start point; iterate over it for the points, then read `ended` and `closed`.
+    """Follows a curve from a start point; iterate over it for the points, then read `ending` and `closed`.
 
     Parameters
     ----------
@@ -87,10 +88,15 @@ class March:
         self.arrive = arrive
         self.home = home
         self.closed = False
-        self.ended = "not started"
+        self.ending = Ending(EndReason.NOT_STARTED)
         self._direction = direction
         self._range = Bounds(lambda curve: curve.parameter, *bounds)
         self._close = replace(newton, tolerance=min(newton.tolerance, max(_SHARE * newton.tolerance, _LEAST)))
+
+    @property
+    def ended(self) -> str:
+        """Why it ended, in words."""
+        return str(self.ending)
 
     def __iter__(self) -> Iterator[CurvePoint]:
         """Points in order, the start first."""
@@ -106,22 +112,20 @@ class March:
         curve, bend, count = point.curve, 0.0, 1
         while True:
             if count >= options.max_points:
-                self.ended = (
-                    f"{options.max_points} points computed at {point.curve.where(point.u)}; raise max_points to go on"
-                )
+                where = point.curve.where(point.u)
+                self.ending = Ending(EndReason.MAX_POINTS, where, str(options.max_points))
                 return
             point = self._rescaled(curve, point, largest)
             try:
                 new, step, deviation, turn = self._advance(point, step, behind)
             except ConvergenceError as failure:
-                self.ended = (
-                    f"step size fell below {options.min_step:.0e} at {point.curve.where(point.u)}: {failure}. "
-                    "Try more harmonics, a smoother law, or a smaller min_step"
-                )
+                where = point.curve.where(point.u)
+                detail = f"{options.min_step:.0e} at {where}: {failure}"
+                self.ending = Ending(EndReason.STEP_TOO_SMALL, where, detail)
                 return
             arrival = None if self.arrive is None else self.arrive(point, new)
             if arrival is not None:
-                self.ended = arrival.reason
+                self.ending = arrival.ending
                 if arrival.point is not None:
                     yield arrival.point
                 return
@@ -132,25 +136,20 @@ class March:
                 end = None if landed is None else landed.parameter
             back = None if count < 3 else home.passed(point, new)
             if back is not None:
-                self.closed, self.ended = True, "the curve closed on itself"
+                self.closed, self.ending = True, Ending(EndReason.CLOSED)
                 yield back
                 return
             if mark is not None and count > marked + 3 and mark.passed(point, new) is not None:
-                self.ended = (
-                    f"came back to {new.curve.where(new.u)} without having passed its start: where two branches nearly "
-                    "touch it went over to another one. Try a smaller max_step"
-                )
+                self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
             if end is not None:
                 if landed is None:
                     landed = new if new.parameter == end else self._range.land(point, new, end, self.newton)
                 if landed is not None:
-                    self.ended = f"reached the end of the range at {landed.curve.where(landed.u)}"
+                    self.ending = Ending(EndReason.RANGE_END, landed.curve.where(landed.u))
                     yield landed
                 else:
-                    self.ended = (
-                        f"left the range after {point.curve.where(point.u)}; no solution was found exactly on its end"
-                    )
+                    self.ending = Ending(EndReason.LEFT_RANGE, point.curve.where(point.u))
                 return
             yield new
             count += 1

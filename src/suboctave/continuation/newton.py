@@ -17,6 +17,7 @@ from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import check_time
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 SHORT = 1e-3
@@ -109,6 +110,7 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
+    check_time()
     if not options.damped:
         at_once: Callable[..., Solved | None] | None = getattr(curve, "corrected", None)
         solved = None if at_once is None else at_once(guess, row, weights, options, spare, known)
@@ -122,6 +124,7 @@ def correct(
     first = 0.0
     factor = known
     for iteration in range(options.iterations + 1):
+        check_time()
         evaluation = curve.evaluate(u)
         error = evaluation.error
         if not math.isfinite(error):

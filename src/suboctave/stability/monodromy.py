@@ -29,6 +29,7 @@ from scipy.linalg import eigh, lapack
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState, length
+from suboctave.interruption import check_time
 from suboctave.stability.closed import ClosedSingle
 from suboctave.stability.linearisation import Linearisation
 from suboctave.stability.magnus import BETWEEN, STEPS
@@ -53,6 +54,7 @@ def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetR
     corrected
         False: along the motion as it stands, as if it were exact; errors are then those of the propagation alone.
     """
+    check_time()
     motion = _linearised(state, corrected)
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays

@@ -56,11 +56,8 @@ class Curve:
     case: Case
     dataset: xarray.Dataset
     seconds: float
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether the user stopped it; what had been computed is there."""
-        return str(self.dataset.attrs["ended"]).startswith("interrupted")
+    #: whether the user stopped it; what had been computed is there
+    interrupted: bool = False
 
 
 CASES = (
@@ -78,7 +75,7 @@ def compute(case: Case, progress: Progress | None = None) -> Curve:
     begin = perf_counter()
     system = library.reference_oscillator(p=case.p, j=case.j, regularization=REGULARIZATION)
     branch = frequency_response(system, omega=OMEGA, max_step=MAX_STEP, progress=progress)
-    return Curve(case, branch.to_xarray(), perf_counter() - begin)
+    return Curve(case, branch.to_xarray(), perf_counter() - begin, branch.interrupted)
 
 
 def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:

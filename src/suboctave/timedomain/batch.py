@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import Interruption, check_time
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.adaptive import AdaptiveGroup, AdaptiveKernel
@@ -226,6 +227,7 @@ class _Run:
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
         self.stop = threading.Event()
+        self.interruption: Interruption | None = None
 
     def go(self, workers: int | None, report: Report | None) -> Motions:
         """Follow all of them."""
@@ -236,14 +238,16 @@ class _Run:
                     self._follow(g, report)
             else:
                 self._together(many, report)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as cause:
             self.stop.set()
+            self.interruption = Interruption.of(cause)
         if self.answers.failure is not None:
             raise self.answers.failure
         self.failed |= self.finished & ~np.isfinite(self.end).all(axis=1)
         return Motions(
-            self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished, self.growth, self.tangents
-        )
+            self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished, self.growth, self.tangents,
+            self.interruption,
+        )  # fmt: skip
 
     def _together(self, many: int, report: Report | None) -> None:
         self._compile()
@@ -262,6 +266,7 @@ class _Run:
                 raise
 
     def _tell(self, report: Report | None) -> None:
+        check_time()
         if report is not None:
             share = sum(self.done) / len(self.done)
             report(share, f"{share * len(self.states):.0f} of {len(self.states)} trajectories")

@@ -18,6 +18,7 @@ from scipy.integrate import DOP853, DenseOutput
 from scipy.optimize import brentq
 
 from suboctave.errors import ConvergenceError
+from suboctave.interruption import check_time
 from suboctave.timedomain.field import Array, Field
 
 __all__ = ["Crossing", "Passage", "Step", "advance"]
@@ -70,6 +71,7 @@ def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: flo
 
 
 def _step(solver: DOP853, model: Field) -> None:
+    check_time()
     message = solver.step()
     if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
         raise ConvergenceError(

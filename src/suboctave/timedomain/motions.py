@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import ConvergenceError
+from suboctave.interruption import Interruption
 from suboctave.model.element import Array
 
 __all__ = ["Motions", "check_motions"]
@@ -31,12 +32,14 @@ class Motions:
     unsettled
         (B,): steps of Newmark's method whose equations were not solved to the tolerance.
     finished
-        (B,): whether the trajectory was followed to its end; not all are where the user interrupted (Ctrl-C).
+        (B,): whether the trajectory was followed to its end; not all are where it was interrupted.
     growth
         (B, S, k + 1): of a flow with k tangent vectors, the logarithms by which they grew since the instant before,
         then that by which the volume of states did.
     tangents
         (B, 2n, k): the tangent vectors at the end, as columns.
+    interruption
+        What stopped them, Ctrl-C or a time limit; None if nothing did.
     """
 
     states: Array
@@ -47,6 +50,7 @@ class Motions:
     finished: NDArray[np.bool_]
     growth: Array | None = None
     tangents: Array | None = None
+    interruption: Interruption | None = None
 
 
 def check_motions(motions: Motions) -> None:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow
@@ -106,7 +107,7 @@ class MultipleShooting:
     ) -> ShotMotions:
         """The motions nearest to `states` (B, N, 2n) at `omega` (B,), in units of `sizes` (B, 2n).
 
-        `along` (B, N 2n + 1): the sense of the tangents. Raises KeyboardInterrupt where the user interrupted.
+        `along` (B, N 2n + 1): the sense of the tangents. Raises KeyboardInterrupt where it was interrupted.
         """
         y, w = states.copy(), omega.copy()
         count = len(y)
@@ -197,8 +198,7 @@ class MultipleShooting:
             {name: np.repeat(values, pieces * each) for name, values in parameters.items()},
             self.workers,
         )
-        if not motions.finished.all():
-            raise KeyboardInterrupt
+        pass_on(motions.interruption)
         ends = motions.end.reshape(count, pieces, each, m) / sizes[:, None, None, :]
         slopes = (ends[:, :, 0:-1:2] - ends[:, :, 1:-1:2]) / (2.0 * width)
         transition = np.swapaxes(slopes[:, :, :m], 2, 3)

@@ -111,8 +111,9 @@ class FindIsolas(FollowingStep):
                 except ConvergenceError as failure:
                     notes.append(f"the closed branch at {self.parameter} = {value:g}: {failure}")
                     continue
-                if branch.interrupted:
-                    return found.noting(["interrupted: the closed branches asked for are not all here", *notes])
+                if branch.interruption is not None:
+                    missing = f"{branch.interruption}: the closed branches asked for are not all here"
+                    return found.noting([missing, *notes], branch.interruption)
         for value in self.at:
             if not any(value in isola for isola in found):
                 notes.append(f"no isola was found at {self.parameter} = {value:g}")

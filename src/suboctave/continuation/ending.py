@@ -1,0 +1,117 @@
+"""Why a curve ends where it does: a reason that decides what follows, and the sentence that is printed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from suboctave.interruption import Interruption
+
+__all__ = ["EndReason", "Ending", "interruption_of", "read_endings", "sentence"]
+
+
+class EndReason(StrEnum):
+    """Why a curve ends at one of its two ends; files hold the values."""
+
+    START = "start"  # it was followed from here, into the other direction only
+    NOT_STARTED = "not started"
+    RANGE_END = "range end"
+    LEFT_RANGE = "left range"
+    CLOSED = "closed"
+    MET_BRANCH = "met branch"
+    MOTIONS_END = "motions end"  # the motions that it consists of do not exist beyond
+    STEP_TOO_SMALL = "step too small"
+    MAX_POINTS = "max points"
+    ASTRAY = "astray"  # it goes round and round without passing its start
+    NO_MEANING = "no meaning"  # what it consists of can no longer be told from other motions
+    CUT = "cut"  # a part of a longer curve
+    INTERRUPTED = "interrupted"
+    TIME_LIMIT = "time limit"
+    OTHER = "other"
+
+
+#: the sentences, from the place, the details and the seconds; where there is none here the details are the sentence
+_SENTENCES = {
+    EndReason.START: "",
+    EndReason.NOT_STARTED: "not started",
+    EndReason.RANGE_END: "reached the end of the range at {where}",
+    EndReason.LEFT_RANGE: "left the range after {where}; no solution was found exactly on its end",
+    EndReason.CLOSED: "the curve closed on itself",
+    EndReason.STEP_TOO_SMALL: (
+        "step size fell below {detail}. Try more harmonics, a smoother law, or a smaller min_step"
+    ),
+    EndReason.MAX_POINTS: "{detail} points computed at {where}; raise max_points to go on",
+    EndReason.ASTRAY: (
+        "came back to {where} without having passed its start: where two branches nearly touch it went over to another "
+        "one. Try a smaller max_step"
+    ),
+    EndReason.INTERRUPTED: "interrupted at {where}; what was computed is kept",
+    EndReason.TIME_LIMIT: "the time limit of {seconds:g} s was reached at {where}; what was computed is kept",
+}
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Why a curve ends: the reason, the place in words, what else is to be said; `seconds` of a time limit."""
+
+    reason: EndReason
+    where: str = ""
+    detail: str = ""
+    seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reason", EndReason(self.reason))  # files hold its value
+
+    @classmethod
+    def stopped(cls, interruption: Interruption, where: str) -> Ending:
+        """Where an interruption found a curve."""
+        reason = EndReason.INTERRUPTED if interruption.seconds is None else EndReason.TIME_LIMIT
+        return cls(reason, where, seconds=interruption.seconds)
+
+    @property
+    def interruption(self) -> Interruption | None:
+        """What stopped the curve before its end; None where it came to one."""
+        if self.reason in (EndReason.INTERRUPTED, EndReason.TIME_LIMIT):
+            return Interruption(self.seconds)
+        return None
+
+    def __str__(self) -> str:
+        words = _SENTENCES.get(self.reason, "{detail}")
+        return words.format(where=self.where, detail=self.detail, seconds=self.seconds or 0.0)
+
+
+#: what goes on with a response that a time limit stopped
+_GO_ON = ", or go on from curve.orbits[{}] with so.continue_branch(...)"
+
+
+def sentence(endings: Sequence[Ending], go_on: str = _GO_ON) -> str:
+    """Why a curve ends, at its one end or at both (first, last); after a time limit with what goes on from there."""
+    told = list(dict.fromkeys(str(ending) for ending in endings if ending.reason is not EndReason.START))
+    text = told[0] if len(told) == 1 else f"{told[0]} in one direction, {told[1]} in the other" if told else ""
+    late = [at for at, ending in zip((0, -1), endings, strict=False) if ending.reason is EndReason.TIME_LIMIT]
+    return text + (f". Give more seconds={go_on.format(late[-1])}" if late else "")
+
+
+def interruption_of(endings: Sequence[Ending]) -> Interruption | None:
+    """What stopped a curve in one of its directions; None where it came to its ends."""
+    return next((found for ending in endings if (found := ending.interruption) is not None), None)
+
+
+def read_endings(text: str) -> tuple[Ending, ...]:
+    """The endings that a sentence tells: for files that hold nothing else."""
+    both = re.fullmatch(r"(.*) in one direction, (.*) in the other", text, re.DOTALL)
+    return tuple(_read(part) for part in (both.groups() if both else (text,)))
+
+
+def _read(text: str) -> Ending:
+    for reason, words in _SENTENCES.items():
+        pattern = re.escape(words)
+        for name in ("where", "detail"):
+            pattern = pattern.replace(re.escape(f"{{{name}}}"), f"(?P<{name}>.*)")
+        found = re.fullmatch(pattern, text, re.DOTALL)
+        if found:
+            named = found.groupdict(default="")
+            return Ending(reason, named.get("where", ""), named.get("detail", ""))
+    return Ending(EndReason.OTHER, detail=text)

@@ -1,0 +1,147 @@
+"""How work is stopped before it is done: by its user, with Ctrl-C, or by a time limit (`seconds=` of the verbs).
+
+Both take one path. The exception of a time limit is a `KeyboardInterrupt`, raised once, by `check_time`, wherever
+Python would raise that of Ctrl-C: long loops and every Newton iteration call it. What catches it keeps what was
+computed and records an `Interruption` in its result. A search that is given an interrupted result passes the
+interruption on (`pass_on`); none of them is kept as complete.
+
+A limit holds for everything that is called while it does; of two limits the nearer one counts. It belongs to its
+thread.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from time import monotonic
+from typing import Any, ParamSpec, TypeVar
+
+from suboctave.errors import InputError, TimeLimitError
+
+__all__ = [
+    "Deadline",
+    "Interruption",
+    "TimeLimitReached",
+    "check_seconds",
+    "check_time",
+    "limited",
+    "pass_on",
+    "time_limit",
+]
+
+Arguments = ParamSpec("Arguments")
+Given = TypeVar("Given")
+
+
+class TimeLimitReached(KeyboardInterrupt):
+    """The time limit of `seconds` was reached."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(f"the time limit of {seconds:g} s was reached")
+        self.seconds = seconds
+
+
+@dataclass(frozen=True)
+class Interruption:
+    """What stopped a computation: a time limit of so many `seconds`, or its user (None)."""
+
+    seconds: float | None = None
+
+    @classmethod
+    def of(cls, cause: KeyboardInterrupt) -> Interruption:
+        """What an exception tells."""
+        return cls(cause.seconds if isinstance(cause, TimeLimitReached) else None)
+
+    def exception(self) -> KeyboardInterrupt:
+        """The exception that stops whatever waits for the result."""
+        return KeyboardInterrupt() if self.seconds is None else TimeLimitReached(self.seconds)
+
+    def __str__(self) -> str:
+        return "interrupted" if self.seconds is None else f"the time limit of {self.seconds:g} s was reached"
+
+
+def pass_on(interruption: Interruption | None) -> None:
+    """Stop whoever needs a result that was interrupted."""
+    if interruption is not None:
+        raise interruption.exception()
+
+
+@dataclass(eq=False)
+class Deadline:
+    """When a time limit ends, by the monotonic clock; `reached`: it was raised."""
+
+    seconds: float
+    until: float
+    reached: bool = False
+
+
+_DEADLINE: ContextVar[Deadline | None] = ContextVar("_DEADLINE", default=None)
+
+
+def check_time() -> None:
+    """Raise `TimeLimitReached` where the time limit that holds here is over: once, as Ctrl-C is raised once.
+
+    What finishes a result after that is not stopped again.
+    """
+    deadline = _DEADLINE.get()
+    if deadline is not None and not deadline.reached and monotonic() >= deadline.until:
+        deadline.reached = True
+        raise TimeLimitReached(deadline.seconds)
+
+
+def check_seconds(seconds: Any) -> float | None:
+    """A time limit in seconds, None for none; InputError for what is no positive number."""
+    if seconds is None:
+        return None
+    try:
+        number = math.nan if isinstance(seconds, bool | str | bytes) else float(seconds)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise InputError(f"seconds must be a positive number, or None for no time limit, not {seconds!r}")
+    return number
+
+
+@contextmanager
+def time_limit(seconds: Any) -> Iterator[Deadline | None]:
+    """Work within takes at most so many seconds; None: no limit but the one that holds already.
+
+    Gives its deadline where that is the one that counts.
+
+    Raises
+    ------
+    InputError
+        If `seconds` is no positive number.
+    TimeLimitError
+        If the limit was reached before there was anything to keep.
+    """
+    number = check_seconds(seconds)
+    outer = _DEADLINE.get()
+    if number is None or (outer is not None and outer.until <= monotonic() + number):
+        yield None
+        return
+    deadline = Deadline(number, monotonic() + number)
+    token = _DEADLINE.set(deadline)
+    try:
+        yield deadline
+    except TimeLimitReached:
+        raise TimeLimitError(
+            f"the time limit of {number:g} s was reached before there was a result to keep: give more seconds="
+        ) from None
+    finally:
+        _DEADLINE.reset(token)
+
+
+def limited(verb: Callable[Arguments, Given]) -> Callable[Arguments, Given]:
+    """A verb whose keyword `seconds` is a time limit for all that it does."""
+
+    @functools.wraps(verb)
+    def within(*positional: Arguments.args, **named: Arguments.kwargs) -> Given:
+        with time_limit(named.get("seconds")):
+            return verb(*positional, **named)
+
+    return within
