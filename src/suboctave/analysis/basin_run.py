@@ -137,7 +137,7 @@ class BasinRun:
             })  # fmt: skip
 
     # ------------------------------------------------------------------------------------------------------ work
-    def go(self, report: Report | None) -> bool:
+    def go(self, report: Report | None) -> None:
         """All that is left to do."""
         count = len(self.states)
         if self._next == 0:
@@ -160,7 +160,6 @@ class BasinRun:
                 self.journal.append("chunk", {"begin": begin, "end": end}, found)
         if not self._audited:
             self._follow_some()
-        return True
 
     def _look_around(self) -> None:
         """Find what attracts a coarse sample of the cells."""

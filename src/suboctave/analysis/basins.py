@@ -18,6 +18,7 @@ from suboctave.analysis.poincare import check_observe
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import Interruption
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.arrays import padded
@@ -275,16 +276,17 @@ def basins(
     states[:, columns[0]], states[:, columns[1]] = np.tile(ends[0], counts[1]), np.repeat(ends[1], counts[0])
     catalogue = Catalogue(system, float(omega), values, observe, tolerance, workers)
     run = BasinRun(catalogue, states, counts, periods, period_tolerance)
+    interruption: Interruption | None = None
     with reporting(progress, "basins") as report:
         run.open(keep, read_attractors(catalogue, attractors))
         try:
-            complete = run.go(report)
-        except KeyboardInterrupt:
-            complete = False
+            run.go(report)
+        except KeyboardInterrupt as cause:
+            interruption = Interruption.of(cause)
         finally:
             run.close()
     names = coordinates(system)
-    return Basins(
+    found = Basins(
         x=ends[0],
         y=ends[1],
         labels=run.labels.reshape(counts[1], counts[0]),
@@ -296,10 +298,12 @@ def basins(
         parameters={**system.parameters, **values},
         followed=run.followed,
         contradicted=run.contradicted,
-        complete=complete,
+        complete=interruption is None,
         observed=observe,
         system=system,
     )
+    found.interruption = interruption
+    return found
 
 
 def coordinates(system: System) -> list[str]:

@@ -25,6 +25,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import ComplexArray
+from suboctave.interruption import Interruption
 from suboctave.stability import FloquetResult
 from suboctave.store.columns import parameter_column
 
@@ -118,7 +119,7 @@ class BranchVerification(TimeResult):
     points, bifurcations
         `VerifiedPoint` and `VerifiedBifurcation` of each that was looked at, in the order of the branch.
     complete
-        False where an interruption (Ctrl-C) left some out.
+        False where an interruption left some out: `interruption`, Ctrl-C or a time limit.
     """
 
     branch: Branch
@@ -126,6 +127,7 @@ class BranchVerification(TimeResult):
     bifurcations: tuple[VerifiedBifurcation, ...]
     tolerance: float
     complete: bool
+    interruption: Interruption | None = None
 
     @property
     def agrees(self) -> bool:
@@ -157,7 +159,7 @@ class BranchVerification(TimeResult):
         confirmed = sum(found.agrees for found in self.bifurcations)
         if self.bifurcations:
             text += f"; {confirmed} of {len(self.bifurcations)} bifurcations are confirmed"
-        return text + ("." if self.complete else "; interrupted before the end.")
+        return text + ("." if self.complete else f"; {self.interruption or Interruption()} before the end.")
 
     def to_xarray(self) -> xarray.Dataset:
         """Points and bifurcations with their outcomes; the branch itself is `branch.to_xarray()`."""
@@ -241,7 +243,7 @@ def verify_branch(
     found: list[VerifiedBifurcation] = []
     items = list(branch.bifurcations.met) if bifurcations else []
     whole = len(which) + 4 * len(items)
-    complete = True
+    interruption: Interruption | None = None
     with reporting(progress, "verifying") as report, one_thread():
         try:
             for begin in range(0, len(which), shots.at_once):
@@ -255,9 +257,9 @@ def verify_branch(
                 if report is not None:
                     report((len(which) + 4 * done) / whole, f"{item.kind} at omega = {item.omega:.6g}")
                 found.append(_confirmed(item, quick.get(id(item)), tolerance, branch.observe, alone, missed))
-        except KeyboardInterrupt:
-            complete = False
-    return BranchVerification(branch, tuple(looked), tuple(found), tolerance, complete)
+        except KeyboardInterrupt as cause:
+            interruption = Interruption.of(cause)
+    return BranchVerification(branch, tuple(looked), tuple(found), tolerance, interruption is None, interruption)
 
 
 def _chosen(count: int, points: int | Iterable[int] | None, every: int) -> list[int]:

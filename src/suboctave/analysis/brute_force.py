@@ -21,6 +21,7 @@ from suboctave.analysis.poincare import check_observe, check_tolerance
 from suboctave.analysis.progress import Report, reporting, timed
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import Interruption, pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
@@ -226,17 +227,17 @@ def brute_force_diagram(
     anew = [i for i, label in enumerate(labels) if label not in _CARRIED]
     with reporting(progress, "brute force") as report:
         whole = len(labels)
-        complete = True
+        interruption: Interruption | None = None
         if carried:
             flow = Flow(system, method, 1, samples, tolerance, lanes=FEW)
             try:
-                complete = run.carried(flow, carried, names, first, _share(report, 0.0, len(carried) / whole))
-            except KeyboardInterrupt:
-                complete = False
-        if anew and complete:
+                run.carried(flow, carried, names, first, _share(report, 0.0, len(carried) / whole))
+            except KeyboardInterrupt as cause:
+                interruption = Interruption.of(cause)
+        if anew and interruption is None:
             flow = Flow(system, method, 1, samples, tolerance)
             begin = np.vstack([np.zeros((1, 2 * system.n)), fresh]) if "rest" in names else fresh
-            complete = run.anew(flow, anew, begin, _share(report, len(carried) / whole, 1.0))
+            interruption = run.anew(flow, anew, begin, _share(report, len(carried) / whole, 1.0))
     attractors = [
         [
             told(system, name, at, float(value), points[s, v], largest[s, v], period_tolerance, observe)
@@ -244,10 +245,12 @@ def brute_force_diagram(
         ]
         for s in range(len(labels))
     ]
-    return BruteForceDiagram(
-        name, grid, labels, points, largest, attractors, complete, None if name == "omega" else at, transient,
-        period_tolerance, method, observe, system,
+    found = BruteForceDiagram(
+        name, grid, labels, points, largest, attractors, interruption is None, None if name == "omega" else at,
+        transient, period_tolerance, method, observe, system,
     )  # fmt: skip
+    found.interruption = interruption
+    return found
 
 
 @dataclass
@@ -264,8 +267,8 @@ class _Scan:
     largest: Array
     workers: int | None
 
-    def carried(self, flow: Flow, which: list[str], names: Sequence[str], first: Array, report: Report | None) -> bool:
-        """Carry states through the values, all directions side by side; whether it came to the end."""
+    def carried(self, flow: Flow, which: list[str], names: Sequence[str], first: Array, report: Report | None) -> None:
+        """Carry states through the values, all directions side by side."""
         count = len(self.grid)
         states = np.repeat(first[None], len(which), axis=0)
         rows = [names.index(one) for one in which]
@@ -274,8 +277,7 @@ class _Scan:
             motions = flow.over(
                 states, *self._at(self.grid[columns]), skip=self.transient, measure=True, workers=1
             )  # fmt: skip
-            if motions.interruption is not None:
-                return False
+            pass_on(motions.interruption)
             assert motions.peaks is not None
             for i, (row, column) in enumerate(zip(rows, columns, strict=True)):
                 self.points[row, column], self.largest[row, column] = motions.states[i], motions.peaks[i]
@@ -283,10 +285,9 @@ class _Scan:
             states = np.where(motions.failed[:, None], first, motions.end)
             if report is not None:
                 report((step + 1) / count, f"{self.name} = {self.grid[columns[0]]:.6g}")
-        return True
 
-    def anew(self, flow: Flow, rows: list[int], begin: Array, report: Report | None) -> bool:
-        """Every value from every state in `begin` (k, 2n); whether it came to the end."""
+    def anew(self, flow: Flow, rows: list[int], begin: Array, report: Report | None) -> Interruption | None:
+        """Every value from every state in `begin` (k, 2n); what stopped it, if anything did."""
         k, count = len(begin), len(self.grid)
         motions = flow.over(
             np.repeat(begin, count, axis=0),
@@ -299,7 +300,7 @@ class _Scan:
         assert motions.peaks is not None
         self.points[rows] = motions.states.reshape(k, count, *motions.states.shape[1:])
         self.largest[rows] = motions.peaks.reshape(k, count, *motions.peaks.shape[1:])
-        return bool(motions.finished.all())
+        return motions.interruption
 
     def _at(self, values: Array) -> tuple[Any, int, dict[str, Array]]:
         """Frequency, periods and parameters of a flow."""

@@ -212,7 +212,9 @@ def lyapunov_map(
     smooth = errors[1] < 0.5 * errors[0]  # the less of two estimates of few stretches is smaller by chance, too
     per_time = np.tile(frequencies, shape[0]) / (2.0 * np.pi)
     mean, error = (np.where(smooth, two[1], two[0]) * per_time for two in (means, errors))
-    return LyapunovMap(
+    found = LyapunovMap(
         parameter, frequencies, column, mean.reshape(shape), error.reshape(shape), bool(motions.finished.all()),
         periods, transient, at,
     )  # fmt: skip
+    found.interruption = motions.interruption
+    return found

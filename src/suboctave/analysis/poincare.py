@@ -14,7 +14,6 @@ from suboctave.analysis.integration import _not_negative, _samples, start_state
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError
-from suboctave.interruption import Interruption
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
@@ -47,8 +46,6 @@ class PoincareSections(TimeResult):
         method did not solve.
     finished
         (B,): False for those that an interruption left out; their points are NaN.
-    interruption
-        What stopped them, Ctrl-C or a time limit (`seconds`); None if nothing did.
     tolerance
         Relative tolerance of the recognition of periods.
     """
@@ -65,7 +62,6 @@ class PoincareSections(TimeResult):
     observed: int
     system: System
     seconds: float = 0.0
-    interruption: Interruption | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -228,7 +224,7 @@ def poincare_sections(
         )
     count = len(motions.states)
     assert motions.peaks is not None
-    return PoincareSections(
+    found = PoincareSections(
         points=motions.states,
         largest=motions.peaks,
         omega=np.broadcast_to(np.asarray(omega, dtype=float), (count,)).copy(),
@@ -238,13 +234,14 @@ def poincare_sections(
         },
         failed=motions.failed | (motions.unsettled > 0.0),
         finished=motions.finished,
-        interruption=motions.interruption,
         tolerance=period_tolerance,
         transient=transient,
         method=method,
         observed=observe,
         system=system,
     )
+    found.interruption = motions.interruption
+    return found
 
 
 def check_tolerance(tolerance: float) -> None:

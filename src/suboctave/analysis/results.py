@@ -21,6 +21,7 @@ from suboctave.analysis.time_result import TimeResult
 from suboctave.analysis.tree import BifurcationDiagram
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
+from suboctave.interruption import Interruption
 from suboctave.store import files
 from suboctave.store.arrays import array_of, flat
 from suboctave.version import __version__
@@ -42,11 +43,18 @@ class Table:
     """Numbers and texts in named columns, (rows,) each: what analyses give that are no curves. `title` says of what.
 
     `result`: what the table was taken from (basins, a stepped-sine test, ...), saved with it; None if that is all.
+    `stopped`: what stopped the analysis before its end, where there is no `result` that says so.
     """
 
     columns: Mapping[str, np.ndarray]
     title: str = ""
     result: TimeResult | None = None
+    stopped: Interruption | None = None
+
+    @property
+    def interruption(self) -> Interruption | None:
+        """What stopped the analysis before its end, Ctrl-C or a time limit; None if nothing did."""
+        return self.stopped if self.result is None else self.result.interruption
 
     def __len__(self) -> int:
         return max((len(column) for column in self.columns.values()), default=0)

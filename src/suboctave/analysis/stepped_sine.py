@@ -26,7 +26,7 @@ from suboctave.analysis.progress import Report, reporting, timed
 from suboctave.analysis.stepped_result import SteppedSine
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
-from suboctave.interruption import pass_on
+from suboctave.interruption import Interruption, pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow, check_count
@@ -102,8 +102,8 @@ def stepped_sine(
     with reporting(progress, "stepped sine") as report:
         try:
             test.run(flows, out, start, where, np.random.default_rng(seed), period_tolerance, report)
-        except KeyboardInterrupt:
-            out.complete = False
+        except KeyboardInterrupt as cause:
+            out.complete, out.interruption = False, Interruption.of(cause)
     return out
 
 

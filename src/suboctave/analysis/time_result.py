@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from suboctave.interruption import Interruption
+
 if TYPE_CHECKING:
     import pandas
     import xarray
@@ -16,7 +18,12 @@ __all__ = ["TimeResult"]
 
 
 class TimeResult(ABC):
-    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications."""
+    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
+
+    `interruption`: what stopped it before its end, Ctrl-C or a time limit (`seconds`); None if nothing did.
+    """
+
+    interruption: Interruption | None = None
 
     @abstractmethod
     def to_xarray(self) -> xarray.Dataset:

@@ -1,8 +1,8 @@
 """The command line: `suboctave new`, `check`, `run`, `show`, `demo`.
 
 Everything heavy is imported when a command runs, so that `--help` and a mistyped option answer at once. Exit status: 0,
-1 where a computation failed, 2 where the user's input is wrong, 130 after Ctrl-C. With `--json` the answer is one JSON
-object on stdout, errors included.
+1 where a computation failed or a time limit ended it, 2 where the user's input is wrong, 130 after Ctrl-C. With
+`--json` the answer is one JSON object on stdout, errors included.
 """
 
 # No `from __future__ import annotations` here: typer reads the annotations below, which name what is imported lazily.
@@ -131,13 +131,14 @@ def application() -> "typer.Typer":
         out: Annotated[Path | None, typer.Option(help="Folder for what is written, in place of the study's.")] = None,
         overwrite: Annotated[bool, typer.Option(help="Replace what an earlier run left there.")] = False,
         resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped or killed.")] = False,
+        seconds: Annotated[float | None, typer.Option(help="Time limit for all analyses together.")] = None,
         allow_code: Annotated[bool, code] = False,
         json_wanted: Annotated[bool, as_json] = False,
     ) -> None:
         """Run a study: analyses in order, then results, tables and figures."""
         from suboctave.study import commands
 
-        status = commands.run(study, out, overwrite, resume, allow_code, json_wanted)
+        status = commands.run(study, out, overwrite, resume, allow_code, json_wanted, seconds)
         if status:
             raise typer.Exit(status)
 

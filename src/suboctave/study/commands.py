@@ -16,6 +16,7 @@ from suboctave.analysis.isola_tables import isola_row
 from suboctave.analysis.results import Result
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
+from suboctave.interruption import Interruption
 from suboctave.store import files
 from suboctave.study.demo import significant
 from suboctave.study.file import Study, read_study
@@ -67,7 +68,15 @@ def check(path: Path, allow_code: bool, as_json: bool) -> None:
         console().print(f"{path} is in order: {count}, outputs in {study.folder}", markup=False, soft_wrap=True)
 
 
-def run(path: Path, out: Path | None, overwrite: bool, resume: bool, allow_code: bool, as_json: bool) -> int:
+def run(
+    path: Path,
+    out: Path | None,
+    overwrite: bool,
+    resume: bool,
+    allow_code: bool,
+    as_json: bool,
+    seconds: float | None = None,
+) -> int:
     """Run a study and print what came of it; the exit status."""
     study = read_study(path, allow_code)
     screen = console(quiet=as_json)
@@ -81,7 +90,7 @@ def run(path: Path, out: Path | None, overwrite: bool, resume: bool, allow_code:
             screen.print(titles.pop(), style="bold", markup=False)
         _print_finished(screen, item)
 
-    outcome = run_study(study, out, overwrite, resume, watch, said)
+    outcome = run_study(study, out, overwrite, resume, watch, said, seconds)
     if outcome.complete_already:
         screen.print(f"nothing to resume: {outcome.files[0]} is complete", markup=False, soft_wrap=True)
     elif outcome.files:
@@ -92,7 +101,9 @@ def run(path: Path, out: Path | None, overwrite: bool, resume: bool, allow_code:
     if as_json:
         _print_json(_summary(outcome, status))
     elif outcome.interrupted:
-        screen.print(f"interrupted; what was computed is kept. Go on: suboctave run {path} --resume", markup=False)
+        why = f"{outcome.interruption}; what was computed is kept"
+        how = "Go on" if outcome.interruption == Interruption() else "Give more seconds, and go on"
+        screen.print(f"{why}. {how}: suboctave run {path} --resume", markup=False)
     elif status:
         names = ", ".join(item.step.name for item in outcome.failed)
         screen.print(f"failed: {names}. Change the study, and go on with --resume", markup=False)
@@ -100,8 +111,10 @@ def run(path: Path, out: Path | None, overwrite: bool, resume: bool, allow_code:
 
 
 def _status(outcome: Outcome) -> int:
-    if outcome.interrupted:
+    if outcome.interruption == Interruption():
         return 130
+    if outcome.interrupted:
+        return 1
     if not outcome.failed:
         return 0
     return 2 if any(item.wrong_input for item in outcome.failed) else 1

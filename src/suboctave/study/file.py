@@ -39,6 +39,7 @@ class StudyFile(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     title: str = ""
+    seconds: float | None = Field(default=None, gt=0.0)
     system: dict[str, Any]
     analyses: list[dict[str, Any]] = Field(min_length=1)
     outputs: dict[str, Any] = Field(default_factory=dict)
@@ -58,6 +59,8 @@ class Study:
         What is written, and where.
     allow_code
         Whether the user has allowed Python code that the file names.
+    seconds
+        Time limit for all analyses together; None for none.
     """
 
     source: Path
@@ -67,18 +70,22 @@ class Study:
     steps: tuple[Step, ...]
     outputs: Outputs
     allow_code: bool = False
+    seconds: float | None = None
 
     def system_of(self, step: Step) -> System:
         """The system at the parameters of one analysis."""
         return self.system.with_parameters(step.parameters) if step.parameters else self.system
 
     def key_of(self, step: Step) -> str:
-        """What an analysis depends on, as a digest: version, system, arguments, and the analyses it starts from."""
+        """What an analysis depends on, as a digest: version, system, arguments, and the analyses it starts from.
+
+        Not its time limit: what is finished did not need more.
+        """
         by_name = {s.name: s for s in self.steps}
         said = {
             "version": __version__,
             "system": describe(self.system_of(step)),
-            "step": {k: v for k, v in step.model_dump(mode="json").items() if k != "name"},
+            "step": {k: v for k, v in step.model_dump(mode="json").items() if k not in ("name", "seconds")},
             "needs": [self.key_of(by_name[name]) for _, name in step.needs()],
         }
         return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
@@ -102,7 +109,9 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     if sections is None:
         # the sections that are there are still looked at, so that all mistakes are told at once
         kept = {k: v for k, v in content.items() if k in StudyFile.model_fields and _fits(k, v)}
-        sections = StudyFile.model_construct(**{"title": "", "system": None, "analyses": [], "outputs": {}} | kept)
+        sections = StudyFile.model_construct(
+            **{"title": "", "seconds": None, "system": None, "analyses": [], "outputs": {}} | kept
+        )
     system = None
     if isinstance(sections.system, dict):
         section = _validated(SystemSection, sections.system, ("system",), mistakes)
@@ -115,7 +124,9 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     mistakes.refuse()
     assert system is not None
     assert outputs is not None
-    return Study(source, text, sections.title, system, tuple(s for s in steps if s), outputs, allow_code)
+    return Study(
+        source, text, sections.title, system, tuple(s for s in steps if s), outputs, allow_code, sections.seconds
+    )
 
 
 def _what_is_left(given: Mapping[str, Any]) -> SystemSection | None:
@@ -140,7 +151,7 @@ def _what_is_left(given: Mapping[str, Any]) -> SystemSection | None:
 def _fits(key: str, value: Any) -> bool:
     if key == "analyses":
         return isinstance(value, list) and all(isinstance(item, dict) for item in value)
-    return isinstance(value, str if key == "title" else dict)
+    return key != "seconds" and isinstance(value, str if key == "title" else dict)
 
 
 def _text(source: Path) -> str:

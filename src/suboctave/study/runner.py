@@ -14,9 +14,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from suboctave.analysis import BifurcationDiagram, Branch, Isolas, Results
+from suboctave.analysis import Results
 from suboctave.analysis.results import Result
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, TimeLimitError
+from suboctave.interruption import Interruption, check_seconds, time_limit
 from suboctave.store.journal import Journal, read_journal
 from suboctave.study.file import Study
 from suboctave.study.keeping import BranchKeeper, Noting, finished, keep
@@ -42,12 +43,17 @@ class Finished:
 
 @dataclass
 class Outcome:
-    """What a run gave: analyses in order, files written, and whether it was interrupted."""
+    """What a run gave: analyses in order, files written, and what stopped it or one of them before the end."""
 
     finished: list[Finished] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
-    interrupted: bool = False
+    interruption: Interruption | None = None
     complete_already: bool = False
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C or a time limit left something to go on with."""
+        return self.interruption is not None
 
     @property
     def failed(self) -> list[Finished]:
@@ -65,6 +71,7 @@ def run_study(
     resume: bool = False,
     watch: Watch | None = None,
     said: Callable[[Finished], None] | None = None,
+    seconds: float | None = None,
 ) -> Outcome:
     """Run a study and write its outputs.
 
@@ -78,12 +85,15 @@ def run_study(
         Gives for each analysis a context whose value is the `progress=` of its verb.
     said
         Told of each analysis when it is over.
+    seconds
+        Time limit for all analyses together, in place of the study's own.
 
     Raises
     ------
     InputError
         If outputs exist and neither is given, or the folder cannot be written to: before any work.
     """
+    check_seconds(seconds)
     place = Path(folder) if folder is not None else study.folder
     journal_at = place / JOURNAL
     targets = places(study.outputs, study.steps, place)
@@ -94,7 +104,7 @@ def run_study(
     for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
         torn.unlink(missing_ok=True)
     try:
-        return _run(study, place, targets, journal, watch, said)
+        return _run(study, place, targets, journal, watch, said, study.seconds if seconds is None else seconds)
     except BaseException:
         journal.close()
         raise
@@ -157,28 +167,36 @@ def _run(
     journal: Journal,
     watch: Watch | None,
     said: Callable[[Finished], None] | None,
+    seconds: float | None,
 ) -> Outcome:
     journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
     outcome = Outcome()
     results: dict[str, Result] = {}
     details: dict[str, dict[str, Any]] = {}
-    for step in study.steps:
-        done, interrupted = _one(study, step, results, journal, watch)
-        if done is not None:
-            outcome.finished.append(done)
-            if done.result is not None:
-                results[step.name] = done.result
-                details[step.name] = {
-                    "type": step.kind,
-                    "seconds": done.seconds,
-                    "key": "" if interrupted else study.key_of(step),
-                    "arguments": step.model_dump_json(exclude_defaults=True),
-                }
-            if said is not None:
-                said(done)
-        if interrupted:
-            outcome.interrupted = True
-            break
+    unfinished: set[str] = set()
+    with time_limit(seconds) as limit:
+        for step in study.steps:
+            whole = not any(name in unfinished for _, name in step.needs())
+            done, interruption = _one(study, step, results, journal, watch, whole)
+            if interruption is not None or not whole:
+                unfinished.add(step.name)
+            if done is not None:
+                outcome.finished.append(done)
+                if done.result is not None:
+                    results[step.name] = done.result
+                    details[step.name] = {
+                        "type": step.kind,
+                        "seconds": done.seconds,
+                        "key": "" if step.name in unfinished else study.key_of(step),
+                        "arguments": step.model_dump_json(exclude_defaults=True),
+                    }
+                if said is not None:
+                    said(done)
+            if interruption is not None:
+                outcome.interruption = interruption
+                own = interruption.seconds is not None and not (limit is not None and limit.reached)
+                if not own:
+                    break
     if results:
         attributes = {"title": study.title, "study": study.text, "analyses": "\n".join(results)}
         for path in targets:
@@ -198,28 +216,34 @@ def _one(
     results: dict[str, Result],
     journal: Journal,
     watch: Watch | None,
-) -> tuple[Finished | None, bool]:
-    """One analysis: what came of it, and whether the user stopped it."""
+    whole: bool,
+) -> tuple[Finished | None, Interruption | None]:
+    """One analysis: what came of it, and what stopped it; `whole`: what it starts from is complete, and so it may be
+    kept as complete.
+    """
     key = study.key_of(step)
-    kept = finished(journal.records, key, study.allow_code)
+    kept = finished(journal.records, key, study.allow_code) if whole else None
     if kept is not None:
         result, said = kept
-        return Finished(step, result, float(said.get("seconds", 0.0)), reused=True), False
+        return Finished(step, result, float(said.get("seconds", 0.0)), reused=True), None
     missing = [name for _, name in step.needs() if name not in results]
     if missing:
-        return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), False
+        return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), None
     begin = perf_counter()
-    interrupted = False
+    interruption: Interruption | None = None
     outcome: Result | None = None
     failure, wrong = "", False
     with (watch or _silent)(step) as progress:
         try:
             system = study.system_of(step)
-            keeper = BranchKeeper(journal, step, key, study.allow_code)
+            keeper = BranchKeeper(journal, step, key, study.allow_code) if whole else None
             noted = Noting(journal, step, progress)
-            outcome = step.run(Context(system, results, noted, study.allow_code, keeper))
-        except KeyboardInterrupt:
-            interrupted = True
+            with time_limit(step.seconds):
+                outcome = step.run(Context(system, results, noted, study.allow_code, keeper))
+        except KeyboardInterrupt as cause:
+            interruption = Interruption.of(cause)
+        except TimeLimitError as error:
+            failure, interruption = str(error), Interruption(step.seconds)
         except ConvergenceError as error:
             failure = str(error)
         except InputError as error:
@@ -227,15 +251,13 @@ def _one(
         except ArithmeticError as error:  # a size of 1e200 whose square is no number
             failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
     seconds = perf_counter() - begin
-    if isinstance(outcome, Branch) and outcome.interrupted:
-        interrupted = True
-    if isinstance(outcome, BifurcationDiagram | Isolas) and outcome.interrupted:
-        interrupted = True
-    if outcome is not None and not interrupted:
-        keep(journal, step.name, key, outcome, seconds)
-    if outcome is None and interrupted:
-        return None, True
-    return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interrupted
+    if outcome is not None:
+        interruption = interruption or outcome.interruption
+        if interruption is None and whole:
+            keep(journal, step.name, key, outcome, seconds)
+    if outcome is None and interruption is not None and not failure:
+        return None, interruption
+    return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interruption
 
 
 def _silent(step: Step) -> AbstractContextManager[Any]:

@@ -86,7 +86,7 @@ class Context:
 
 
 class Step(BaseModel):
-    """One analysis of a study. `parameters` are other values for this analysis alone."""
+    """One analysis of a study. `parameters` are other values for this analysis alone, `seconds` is its time limit."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
@@ -98,6 +98,7 @@ class Step(BaseModel):
     name: str = Field(min_length=1)
     type: str
     parameters: dict[str, float] = Field(default_factory=dict)
+    seconds: float | None = Field(default=None, gt=0.0)
 
     @classmethod
     def drawn(cls) -> bool:

@@ -20,11 +20,10 @@ class Diagram(FrequencyResponse):
 
     depth: int = Field(default=2, ge=0)
     max_branches: int = Field(default=32, ge=1)
-    seconds: float | None = Field(default=None, gt=0.0)
 
     def run(self, context: Context) -> BifurcationDiagram:
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         omega: Any = tuple(self.omega)
-        options |= {"start": self.started(context), "max_branches": self.max_branches, "seconds": self.seconds}
+        options |= {"start": self.started(context), "max_branches": self.max_branches}
         return bifurcation_diagram(context.system, omega, self.depth, keeper=context.keeper, **options)

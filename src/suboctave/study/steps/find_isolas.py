@@ -30,7 +30,6 @@ class FindIsolas(FollowingStep):
     search: list[int] | None = None
     seeds: dict[str, Any] | None = None
     max_curves: int = Field(default=64, ge=1)
-    seconds: float | None = Field(default=None, gt=0.0)
     at: list[float] = Field(default_factory=list)
 
     @field_validator("seeds")
@@ -88,8 +87,6 @@ class FindIsolas(FollowingStep):
         """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         options |= {"values": self.values, "depth": self.depth, "max_curves": self.max_curves}
-        if self.seconds is not None:
-            options["seconds"] = self.seconds
         for name in ("levels", "search"):
             if getattr(self, name) is not None:
                 options[name] = tuple(getattr(self, name))

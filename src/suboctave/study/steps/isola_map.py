@@ -45,9 +45,11 @@ class IsolaRegions(MapStep):
         """See `Step.run`."""
         options = self.options(context)
         isolas = find_isolas(context.system, *self.ranges, values=self.values, depth=self.depth, **options)
-        if not isolas:
-            return Table({}, isolas.said)
+        if not isolas or isolas.interrupted:
+            said = "; ".join([isolas.said, *(f"note: {note}" for note in isolas.notes if isolas.interrupted)])
+            return Table({}, said, stopped=isolas.interruption)
         bounds = self.second_bounds[0], self.second_bounds[1]
         found = isola_map(isolas, self.second, bounds, probes=self.probes, progress=context.progress)
         table = found.to_table()
-        return Table(table.columns, "; ".join([table.title, *(f"note: {note}" for note in found.notes)]))
+        said = "; ".join([table.title, *(f"note: {note}" for note in found.notes)])
+        return Table(table.columns, said, stopped=found.interruption)

@@ -46,8 +46,8 @@ class Regimes(MapStep):
         )
         table = found.to_table()
         said = [table.title, *(f"note: {note}" for note in found.notes)]
-        if self.check_points:
+        if self.check_points and not found.interrupted:
             checked = found.check(self.check_points, self.seed, progress=context.progress)
             rate = 100.0 * checked.rate
             said.insert(1, f"{rate:.1f} % of {len(checked.landings)} trajectories in time agree")
-        return Table(table.columns, "; ".join(said))
+        return Table(table.columns, "; ".join(said), stopped=found.interruption)
