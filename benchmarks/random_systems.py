@@ -1,150 +1,385 @@
-"""Is the list of bifurcations the same at any step and in both directions, for systems that nobody chose?
+"""Are the lists of bifurcations right for systems that nobody chose? Held against an independent shooting code.
 
-Systems of one to three masses in a row with one to three elements (exact and rounded stops, cubic springs, springs and
-stops between masses) and damping, drawn from a seed. Each is followed over a range of frequencies around its first
-resonance with several largest steps, from either end. Where the ends lie on several branches the two directions may be
-different curves: runs are compared with those that share their ends and length only. Printed for each system: events,
-runs that miss or add one against the union, stretches left unsettled, and how many events `so.verify` confirms.
+Systems of one to four degrees of freedom are drawn from a seed: exact and rounded stops on one side or both, plays,
+polynomial springs, quadratic dampers, parametric stiffness, gyroscopic damping, static loads and loads of several
+harmonics; one in five is symmetric. Each is followed at default options over a range of frequencies, and from its first
+period doubling the branch of twice the period as well. `shooting_judge.py` follows the same curves without a line of
+the package's; its answers lie in `data/random_systems.json` and are computed where they are missing (minutes).
 
-    python benchmarks/random_systems.py [systems] [seed]
+Printed for each curve: the judge's events, those found, missed without a word, missed but said (an unsettled stretch
+names the place), added, verdicts that are wrong at points, unsettled stretches and warnings, and the largest distance of
+an event from the judge's.
+
+    python benchmarks/random_systems.py [--seeds 0:200] [--judge] [--verbose] [--no-doubled]
 """
 
 from __future__ import annotations
 
+import argparse
+import hashlib
+import json
 import sys
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
 
-STEPS = (None, 0.1, 0.3)
-#: two events of one kind are the same within this, relative to the width of the range, or their stated uncertainty
-SAME = 1e-5
-#: curves are the same if amplitudes agree at both ends, relative
-ALIKE = 1e-4
+ANSWERS = Path(__file__).with_name("data") / "random_systems.json"
+#: distance in omega, relative to the width of the range, up to which an event is the judge's, beyond its uncertainty
+SAME = 2e-4
+#: difference of the motions at two events that are one, relative to the motion
+ALIKE = 0.03
+#: seconds that the judge may take for one curve
+PATIENCE = 60.0
+Description = dict[str, Any]
 
 
-def random_system(rng: np.random.Generator) -> so.System:
-    n = int(rng.integers(1, 4))
+# -------------------------------------------------------------------------------------------------------- the systems
+def describe(seed: int) -> Description:
+    """A system as plain numbers: matrices, laws, loads, and the range of frequencies."""
+    rng = np.random.default_rng([19, seed])
+    n = int(rng.choice([1, 2, 3, 4], p=[0.35, 0.35, 0.2, 0.1]))
+    symmetric = rng.uniform() < 0.2
     mass = np.diag(rng.uniform(0.5, 2.0, n))
     springs = rng.uniform(0.5, 2.0, n)
     between = np.diag(springs[1:], 1)
     stiffness = np.diag(springs + np.append(springs[1:], 0.0)) - between - between.T
-    damping = rng.uniform(0.02, 0.08) * stiffness + rng.uniform(0.0, 0.03) * mass
-    elements: list[so.Element] = []
+    damping = rng.uniform(0.01, 0.08) * stiffness + rng.uniform(0.0, 0.03) * mass
+    if n > 1 and rng.uniform() < 0.25:
+        skew = np.triu(rng.uniform(-0.6, 0.6, (n, n)), 1)
+        damping = damping + skew - skew.T
+    kinds = (
+        ["play", "cubic", "damper"] if symmetric else ["stop", "stop", "rounded", "two", "play", "cubic", "polynomial"]
+    )
+    laws: list[dict[str, Any]] = []
     for _ in range(int(rng.integers(1, 4))):
         dof = int(rng.integers(n))
-        at = (dof, (dof + 1) % n) if n > 1 and rng.uniform() < 0.4 else dof
-        law = int(rng.integers(4))
-        if law == 0:
-            elements.append(so.CubicSpring(at, rng.uniform(0.1, 1.0)))
-        else:
-            gap = rng.uniform(0.05, 1.5) * (1.0 if rng.uniform() < 0.5 else -1.0)
-            sharp = None if law < 3 else 10.0 ** rng.uniform(1.0, 3.5)
-            elements.append(so.ElasticStop(at, rng.uniform(0.5, 6.0), gap, regularization=sharp))
-    return so.System(mass, damping, stiffness, elements, [so.HarmonicLoad(int(rng.integers(n)), rng.uniform(0.1, 0.8))])
-
-
-def frequencies(system: so.System) -> tuple[float, float]:
-    mass, _, stiffness = system.matrices()
-    natural = np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
-    return 0.7 * float(natural.min()), 2.4 * float(natural.min())
-
-
-def same(a: so.Bifurcation, b: so.Bifurcation, width: float) -> bool:
-    slack = SAME * width + a.uncertainty + b.uncertainty
-    size = max(a.amplitude, b.amplitude)
-    return a.kind == b.kind and abs(a.omega - b.omega) < slack and abs(a.amplitude - b.amplitude) < 1e-2 * size
-
-
-def unmatched(some: list[so.Bifurcation], others: list[so.Bifurcation], width: float) -> list[so.Bifurcation]:
-    """Those of one list that have no partner of their own in the other."""
-    left, rest = list(others), []
-    for item in some:
-        partner = min((e for e in left if same(item, e, width)), key=lambda e: abs(e.omega - item.omega), default=None)
-        if partner is None:
-            rest.append(item)
-        else:
-            left.remove(partner)
-    return rest
-
-
-def alike(a: so.Branch, b: so.Branch) -> bool:
-    """Whether two runs followed the same curve, in either direction."""
-
-    def ends(branch: so.Branch) -> np.ndarray:
-        found = sorted((float(branch.omega[i]), float(branch.amplitude[i])) for i in (0, -1))
-        return np.array(found)
-
-    one, other = ends(a), ends(b)
-    return bool(np.all(np.abs(one - other) <= ALIKE * np.abs(other))) and a.closed == b.closed
-
-
-def stated(item: so.Bifurcation, branch: so.Branch) -> bool:
-    """Whether a branch says that it may have missed an event."""
-    slack = 1e-6 * item.omega
-    return any(
-        min(u.first, u.last) - slack <= item.omega <= max(u.first, u.last) + slack for u in branch.audit.unsettled
-    )
-
-
-def main(count: int, seed: int) -> int:
-    missed = added = silent = 0
-    print(f"{'system':<8}{'DOFs':>5}{'elements':>9}{'curves':>8}{'events':>8}{'missed':>8}{'stated':>8}", end="")
-    print(f"{'added':>7}{'unsettled':>11}{'verified':>10}{'s':>7}")
-    for number in range(count):
-        rng = np.random.default_rng([seed, number])
-        system = random_system(rng)
-        low, high = frequencies(system)
-        start = time.perf_counter()
-        found: dict[tuple[float | None, bool], so.Branch] = {}
-        failed = []
-        for step in STEPS:
-            for upwards in (True, False):
-                ends = (low, high) if upwards else (high, low)
-                try:
-                    found[step, upwards] = so.frequency_response(system, ends, max_step=step)
-                except so.ConvergenceError as failure:
-                    failed.append(((step, upwards), failure))
-        curves: list[list[tuple[float | None, bool]]] = []
-        for run, branch in found.items():
-            group = next((g for g in curves if alike(found[g[0]], branch)), None)
-            if group is None:
-                curves.append([run])
-            else:
-                group.append(run)
-        lines, mine, verified, events = [], [0, 0, 0], 0, 0
-        for group in curves:
-            lists = {run: list(found[run].bifurcations) for run in group}
-            # what at least half of the runs found counts as there
-            reference = max(lists.values(), key=lambda items: sum(len(items) == len(o) for o in lists.values()))
-            events += len(reference)
-            for run, items in lists.items():
-                lost = unmatched(reference, items, high - low)
-                more = unmatched(items, reference, high - low)
-                said = [item for item in lost if stated(item, found[run])]
-                mine = [mine[0] + len(lost), mine[1] + len(more), mine[2] + len(said)]
-                lines += [f"        {run}: missed {item}{', stated' * (item in said)}" for item in lost]
-                lines += [f"        {run}: added {item}" for item in more]
-            checks = [(item, so.verify(item)) for item in reference]
-            verified += sum(check.agrees for _, check in checks)
-            lines += [f"        not verified: {item}: {check}" for item, check in checks if not check.agrees]
-        lines += [f"        {run}: {failure}" for run, failure in failed]
-        unsettled = sum(len(branch.audit.unsettled) for branch in found.values())
-        missed, added, silent = missed + mine[0], added + mine[1], silent + mine[0] - mine[2]
-        print(
-            f"{number:<8}{system.n:>5}{len(system.elements):>9}{len(curves):>8}{events:>8}{mine[0]:>8}{mine[2]:>8}"
-            f"{mine[1]:>7}{unsettled:>11}{verified:>10}{time.perf_counter() - start:>7.1f}"
+        direction = np.eye(n)[dof]
+        if n > 1 and rng.uniform() < 0.4:
+            direction = direction - np.eye(n)[(dof + 1) % n]
+        laws += _law(rng, str(rng.choice(kinds)), direction.tolist())
+    if symmetric and all(law["kind"] == "damper" for law in laws):
+        laws += _law(rng, "cubic", np.eye(n)[0].tolist())
+    if not symmetric and rng.uniform() < 0.2:
+        laws += _law(rng, "damper", np.eye(n)[int(rng.integers(n))].tolist())
+    if rng.uniform() < 0.2:
+        harmonic = 2 if symmetric else int(rng.integers(1, 3))
+        depth = rng.uniform(0.05, 0.4) * springs[0]
+        laws.append(
+            {"kind": "parametric", "direction": np.eye(n)[0].tolist(), "stiffness": depth, "harmonic": harmonic}
+            | {"phase": rng.uniform(0.0, 2.0 * np.pi)}
         )
-        for line in lines:
-            print(line)
+    dof = int(rng.integers(n))
+    loads = [{"dof": dof, "amplitude": rng.uniform(0.1, 0.8), "harmonic": 1, "phase": 0.0}]
+    if rng.uniform() < 0.25:
+        harmonic = 3 if symmetric else int(rng.integers(2, 4))
+        phase = rng.uniform(0.0, 2.0 * np.pi)
+        loads.append({"dof": dof, "amplitude": rng.uniform(0.05, 0.4), "harmonic": harmonic, "phase": phase})
+    if not symmetric and rng.uniform() < 0.25:
+        loads.append({"dof": int(rng.integers(n)), "amplitude": rng.uniform(0.05, 0.5), "harmonic": 0, "phase": 0.0})
+    natural = np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
+    low, high = 0.7 * float(natural.min()), 2.4 * float(natural.min())
+    ends = [low, high] if rng.uniform() < 0.5 else [high, low]
+    plain = {"mass": mass.tolist(), "damping": damping.tolist(), "stiffness": stiffness.tolist()}
+    # plain numbers of Python's, as a file of JSON holds them
+    return json.loads(json.dumps({**plain, "laws": laws, "loads": loads, "omega": ends}))  # type: ignore[no-any-return]
+
+
+def _law(rng: np.random.Generator, kind: str, direction: list[float]) -> list[dict[str, Any]]:
+    """One or two laws of a kind."""
+
+    def stop(side: int, gap: float, stiffness: float, sharpness: float | None) -> dict[str, Any]:
+        return {"kind": "stop", "direction": direction, "stiffness": stiffness, "gap": gap, "side": side} | {
+            "sharpness": sharpness
+        }
+
+    if kind in ("stop", "rounded"):
+        side = 1 if rng.uniform() < 0.5 else -1
+        gap = side * (rng.uniform(0.05, 1.5) if rng.uniform() < 0.9 else -0.2)
+        sharp = 10.0 ** rng.uniform(1.0, 3.3) if kind == "rounded" else None
+        return [stop(side, float(gap), rng.uniform(0.5, 6.0), sharp)]
+    if kind == "two":
+        sharp = 10.0 ** rng.uniform(1.0, 3.0) if rng.uniform() < 0.4 else None
+        return [stop(s, s * rng.uniform(0.1, 1.2), rng.uniform(0.5, 6.0), sharp) for s in (-1, 1)]
+    if kind == "play":
+        numbers = {"stiffness": rng.uniform(0.5, 5.0), "gap": rng.uniform(0.1, 0.8), "offset": 0.0}
+        return [{"kind": kind, "direction": direction, **numbers}]
+    if kind == "cubic":
+        factors = [0.0, 0.0, rng.uniform(0.1, 1.0), 0.0, 0.0]
+    elif kind == "polynomial":
+        factors = [0.0, rng.uniform(-0.4, 0.4), rng.uniform(0.1, 0.8), 0.0, rng.uniform(0.0, 0.1)]
+    else:
+        return [{"kind": "damper", "direction": direction, "coefficient": rng.uniform(0.01, 0.15)}]
+    return [{"kind": "polynomial", "direction": direction, "coefficients": factors}]
+
+
+def system_of(description: Description) -> so.System:
+    """The same system as the package reads it."""
+    n = len(description["mass"])
+    elements: list[so.Element] = []
+    for law in description["laws"]:
+        along = {"direction": law["direction"]}
+        if law["kind"] == "stop":
+            side = "right" if law["side"] > 0 else "left"
+            given = {"stiffness": law["stiffness"], "gap": law["gap"], "side": side, "regularization": law["sharpness"]}
+            elements.append(so.ElasticStop(**given, **along))
+        elif law["kind"] == "play":
+            elements.append(so.Freeplay(stiffness=law["stiffness"], gap=law["gap"], **along))
+        elif law["kind"] == "polynomial":
+            elements.append(so.PolynomialSpring(coefficients=law["coefficients"], **along))
+        elif law["kind"] == "damper":
+            elements.append(so.QuadraticDamper(coefficient=law["coefficient"], **along))
+        else:
+            text = f"{law['stiffness']!r}*cos({law['harmonic']}*omega*t + {law['phase']!r})*x"
+            elements.append(so.Expression(expression=text, **along))
+    loads: list[Any] = []
+    for load in description["loads"]:
+        if load["harmonic"] == 0:
+            loads.append(so.StaticLoad(load["dof"], load["amplitude"]))
+        else:
+            loads.append(so.HarmonicLoad(load["dof"], load["amplitude"], load["harmonic"], load["phase"]))
+    assert n == len(description["damping"])
+    return so.System(description["mass"], description["damping"], description["stiffness"], elements, loads)
+
+
+def short(description: Description) -> str:
+    """A system in a few words."""
+    marks = []
+    for law in description["laws"]:
+        kind = law["kind"]
+        if kind == "stop":
+            kind = "arctan" if law["sharpness"] else "stop"
+        elif kind == "polynomial":
+            kind = "cubic" if law["coefficients"][1] == 0.0 else "poly"
+        marks.append(kind + "-" * (sum(value != 0.0 for value in law["direction"]) > 1))
+    damping = np.array(description["damping"])
+    marks += ["gyro"] * bool(np.abs(damping - damping.T).max() > 1e-12)
+    marks += ["static" if load["harmonic"] == 0 else f"{load['harmonic']}w" for load in description["loads"][1:]]
+    return f"{len(description['mass'])}: {' '.join(marks)}"
+
+
+# -------------------------------------------------------------------------------------------------- the judge's answers
+def digest(*parts: Any) -> str:
+    """A name for a question to the judge."""
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+
+
+class Answers:
+    """The judge's answers, kept in a file by seed and curve."""
+
+    def __init__(self, path: Path = ANSWERS) -> None:
+        self.path = path
+        self.known: dict[str, dict[str, Any]] = json.loads(path.read_text()) if path.exists() else {}
+
+    def of(self, seed: int, description: Description, branch: so.Branch) -> dict[str, Any]:
+        """What the judge says of the curve that a branch lies on; from its first motion (T), or a middle one (2T)."""
+        key, question = f"{seed}:{branch.nu}T", digest(description, branch.nu)
+        known = self.known.get(key)
+        if known is not None and known["question"] == question:
+            return known
+        import shooting_judge
+
+        place = 0 if branch.nu == 1 else len(branch) // 2
+        orbit = branch.orbits[place]
+        first, last = description["omega"]
+        direction = float(np.sign(last - first)) if branch.nu == 1 else 1.0
+        answer = shooting_judge.judged(description, orbit.start(), orbit.omega, direction, branch.nu, PATIENCE)
+        answer = {"question": question, **answer}
+        self.known[key] = answer
+        self.path.parent.mkdir(exist_ok=True)
+        lines = ",\n".join(f'"{k}": {json.dumps(v)}' for k, v in sorted(self.known.items()))
+        self.path.write_text("{\n" + lines + "\n}\n")
+        return answer
+
+
+# --------------------------------------------------------------------------------------------------------- comparison
+class Row:
+    """What became of one curve."""
+
+    def __init__(self) -> None:
+        self.missed: list[str] = []
+        self.said: list[str] = []
+        self.added: list[str] = []
+        self.wrong: list[str] = []
+        self.found = self.events = self.unsettled = self.warnings = 0
+        self.worst = 0.0
+        self.note = ""
+
+
+def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
+    """A branch held against the judge's answer."""
+    row = Row()
+    mine = [item for item in branch.bifurcations if item.kind != "grazing"]
+    theirs, counts = answer["events"], answer["unstable"]
+    if branch.nu == 2:
+        theirs, counts = in_order_of(branch, theirs, counts)
+    row.events, row.found = len(theirs), len(mine)
+    row.unsettled, row.warnings = len(branch.audit.unsettled), len(branch.warnings)
+    row.note = answer["failure"]
+    pairs = aligned(theirs, mine, width)
+    for i, j in pairs:
+        row.worst = max(row.worst, abs(theirs[i]["omega"] - mine[j].omega) / theirs[i]["omega"])
+    paired, own = {i for i, _ in pairs}, {j for _, j in pairs}
+    for i, item in enumerate(theirs):
+        if i not in paired:
+            text = f"{item['kind']} {item['omega']:.9f} (multiplier {complex(*item['multiplier']):.4f})"
+            (row.said if stated(item["omega"], branch, width) else row.missed).append(text)
+    row.added = [f"{mine[j].kind} {mine[j].omega:.9f}" for j in range(len(mine)) if j not in own]
+    row.wrong = verdicts(counts, pairs, len(theirs), mine, branch)
+    return row
+
+
+def in_order_of(branch: so.Branch, theirs: list[Any], counts: list[int]) -> tuple[list[Any], list[int]]:
+    """The judge's events of a 2T curve in the order of the branch, which may run the other way."""
+    mine = [item for item in branch.bifurcations if item.kind != "grazing"]
+    back = theirs[::-1]
+    width = 1e9
+    forward, backward = (len(aligned(some, mine, width)) for some in (theirs, back))
+    return (back, counts[::-1]) if backward > forward else (theirs, counts)
+
+
+def aligned(theirs: list[Any], mine: list[so.Bifurcation], width: float) -> list[tuple[int, int]]:
+    """The longest common subsequence of two lists of events, of least distance."""
+    n, m = len(theirs), len(mine)
+    best = np.zeros((n + 1, m + 1))
+    close = np.zeros((n, m), dtype=bool)
+    for i in range(n):
+        for j in range(m):
+            close[i, j] = same(theirs[i], mine[j], width)
+    for i in range(n - 1, -1, -1):
+        for j in range(m - 1, -1, -1):
+            best[i, j] = max(best[i + 1, j], best[i, j + 1])
+            if close[i, j]:
+                gain = 1.0 - 0.5 * min(1.0, abs(theirs[i]["omega"] - mine[j].omega) / (SAME * width))
+                best[i, j] = max(best[i, j], best[i + 1, j + 1] + gain)
+    pairs, i, j = [], 0, 0
+    while i < n and j < m:
+        if best[i, j] == best[i + 1, j]:
+            i += 1
+        elif best[i, j] == best[i, j + 1]:
+            j += 1
+        else:
+            pairs.append((i, j))
+            i, j = i + 1, j + 1
+    return pairs
+
+
+def same(theirs: dict[str, Any], mine: so.Bifurcation, width: float) -> bool:
+    """Whether two events are one: kind, frequency, and motion (up to a period of the load)."""
+    if theirs["kind"] != mine.kind or abs(theirs["omega"] - mine.omega) > min(SAME * width, 1.0) + mine.uncertainty:
+        return False
+    state, period = np.array(theirs["state"]), 2.0 * np.pi / mine.omega
+    orbit = mine.orbit
+    own = [
+        np.concatenate((orbit.displacement(k * period), orbit.velocity(k * period) / mine.omega))
+        for k in range(orbit.basis.nu)
+    ]
+    state = np.concatenate((state[: len(state) // 2], state[len(state) // 2 :] / mine.omega))
+    size = max(float(np.abs(orbit.amplitudes).max()), float(np.abs(state).max()))
+    return min(float(np.abs(state - other).max()) for other in own) < ALIKE * size
+
+
+def stated(omega: float, branch: so.Branch, width: float) -> bool:
+    """Whether a branch says that it may have missed something there."""
+    slack = SAME * width
+    return any(min(u.first, u.last) - slack <= omega <= max(u.first, u.last) + slack for u in branch.audit.unsettled)
+
+
+def verdicts(
+    counts: list[int], pairs: list[tuple[int, int]], total: int, mine: list[so.Bifurcation], branch: so.Branch
+) -> list[str]:
+    """Points whose number of unstable multipliers is not the judge's, between events that both know."""
+    wrong: list[str] = []
+    stretches = []
+    if not pairs and total == 0 and not mine:
+        stretches.append((0, -np.inf, np.inf))
+    marks = [(-1, -1), *pairs, (total, len(mine))]
+    for (i, j), (k, l) in zip(marks, marks[1:], strict=False):
+        if k == i + 1 and l == j + 1 and i + 1 < len(counts):
+            low = mine[j].arclength if j >= 0 else -np.inf
+            high = mine[l].arclength if l < len(mine) else np.inf
+            stretches.append((i + 1, low, high))
+    for index, low, high in dict.fromkeys(stretches):
+        if counts[index] < 0:
+            continue
+        for point in branch.points:
+            near = min(abs(point.arclength - low), abs(point.arclength - high)) < 1e-4
+            if low < point.arclength < high and not near and point.floquet.decided:
+                if point.floquet.unstable != counts[index] and point.floquet.clearance > 1e-4:
+                    wrong.append(
+                        f"{point.floquet.unstable} unstable at omega = {point.orbit.omega:.7g}, judge {counts[index]}"
+                    )
+    return wrong
+
+
+# --------------------------------------------------------------------------------------------------------------- table
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else "")
+    parser.add_argument("--seeds", default="0:200", help="from:to, or a list 3,17,20")
+    parser.add_argument("--verbose", action="store_true", help="warnings of every curve with a finding")
+    parser.add_argument("--doubled", default="4", help="of every how manyth seed the 2T branch is judged, 0 for none")
+    options = parser.parse_args(arguments)
+    text = options.seeds
+    seeds = range(*map(int, text.split(":"))) if ":" in text else [int(value) for value in text.split(",")]
+    answers = Answers()
+    total = dict.fromkeys(("curves", "events", "found", "missed", "said", "added", "wrong", "unsettled"), 0)
+    worst, unjudged, failed, began = 0.0, [], [], time.perf_counter()
+    print(
+        f"{'seed':>5}  {'system':<44}{'events':>7}{'found':>7}{'missed':>7}{'said':>6}{'added':>6}{'wrong':>6}", end=""
+    )
+    print(f"{'unsettled':>10}{'notes':>6}{'distance':>10}{'s':>7}")
+    for seed in seeds:
+        description = describe(seed)
+        width = abs(description["omega"][1] - description["omega"][0])
+        name = short(description)
+        start = time.perf_counter()
+        branches: list[so.Branch] = []
+        try:
+            branches.append(so.frequency_response(system_of(description), tuple(description["omega"])))
+            doublings = branches[0].bifurcations["PD"]
+            every = int(options.doubled)
+            if doublings and every and seed % every == 0:
+                branches.append(so.switch_branch(doublings[0]))
+        except so.SuboctaveError as failure:
+            failed.append(f"{seed}: {failure}")
+            print(f"{seed:>5}  {name:<44}  {failure}")
+        seconds = time.perf_counter() - start
+        for branch in branches:
+            answer = answers.of(seed, description, branch)
+            row = compare(answer, branch, width)
+            label = name if branch.nu == 1 else f"   {branch.nu}T branch"
+            print(
+                f"{seed:>5}  {label:<44}{row.events:>7}{row.found:>7}{len(row.missed):>7}{len(row.said):>6}"
+                f"{len(row.added):>6}{len(row.wrong):>6}{row.unsettled:>10}{row.warnings:>6}{row.worst:>10.1e}"
+                f"{seconds:>7.1f}" + (f"  NOT JUDGED: {row.note}" if row.note else "")
+            )
+            for what in ("missed", "said", "added", "wrong"):
+                lines = getattr(row, what)
+                for line in lines[:3] if what == "wrong" else lines:
+                    print(f"         {what}: {line}")
+            if options.verbose and (row.missed or row.said or row.added or row.wrong or row.unsettled):
+                for warning in branch.warnings:
+                    print(f"         note: {warning}")
+            if row.note:
+                unjudged.append(f"{seed} ({branch.nu}T): {row.note}")
+                continue
+            counted = {"curves": 1, "events": row.events, "found": row.found, "unsettled": row.unsettled}
+            counted |= {what: len(getattr(row, what)) for what in ("missed", "said", "added", "wrong")}
+            total = {what: total[what] + counted[what] for what in total}
+            worst = max(worst, row.worst)
         sys.stdout.flush()
-    print(f"\nin all: {missed} missed ({silent} without a word), {added} added")
-    return 1 if silent or added else 0
+    print("\nin all: " + ", ".join(f"{value} {what}" for what, value in total.items()), end="")
+    print(f", worst distance {worst:.1e} of omega, {time.perf_counter() - began:.0f} s")
+    for title, lines in (("not judged", unjudged), ("not computed", failed)):
+        for line in lines:
+            print(f"{title}: seed {line}")
+    return 1 if total["missed"] or total["added"] or total["wrong"] else 0
 
 
 if __name__ == "__main__":
     with threadpool_limits(1):
-        sys.exit(main(*(int(value) for value in (sys.argv[1:] + ["10", "1"][len(sys.argv) - 1 :]))))
+        sys.exit(main())
