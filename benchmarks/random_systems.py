@@ -86,7 +86,7 @@ def describe(seed: int) -> Description:
     ends = [low, high] if rng.uniform() < 0.5 else [high, low]
     plain = {"mass": mass.tolist(), "damping": damping.tolist(), "stiffness": stiffness.tolist()}
     # plain numbers of Python's, as a file of JSON holds them
-    return json.loads(json.dumps({**plain, "laws": laws, "loads": loads, "omega": ends}))  # type: ignore[no-any-return]
+    return json.loads(json.dumps({**plain, "laws": laws, "loads": loads, "omega": ends}))
 
 
 def _law(rng: np.random.Generator, kind: str, direction: list[float]) -> list[dict[str, Any]]:
@@ -216,7 +216,7 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     mine = [item for item in branch.bifurcations if item.kind != "grazing"]
     theirs, counts = answer["events"], answer["unstable"]
     if branch.nu == 2:
-        theirs, counts = in_order_of(branch, theirs, counts)
+        theirs, counts = in_order_of(branch, answer)
     row.events, row.found = len(theirs), len(mine)
     row.unsettled, row.warnings = len(branch.audit.unsettled), len(branch.warnings)
     row.note = answer["failure"]
@@ -233,13 +233,15 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     return row
 
 
-def in_order_of(branch: so.Branch, theirs: list[Any], counts: list[int]) -> tuple[list[Any], list[int]]:
+def in_order_of(branch: so.Branch, answer: dict[str, Any]) -> tuple[list[Any], list[int]]:
     """The judge's events of a 2T curve in the order of the branch, which may run the other way."""
+    theirs, counts = answer["events"], answer["unstable"]
     mine = [item for item in branch.bifurcations if item.kind != "grazing"]
-    back = theirs[::-1]
-    width = 1e9
-    forward, backward = (len(aligned(some, mine, width)) for some in (theirs, back))
-    return (back, counts[::-1]) if backward > forward else (theirs, counts)
+    ends, own = np.array(answer["ends"]), branch.omega[[0, -1]]
+    back = len(ends) == 2 and np.abs(ends - own).max() > np.abs(ends[::-1] - own).max()
+    if branch.closed:
+        back = len(aligned(theirs[::-1], mine, 1e9)) > len(aligned(theirs, mine, 1e9))
+    return (theirs[::-1], counts[::-1]) if back else (theirs, counts)
 
 
 def aligned(theirs: list[Any], mine: list[so.Bifurcation], width: float) -> list[tuple[int, int]]:

@@ -44,6 +44,8 @@ TURN = 0.99
 MOVEMENT = 0.12
 #: intervals shorter than this are not halved any more to find hidden pairs
 FINEST = 2e-7
+#: share of the odd part's largest size below which a motion of twice the period counts as its parent
+PARENT = 0.01
 #: multipliers of which shooting over one period tells nothing any more
 LARGEST = 1e7
 
@@ -79,24 +81,24 @@ def law(code, par, mode, u, v, tau):
 
 
 @njit(cache=True)
-def field_of(tau, z, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, out, jac, wide):
-    """out = dz/dtau for all columns of z (2 n, 1 + columns); the last column is the derivative by omega."""
+def field_of(tau, z, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, out, work):
+    """out = dz/dtau for all columns of z (2 n, 1 + columns); the last of several is the derivative by omega."""
     n = minv.shape[0]
-    force = np.zeros(n)
+    cols = z.shape[1]
+    wide = cols > 1
+    force, low = work[0], work[1 : 1 + n]
     for i in range(n):
         s = 0.0
         for j in range(n):
             s -= damping[i, j] * z[n + j, 0] + stiffness[i, j] * z[j, 0]
+            if wide:
+                low[i, j] = -stiffness[i, j]
+                low[i, n + j] = -damping[i, j]
         force[i] = s
     for r in range(loads.shape[0]):
         wave = math.cos(loads[r, 0] * tau + loads[r, 1])
         for i in range(n):
             force[i] += loads[r, 2 + i] * wave
-    if wide:
-        for i in range(n):
-            for j in range(n):
-                jac[i, j] = -stiffness[i, j]
-                jac[i, n + j] = -damping[i, j]
     for e in range(codes.shape[0]):
         u = v = 0.0
         for i in range(n):
@@ -107,89 +109,70 @@ def field_of(tau, z, omega, minv, damping, stiffness, dirs, codes, pars, modes, 
             force[i] -= dirs[e, i] * f
             if wide:
                 for j in range(n):
-                    jac[i, j] -= dirs[e, i] * dirs[e, j] * fu
-                    jac[i, n + j] -= dirs[e, i] * dirs[e, j] * fv
+                    low[i, j] -= dirs[e, i] * dirs[e, j] * fu
+                    low[i, n + j] -= dirs[e, i] * dirs[e, j] * fv
+    # the mass matrix is diagonal in what is drawn, but need not be
     for i in range(n):
-        out[i, 0] = z[n + i, 0] / omega
         s = 0.0
         for j in range(n):
             s += minv[i, j] * force[j]
         out[n + i, 0] = s / omega
+        out[i, 0] = z[n + i, 0] / omega
+        for c in range(1, cols):
+            out[i, c] = z[n + i, c] / omega
+            out[n + i, c] = 0.0
     if not wide:
         return
-    low = np.zeros((n, 2 * n))
     for i in range(n):
-        for k in range(n):
-            m = minv[i, k] / omega
-            for j in range(2 * n):
-                low[i, j] += m * jac[k, j]
-    last = z.shape[1] - 1
-    for c in range(1, last + 1):
-        for i in range(n):
-            out[i, c] = z[n + i, c] / omega
+        for j in range(2 * n):
             s = 0.0
-            for j in range(2 * n):
-                s += low[i, j] * z[j, c]
-            out[n + i, c] = s
+            for k in range(n):
+                s += minv[i, k] * low[k, j]
+            s /= omega
+            for c in range(1, cols):
+                out[n + i, c] += s * z[j, c]
     for i in range(2 * n):
-        out[i, last] -= out[i, 0] / omega
+        out[i, cols - 1] -= out[i, 0] / omega
 
 
 @njit(cache=True)
-def advance(tau, h, z, first, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, k, jac, new, wide):
+def advance(tau, h, z, first, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, k, work, stage, new):
     """One step of the pair into `new`; k[0] is `first`, k[12] the slope at the end; the error in units of tolerance."""
     rows, cols = z.shape
-    k[0] = first
-    stage = np.empty((rows, cols))
-    for s in range(1, 12):
-        for i in range(rows):
-            for j in range(cols):
-                total = 0.0
-                for r in range(s):
-                    if A[s, r] != 0.0:
-                        total += A[s, r] * k[r, i, j]
-                stage[i, j] = z[i, j] + h * total
-        field_of(
-            tau + C_NODES[s] * h,
-            stage,
-            omega,
-            minv,
-            damping,
-            stiffness,
-            dirs,
-            codes,
-            pars,
-            modes,
-            loads,
-            k[s],
-            jac,
-            wide,
-        )
-    for i in range(rows):
-        for j in range(cols):
-            total = 0.0
-            for r in range(12):
-                if B[r] != 0.0:
-                    total += B[r] * k[r, i, j]
-            new[i, j] = z[i, j] + h * total
-    field_of(tau + h, new, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, k[12], jac, wide)
+    system = (minv, damping, stiffness, dirs, codes, pars, modes, loads)
+    k[0, :, :] = first
+    flat, whole, begin = k.reshape(13, rows * cols), stage.reshape(rows * cols), z.reshape(rows * cols)
+    for s in range(1, 13):
+        target = whole if s < 12 else new.reshape(rows * cols)
+        for i in range(rows * cols):
+            target[i] = 0.0
+        for r in range(s):
+            factor = A[s, r] if s < 12 else B[r]
+            if factor != 0.0:
+                for i in range(rows * cols):
+                    target[i] += factor * flat[r, i]
+        for i in range(rows * cols):
+            target[i] = begin[i] + h * target[i]
+        at = C_NODES[s] * h if s < 12 else h
+        field_of(tau + at, stage if s < 12 else new, omega, *system, k[s], work)
+    five, three = np.zeros(rows * cols), np.zeros(rows * cols)
+    for r in range(13):
+        if E5[r] != 0.0 or E3[r] != 0.0:
+            for i in range(rows * cols):
+                five[i] += E5[r] * flat[r, i]
+                three[i] += E3[r] * flat[r, i]
     half = rows // 2
     worst = 0.0
     for j in range(cols):
         for part in range(2):
             size = 1e-3
+            a = b = 0.0
             for i in range(part * half, part * half + half):
                 size = max(size, abs(z[i, j]), abs(new[i, j]))
-            five = three = 0.0
-            for i in range(part * half, part * half + half):
-                a = b = 0.0
-                for r in range(13):
-                    a += E5[r] * k[r, i, j]
-                    b += E3[r] * k[r, i, j]
-                five += a * a
-                three += b * b
-            if five > 0.0:
-                worst = max(worst, h * five / math.sqrt((five + 0.01 * three) * half) / (TOLERANCE * size))
+                a += five[i * cols + j] ** 2
+                b += three[i * cols + j] ** 2
+            if a > 0.0:
+                worst = max(worst, h * a / math.sqrt((a + 0.01 * b) * half) / (TOLERANCE * size))
     return worst
 
 
@@ -213,18 +196,19 @@ def switch(e, z, slope, omega, dirs, codes, pars):
 
 
 @njit(cache=True)
-def until(e, rate, tau, h, z, first, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, k, jac, new):
-    """The step up to the zero of a switching function, or of its rate, which lies within h: Illinois, the state alone."""
+def until(e, rate, tau, h, z, first, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, work):
+    """The step up to the zero of a switching function, or of its rate, within h: Illinois, with the state alone."""
     rows = z.shape[0]
+    system = (minv, damping, stiffness, dirs, codes, pars, modes, loads)
     one, slope = np.empty((rows, 1)), np.empty((rows, 1))
     for i in range(rows):
         one[i, 0], slope[i, 0] = z[i, 0], first[i, 0]
-    kk, nn = np.empty((13, rows, 1)), np.empty((rows, 1))
+    k, stage, new = np.empty((13, rows, 1)), np.empty((rows, 1)), np.empty((rows, 1))
     index = 1 if rate else 0
     a, b = 0.0, h
     fa = switch(e, one, slope, omega, dirs, codes, pars)[index]
-    advance(tau, h, one, slope, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, kk, jac, nn, False)
-    fb = switch(e, nn, kk[12], omega, dirs, codes, pars)[index]
+    advance(tau, h, one, slope, omega, *system, k, work, stage, new)
+    fb = switch(e, new, k[12], omega, dirs, codes, pars)[index]
     if fa * fb >= 0.0:
         return h
     side = 0
@@ -232,10 +216,8 @@ def until(e, rate, tau, h, z, first, omega, minv, damping, stiffness, dirs, code
         c = b - fb * (b - a) / (fb - fa)
         if not a < c < b:
             c = 0.5 * (a + b)
-        advance(
-            tau, c, one, slope, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, kk, jac, nn, False
-        )
-        fc = switch(e, nn, kk[12], omega, dirs, codes, pars)[index]
+        advance(tau, c, one, slope, omega, *system, k, work, stage, new)
+        fc = switch(e, new, k[12], omega, dirs, codes, pars)[index]
         if abs(fc) < 1e-15 or b - a < 1e-14:
             return c
         if fc * fb > 0.0:
@@ -256,178 +238,74 @@ def flow(start, omega, periods, wide, minv, damping, stiffness, dirs, codes, par
     """State, monodromy matrix and derivative by omega after so many periods of the load; largest |x|, |v|; steps."""
     n = minv.shape[0]
     cols = 2 * n + 2 if wide else 1
-    z, new = np.zeros((2 * n, cols)), np.empty((2 * n, cols))
+    z, new, stage = np.zeros((2 * n, cols)), np.empty((2 * n, cols)), np.empty((2 * n, cols))
     for i in range(2 * n):
         z[i, 0] = start[i]
         if wide:
             z[i, 1 + i] = 1.0
-    jac = np.zeros((n, 2 * n))
+    work = np.zeros((1 + n, 2 * n))
     k = np.empty((13, 2 * n, cols))
     slope = np.empty((2 * n, cols))
     modes = np.zeros(codes.shape[0])
-    field_of(0.0, z, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, slope, jac, wide)
+    system = (minv, damping, stiffness, dirs, codes, pars, modes, loads)
+    field_of(0.0, z, omega, *system, slope, work)
     for e in range(codes.shape[0]):
         g, rate = switch(e, z, slope, omega, dirs, codes, pars)
-        if g > 0.0 or (g == 0.0 and rate > 0.0):
-            modes[e] = 1.0
-        else:
-            modes[e] = -1.0
-    field_of(0.0, z, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, slope, jac, wide)
+        modes[e] = 1.0 if g > 0.0 or (g == 0.0 and rate > 0.0) else -1.0
+    field_of(0.0, z, omega, *system, slope, work)
     end = 2.0 * math.pi * periods
     tau, h = 0.0, 0.02
     peaks = np.zeros(2)
     steps = 0
     while tau < end:
         steps += 1
-        if steps > 200000:
+        if steps > 100000:
             return z, peaks, -1
         last = tau + h >= end * (1.0 - 1e-15)
         if last:
             h = end - tau
-        error = advance(
-            tau, h, z, slope, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, k, jac, new, wide
-        )
+        error = advance(tau, h, z, slope, omega, *system, k, work, stage, new)
         if not error < 1.0:
             h *= max(0.2, 0.9 * error ** (-0.125)) if error == error else 0.2
             if h < 1e-14:
                 return z, peaks, -1
             continue
-        # where a contact turns back within reach of its gap, and where a law changes
-        cut = h
+        # up to where a contact turns back within reach of its gap, or a law changes, whichever comes first
+        taken, which = h, -1
         for e in range(codes.shape[0]):
             if codes[e] != STOP:
                 continue
             g0, r0 = switch(e, z, slope, omega, dirs, codes, pars)
             g1, r1 = switch(e, new, k[12], omega, dirs, codes, pars)
             if r0 * r1 < 0.0 and min(abs(g0), abs(g1)) <= 2.0 * h * max(abs(r0), abs(r1)):
-                at = until(
-                    e,
-                    True,
-                    tau,
-                    h,
-                    z,
-                    slope,
-                    omega,
-                    minv,
-                    damping,
-                    stiffness,
-                    dirs,
-                    codes,
-                    pars,
-                    modes,
-                    loads,
-                    k,
-                    jac,
-                    new,
-                )
+                at = until(e, True, tau, h, z, slope, omega, *system, work)
                 if 1e-10 < at < h - 1e-10:
-                    cut = min(cut, at)
-        taken = h
-        if cut < h:
-            taken, last = cut, False
-            advance(
-                tau,
-                taken,
-                z,
-                slope,
-                omega,
-                minv,
-                damping,
-                stiffness,
-                dirs,
-                codes,
-                pars,
-                modes,
-                loads,
-                k,
-                jac,
-                new,
-                wide,
-            )
-        else:
-            # the last slope and state belong to the whole step
-            advance(
-                tau,
-                taken,
-                z,
-                slope,
-                omega,
-                minv,
-                damping,
-                stiffness,
-                dirs,
-                codes,
-                pars,
-                modes,
-                loads,
-                k,
-                jac,
-                new,
-                wide,
-            )
-        which = -1
+                    taken = min(taken, at)
+        if taken < h:
+            advance(tau, taken, z, slope, omega, *system, k, work, stage, new)
+        whole = taken
         for e in range(codes.shape[0]):
             if codes[e] != STOP and codes[e] != DAMPER:
                 continue
-            g1 = switch(e, new, k[12], omega, dirs, codes, pars)[0]
-            if g1 * modes[e] < 0.0:
-                at = until(
-                    e,
-                    False,
-                    tau,
-                    taken,
-                    z,
-                    slope,
-                    omega,
-                    minv,
-                    damping,
-                    stiffness,
-                    dirs,
-                    codes,
-                    pars,
-                    modes,
-                    loads,
-                    k,
-                    jac,
-                    new,
-                )
-                if which < 0 or at < cut:
-                    cut, which = at, e
-        if which >= 0:
-            if cut < taken:
-                last = False
-            taken = cut
-            advance(
-                tau,
-                taken,
-                z,
-                slope,
-                omega,
-                minv,
-                damping,
-                stiffness,
-                dirs,
-                codes,
-                pars,
-                modes,
-                loads,
-                k,
-                jac,
-                new,
-                wide,
-            )
-            modes[which] = -modes[which]
+            if switch(e, new, k[12], omega, dirs, codes, pars)[0] * modes[e] < 0.0:
+                at = until(e, False, tau, whole, z, slope, omega, *system, work)
+                if which < 0 or at < taken:
+                    taken, which = at, e
+        if taken < h:
+            last = False
+        if taken < whole:
+            advance(tau, taken, z, slope, omega, *system, k, work, stage, new)
         tau = end if last else tau + taken
-        for i in range(2 * n):
-            for j in range(cols):
-                z[i, j] = new[i, j]
+        z[:, :] = new
+        slope[:, :] = k[12]
         if which >= 0:
+            modes[which] = -modes[which]
             # several laws may change at once: the rate tells which side comes
             for e in range(codes.shape[0]):
-                g, rate = switch(e, z, k[12], omega, dirs, codes, pars)
-                if codes[e] <= DAMPER and abs(g) < 1e-12 and abs(rate) > 1e-9:
+                g, rate = switch(e, z, slope, omega, dirs, codes, pars)
+                if (codes[e] == STOP or codes[e] == DAMPER) and abs(g) < 1e-12 and abs(rate) > 1e-9:
                     modes[e] = 1.0 if rate > 0.0 else -1.0
-        field_of(tau, z, omega, minv, damping, stiffness, dirs, codes, pars, modes, loads, slope, jac, wide)
+            field_of(tau, z, omega, *system, slope, work)
         for i in range(n):
             peaks[0] = max(peaks[0], abs(z[i, 0]))
             peaks[1] = max(peaks[1], abs(z[n + i, 0]))
@@ -562,6 +440,7 @@ class Judge:
         self.system, self.nu = system, nu
         self.low, self.high = min(bounds), max(bounds)
         self.size = np.zeros(2)
+        self.odd = 0.0
         self.until = time.perf_counter() + seconds
 
     # ------------------------------------------------------------------------------------------------------- solving
@@ -573,7 +452,7 @@ class Judge:
             raise Failure("out of time")
         n2 = 2 * self.system.n
         last = math.inf
-        for iteration in range(9):
+        for iteration in range(20):
             if not 0.0 < y[-1] < 3.0 * self.high:
                 raise ArithmeticError("left")
             z, peaks = self.system.period_map(y[:-1], y[-1], self.nu)
@@ -582,7 +461,7 @@ class Judge:
             matrix = np.vstack((jac / weights, row))
             step = np.linalg.solve(matrix, -residual)
             moved = float(np.linalg.norm(step))
-            if not np.isfinite(moved) or (iteration > 2 and moved > 3.0 * last and moved > 1e-6):
+            if not np.isfinite(moved) or moved > 1.0 or (iteration > 8 and moved > 1e-3):
                 raise ArithmeticError("diverges")
             y = y + step / weights
             if moved < 1e-9 or (moved < 3e-8 and moved > 0.3 * last):
@@ -605,6 +484,7 @@ class Judge:
         half = np.zeros(n2)
         if self.nu == 2:
             half = y[:-1] - self.system.period_map(y[:-1], y[-1], 1, False)[0][:, 0]
+            self.odd = max(self.odd, float(np.linalg.norm(half)))
         return Point(y, weights, jac, mu, tangent, half)
 
     def weights(self, peaks: np.ndarray) -> np.ndarray:
@@ -724,13 +604,14 @@ class Judge:
         """Points closer and closer to where the odd part vanishes, between the last point before and the first after;
         and the frequency there.
 
-        At that place itself the equations of twice the period are singular: the last 0.3 % of the step are left out.
+        At that place itself the equations of twice the period are singular: what lies within PARENT of the odd part's
+        largest size is the parent's.
         """
         unit = a.half / np.linalg.norm(a.half)
         low, high, f_low, f_high = 0.0, 1.0, float(unit @ a.half), float(unit @ b.half)
-        known: list[tuple[float, Point]] = [(0.0, a)]
+        points: list[Point] = []
         omega = 0.5 * (a.omega + b.omega)
-        for _ in range(8):
+        for _ in range(12):
             share = low + 0.9 * (high - low) * f_low / (f_low - f_high)
             try:
                 point = self.between(a, b, share)
@@ -740,11 +621,11 @@ class Judge:
             if f <= 0.0:
                 high, f_high = share, f
                 continue
-            if share - low < 0.003 * (high if high < 1.0 else 1.0):
+            if f < PARENT * self.odd:
                 break
             low, f_low, omega = share, f, point.omega
-            known.append((share, point))
-        return [point for _, point in known[1:]], omega
+            points.append(point)
+        return points, omega
 
     def closes(self, first: Point, a: Point, b: Point) -> bool:
         """Whether the curve has come back to its first point, or to it a load period later."""
@@ -782,9 +663,14 @@ class Judge:
                     curve.close.append((0.5 * (a.omega + b.omega), reason))
                 i += 1
                 continue
-            try:
-                middle = self.between(a, b, 0.5)
-            except ArithmeticError:
+            middle = None
+            for share in (0.5, 0.4, 0.65, 0.25, 0.8):
+                try:
+                    middle = self.between(a, b, share)
+                    break
+                except ArithmeticError:
+                    continue
+            if middle is None:
                 curve.close.append((0.5 * (a.omega + b.omega), f"{reason}; no motion in between"))
                 i += 1
                 continue
@@ -1018,6 +904,7 @@ def judged(
         ],
         "unstable": counts,
         "ended": ends,
+        "ends": [curve.points[-1].omega for curve in curves if curve.points],
         "points": sum(len(curve.points) for curve in curves),
         "close": [[omega, reason] for curve in curves for omega, reason in curve.close][:20],
         "failure": failure,

@@ -318,9 +318,11 @@ def _joined(items: list[Unsettled]) -> list[Unsettled]:
 
 
 def _separating(samples: list[Sample]) -> list[Sample]:
-    """The fewest of the samples (the first left out, the last kept) between which no test changes twice.
+    """The fewest of the samples (the first left out, the last kept) between which no test changes twice, and every
+    change that lies between is seen: two real multipliers that meet and cross the circle as a pair are a pair only from
+    close by.
 
-    A pair of multipliers that crosses the circle is seen in their count: it wants an interval of its own.
+    A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own.
     """
     if len(samples) == 2:
         return samples[1:]
@@ -328,7 +330,8 @@ def _separating(samples: list[Sample]) -> list[Sample]:
     since: set[str] = set()
     for p, q in pairwise(samples):
         now = {kind.name for kind in changes(p, q)}
-        if now & since or (now and since and "NS" in now | since):
+        crowded = now & since or (now and since and "NS" in now | since)
+        if p is not kept[-1] and (crowded or {kind.name for kind in changes(kept[-1], q)} != now | since):
             kept.append(p)
             since = set()
         since |= now
