@@ -369,3 +369,80 @@ def test_show_prints_results_studies_and_journals(study_file, suboctave):
     status, out, _ = suboctave("show", path.parent / "x.journal")
     assert status == 0
     assert "begun" in out
+
+
+def test_outputs_that_are_asked_for_later_are_drawn_from_the_results(study_file, suboctave):
+    """Of a complete study: what is missing is written, what is there left alone, nothing computed again."""
+    path = study_file()
+    suboctave("run", path)
+    folder = path.parent / "study_results"
+    results = (folder / "results.nc").read_bytes()
+    figures = "".join(
+        f'[[outputs.figures]]\nfile = "{name}"\nanalyses = ["response"]\n' for name in ("one.svg", "two.svg")
+    )
+    path.write_text(path.read_text() + f'\n[outputs]\ncsv = true\nhtml = "page.html"\n{figures}')
+    tables = ["response.csv", "response_bifurcations.csv", "up.csv", "up_bifurcations.csv"]
+
+    status, out, _ = suboctave("run", path, "--resume")
+    assert status == 0
+    assert "nothing to compute" in out
+    assert sorted(p.name for p in folder.iterdir()) == sorted(
+        ["results.nc", "one.svg", "two.svg", "page.html", *tables]
+    )
+    assert out.count("written: ") == 7
+    assert "left as they are" not in out
+    again = path.parent / "again"
+    suboctave("run", path, "--out", again)
+    for name in ("one.svg", "two.svg", *tables):
+        assert (again / name).read_bytes() == (folder / name).read_bytes()
+
+    # a figure that was deleted comes back; one that its user changed, or that is asked for otherwise, is left and named
+    drawn = (folder / "one.svg").read_bytes()
+    (folder / "one.svg").unlink()
+    (folder / "two.svg").write_text("mine")
+    status, out, _ = suboctave("run", path, "--resume")
+    assert status == 0
+    assert out.count("written: ") == 1
+    assert "left as they are: two.svg" in out
+    assert "--resume --overwrite" in out
+    assert (folder / "one.svg").read_bytes() == drawn
+    assert (folder / "two.svg").read_text() == "mine"
+    assert (folder / "results.nc").read_bytes() == results
+
+
+def test_overwrite_and_resume_write_every_output_of_a_complete_study_again(study_file, suboctave):
+    path = study_file()
+    path.write_text(path.read_text() + '\n[outputs]\n[[outputs.figures]]\nfile = "one.svg"\nanalyses = ["response"]\n')
+    suboctave("run", path)
+    folder = path.parent / "study_results"
+    before, drawn = so.load(folder / "results.nc"), (folder / "one.svg").read_bytes()
+    path.write_text(path.read_text() + 'quantity = "rms"\n')
+    assert "left as they are: one.svg" in suboctave("run", path, "--resume")[1]
+    assert (folder / "one.svg").read_bytes() == drawn
+    status, out, _ = suboctave("run", path, "--resume", "--overwrite")
+    assert status == 0
+    assert out.count("written: ") == 2
+    assert (folder / "one.svg").read_bytes() != drawn
+    after = so.load(folder / "results.nc")
+    assert after.attributes["study"] == path.read_text()
+    assert [after.details[name] for name in after] == [before.details[name] for name in before]
+    for name, branch in before.items():
+        assert after[name].to_dataframe().equals(branch.to_dataframe())
+    # nothing but outputs may differ
+    path.write_text(path.read_text().replace("F = 0.3", "F = 0.31"))
+    status, _, err = suboctave("run", path, "--resume", "--overwrite")
+    assert status == 2
+    assert "results of another study" in err
+
+
+def test_figures_that_cannot_be_drawn_of_a_complete_study_are_said(study_file, suboctave):
+    path = study_file()
+    suboctave("run", path)
+    path.write_text(
+        path.read_text() + '\n[outputs]\n[[outputs.figures]]\nfile = "a.svg"\nanalyses = ["response"]\nharmonic = 0.5\n'
+        '[[outputs.figures]]\nfile = "b.svg"\nanalyses = ["response"]\nharmonic = 1\n'
+    )
+    status, _, err = suboctave("run", path, "--resume")
+    assert status == 2
+    assert "outputs.figures[0] is not drawn" in err
+    assert (path.parent / "study_results" / "b.svg").exists()

@@ -130,7 +130,9 @@ def application() -> "typer.Typer":
         study: Annotated[Path, typer.Argument(help="The study file.")],
         out: Annotated[Path | None, typer.Option(help="Folder for what is written, in place of the study's.")] = None,
         overwrite: Annotated[bool, typer.Option(help="Replace what an earlier run left there.")] = False,
-        resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped or killed.")] = False,
+        resume: Annotated[
+            bool, typer.Option(help="Go on with a run that stopped; of a complete one, write what is missing.")
+        ] = False,
         seconds: Annotated[float | None, typer.Option(help="Time limit for all analyses together.")] = None,
         allow_code: Annotated[bool, code] = False,
         json_wanted: Annotated[bool, as_json] = False,

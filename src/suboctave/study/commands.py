@@ -91,12 +91,15 @@ def run(
         _print_finished(screen, item)
 
     outcome = run_study(study, out, overwrite, resume, watch, said, seconds)
-    if outcome.complete_already:
-        screen.print(f"nothing to resume: {outcome.files[0]} is complete", markup=False, soft_wrap=True)
+    if outcome.complete is not None:
+        screen.print(f"nothing to compute: {outcome.complete} is complete", markup=False, soft_wrap=True)
     elif outcome.files:
         screen.print()
-        for file in outcome.files:
-            screen.print(f"written: {file}", markup=False, soft_wrap=True)
+    for file in outcome.files:
+        screen.print(f"written: {file}", markup=False, soft_wrap=True)
+    if others := [file.name for file in outcome.left if file != outcome.complete]:
+        text = f"left as they are: {', '.join(others)} (--resume --overwrite writes them again)"
+        screen.print(text, markup=False, soft_wrap=True)
     status = _status(outcome)
     if as_json:
         _print_json(_summary(outcome, status))
@@ -143,6 +146,7 @@ def _summary(outcome: Outcome, status: int) -> dict[str, Any]:
         "interrupted": outcome.interrupted,
         "analyses": analyses,
         "files": [str(file) for file in outcome.files],
+        "left": [str(file) for file in outcome.left],
     }
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -123,25 +124,32 @@ def places(outputs: Outputs, steps: Sequence[Step], folder: Path) -> list[Path]:
     return [folder / name for name in names]
 
 
-def write_outputs(outputs: Outputs, results: Results, folder: Path, title: str) -> Iterator[Path]:
-    """Write what was asked for of what there is, and yield each file; what stood there is replaced.
+def write_outputs(
+    outputs: Outputs, results: Results, folder: Path, title: str, left: Sequence[Path] = ()
+) -> Iterator[Path]:
+    """Write what was asked for of what there is, and yield each file; what stood there is replaced, or `left`.
 
     Raises InputError, after everything else is written, for figures of motions or branches that finished analyses lack.
     """
-    yield results.save(folder / outputs.results, overwrite=True)
+    if folder / outputs.results not in left:
+        yield results.save(folder / outputs.results, overwrite=True)
     if outputs.csv:
         for name, item in results.items():
-            yield from _tables(name, item, folder)
+            for path, write in _tables(name, item, folder):
+                if path not in left:
+                    yield write(files.free_place(path, True), overwrite=True)
     missing = []
     for index, figure in enumerate(outputs.figures):
         path = folder / figure.file
+        if path in left:
+            continue
         try:
             if figure.draw(results, path):
                 yield path
         except InputError as error:
             missing.append(f"outputs.figures[{index}] is not drawn: {error}")
-    if outputs.html is not None and any(drawable(item) for item in results.values()):
-        path = folder / outputs.html
+    path = folder / (outputs.html or "")
+    if outputs.html is not None and path not in left and any(drawable(item) for item in results.values()):
         report: Any = importlib.import_module(_REPORT)
         shown = {name: _shown(item, results.details.get(name, {})) for name, item in results.items() if _worth(item)}
         report.write_report(shown, path, title=title or "Study", overwrite=True)
@@ -163,9 +171,10 @@ def _worth(item: Result) -> bool:
     return isinstance(item, Isolas) or bool(len(item))
 
 
-def _tables(name: str, item: Result, folder: Path) -> Iterator[Path]:
-    yield item.to_csv(files.free_place(folder / f"{name}.csv", True), overwrite=True)
+def _tables(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:
+    """The tables of a result: where each goes, and what writes it."""
+    yield folder / f"{name}.csv", item.to_csv
     if isinstance(item, Isolas):
-        yield item.to_csv(folder / f"{name}_points.csv", "points", overwrite=True)
+        yield folder / f"{name}_points.csv", partial(item.to_csv, what="points")
     if isinstance(item, Branch | BifurcationDiagram | Isolas):
-        yield item.to_csv(folder / f"{name}_bifurcations.csv", "bifurcations", overwrite=True)
+        yield folder / f"{name}_bifurcations.csv", partial(item.to_csv, what="bifurcations")

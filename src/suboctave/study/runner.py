@@ -43,12 +43,16 @@ class Finished:
 
 @dataclass
 class Outcome:
-    """What a run gave: analyses in order, files written, and what stopped it or one of them before the end."""
+    """What a run gave: analyses in order, files written, and what stopped it or one of them before the end.
+
+    `complete`: the results file of a study that was complete already; `left`: outputs that stood there and were left.
+    """
 
     finished: list[Finished] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     interruption: Interruption | None = None
-    complete_already: bool = False
+    complete: Path | None = None
+    left: list[Path] = field(default_factory=list)
 
     @property
     def interrupted(self) -> bool:
@@ -80,7 +84,8 @@ def run_study(
     folder
         Where outputs go, in place of what the study says.
     overwrite, resume
-        Replace what an earlier run left, or go on with it.
+        Replace what an earlier run left, or go on with it. Of a study that is complete `resume` writes the outputs that
+        are missing, from its results; with `overwrite` all of them.
     watch
         Gives for each analysis a context whose value is the `progress=` of its verb.
     said
@@ -98,7 +103,7 @@ def run_study(
     journal_at = place / JOURNAL
     targets = places(study.outputs, study.steps, place)
     if resume and not journal_at.exists() and targets[0].exists():
-        return _complete(study, targets[0])
+        return _complete(study, place, targets, overwrite)
     _prepare(place, targets, journal_at, overwrite, resume)
     journal = Journal.reopen(journal_at) if resume and journal_at.exists() else Journal.create(journal_at)
     for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
@@ -116,8 +121,7 @@ def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, r
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"the folder {place} cannot be made: {error.strerror}; write elsewhere with --out") from None
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise InputError(f"the folder {place} is not writable: write elsewhere with --out")
+    _check_folder(place)
     if overwrite and not resume:
         if journal.exists():
             Journal.reopen(journal).remove()
@@ -139,10 +143,21 @@ def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, r
         )
 
 
-def _complete(study: Study, path: Path) -> Outcome:
-    """Nothing to resume: the results are there. InputError if they are those of another study."""
+def _check_folder(place: Path) -> None:
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(f"the folder {place} is not writable: write elsewhere with --out")
+
+
+def _attributes(study: Study, names: list[str]) -> dict[str, Any]:
+    """What a results file says of the study that it is of."""
+    return {"title": study.title, "study": study.text, "analyses": "\n".join(names)}
+
+
+def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -> Outcome:
+    """The results are there: write the outputs that are missing, or all. InputError if they are another study's."""
     from suboctave.analysis import load
 
+    path = targets[0]
     results = load(path, allow_code=study.allow_code)
     done = isinstance(results, Results) and all(
         step.name in results and results.details[step.name].get("key") == study.key_of(step) for step in study.steps
@@ -157,7 +172,13 @@ def _complete(study: Study, path: Path) -> Outcome:
         Finished(step, results[step.name], float(results.details[step.name].get("seconds", 0.0)), True)
         for step in study.steps
     ]
-    return Outcome(finished, [path], complete_already=True)
+    left = [] if overwrite else [target for target in targets if target.exists()]
+    if len(left) < len(targets):
+        _check_folder(place)
+    details = {step.name: results.details[step.name] for step in study.steps}
+    everything = Results({name: results[name] for name in details}, _attributes(study, list(details)), details)
+    files = list(write_outputs(study.outputs, everything, place, study.title, left))
+    return Outcome(finished, files, complete=path, left=left)
 
 
 def _run(
@@ -198,10 +219,9 @@ def _run(
                 if not own:
                     break
     if results:
-        attributes = {"title": study.title, "study": study.text, "analyses": "\n".join(results)}
         for path in targets:
             journal.append("output", {"file": path.name}, sync=False)
-        everything = Results(results, attributes, details)
+        everything = Results(results, _attributes(study, list(results)), details)
         outcome.files = list(write_outputs(study.outputs, everything, place, study.title))
     if outcome.interrupted or outcome.failed:
         journal.close()  # --resume goes on from here
