@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -158,3 +160,29 @@ def test_large_arguments_have_a_kernel_compiled_at_once_unless_that_takes_second
     compiled.computation_begins()
     total(np.ones(compiled.LARGE + 1))
     assert bool(total.signatures) != alone
+
+
+@pytest.mark.parametrize("state", [{"credit": 0.0}, {"eager": True}])
+def test_several_threads_may_call_a_kernel_while_one_of_them_compiles_it(made, state, monkeypatch):
+    """One kernel or several: each compiled once, and nobody meets one that changes under its hands."""
+    total = made("patience=0.0", **state)
+    inner = total.py_func.__globals__["inner"]
+    compilations = []
+    compile = compiled._Kernel.compile
+
+    def counted(kernel, sig):
+        if kernel.overloads.get(tuple(sig)) is None:
+            compilations.append(kernel)
+        return compile(kernel, sig)
+
+    monkeypatch.setattr(compiled._Kernel, "compile", counted)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            results = list(pool.map(total, [np.arange(5.0)] * 2000))
+    finally:
+        sys.setswitchinterval(interval)
+    assert results == [30.0] * 2000
+    assert len(compilations) == len({id(kernel) for kernel in compilations}) <= 2
+    assert {id(kernel) for kernel in compilations} <= {id(total), id(inner)}

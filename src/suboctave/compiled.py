@@ -16,11 +16,15 @@ same angle) are compiled at once, so that both forms agree bit by bit; but where
 one the last bit may still change, for rounded laws and several degrees of freedom, until everything is compiled.
 
 All seconds are processor time of the thread: a busy machine changes nothing.
+
+Several threads may compute at once: whatever asks Numba's cache or compiler, or changes what a kernel is, holds the
+lock of that compiler, and looks again once it has it.
 """
 
 from __future__ import annotations
 
 import gc
+import threading
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -58,10 +62,8 @@ class _Ledger:
         self.eager = False
         #: whether nothing has been found in the cache
         self.fresh = True
-        #: seconds spent in kernels called by the one that runs
-        self.nested = 0.0
-        #: kernels that are being compiled, each because of the one before
-        self.depth = 0
+        #: kernels that are being compiled, each because of the one before, and when the first of them began
+        self.depth, self.began = 0, 0.0
 
     def allows(self, alone: bool = False) -> bool:
         """Whether something may be compiled now; alone: a kernel that must not follow others at once."""
@@ -72,15 +74,15 @@ class _Ledger:
         """The compilation of a kernel begins."""
         if self.depth == 0:
             self._worked()
+            self.began = time.thread_time()
         self.depth += 1
 
     def ends(self) -> None:
         """The compilation of a kernel ends."""
         self.depth -= 1
         if self.depth == 0:
-            now = time.thread_time()
-            self.credit -= now - self.since
-            self.since = now
+            self.since = time.thread_time()
+            self.credit -= self.since - self.began
 
     def _worked(self) -> None:
         now = time.thread_time()
@@ -89,6 +91,15 @@ class _Ledger:
 
 
 _ledger = _Ledger()
+
+
+class _Nested(threading.local):
+    """Seconds that a thread has spent in kernels called by the one that runs."""
+
+    seconds = 0.0
+
+
+_nested = _Nested()
 
 
 def computation_begins() -> None:
@@ -135,47 +146,63 @@ class _Patient(_Kernel):
     alone = False
 
     def __call__(self, *args: Any) -> Any:
-        spent = self.__dict__.get("_spent")
-        if spent is None:
-            signature = tuple(self.typeof_pyval(a) for a in args)
-            if self._cache.load_overload(signature, self.targetctx) is not None:
-                _ledger.fresh = False
-                return compiled(self)(*args)
-            spent = 0.0
-        # those that take seconds to compile leave long loops to others
-        large = not self.alone and sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE
-        if self._due(spent) or large:
-            self.compile(tuple(self.typeof_pyval(a) for a in args))
-            return compiled(self)(*args)
-        before, _ledger.nested = _ledger.nested, 0.0
+        # methods by the name of the class: another thread may make it a `_Kernel` at any time
+        if "_spent" not in self.__dict__ or _Patient._due(self, args):
+            with global_compiler_lock:
+                if _patient(self):
+                    self._prepare(args)
+        if not _patient(self):
+            return self(*args)
+        before, _nested.seconds = _nested.seconds, 0.0
         start = time.thread_time()
         try:
             with np.errstate(all="ignore"):
                 return self.py_func(*args)
         finally:
             took = time.thread_time() - start
-            self._spent = spent + took - _ledger.nested
-            _ledger.nested = before + took
+            self._spent += took - _nested.seconds
+            _nested.seconds = before + took
 
-    def _due(self, spent: float) -> bool:
-        if _ledger.eager:
+    def _prepare(self, args: tuple[Any, ...]) -> None:
+        """Load it, or compile it if it is due."""
+        signature = tuple(self.typeof_pyval(a) for a in args)
+        if "_spent" not in self.__dict__:
+            if self._cache.load_overload(signature, self.targetctx) is not None:
+                _ledger.fresh = False
+                compiled(self)
+                return
+            self._spent = 0.0
+        if self._due(args):
+            self.compile(signature)
+            compiled(self)
+
+    def _due(self, args: tuple[Any, ...]) -> bool:
+        """Whether it is to be compiled now."""
+        # those that take seconds to compile leave long loops to others
+        large = not self.alone and sum(a.size for a in args if isinstance(a, np.ndarray)) > LARGE
+        if _ledger.eager or large:
             return True
         patience = self.patience if _ledger.fresh and _ledger.runs < 2 else min(self.patience, LESS)
-        if not (spent > patience and _ledger.allows(self.alone)):
+        if not (self._spent > patience and _ledger.allows(self.alone)):
             return False
         # those that it has called first, one by one: otherwise all of them would be compiled at one go
-        waiting = [part for part in self._parts() if isinstance(part, _Patient) and "_spent" in part.__dict__]
+        waiting = [part for part in _parts(self) if isinstance(part, _Patient) and "_spent" in part.__dict__]
         for part in waiting:
             part.patience = 0.0
         return not waiting
 
-    def _parts(self) -> list[Any]:
-        """The kernels that this one calls."""
-        known = self.__dict__.get("_called")
-        if known is None:
-            names, there = self.py_func.__code__.co_names, self.py_func.__globals__
-            known = self._called = [there[name] for name in names if isinstance(there.get(name), CPUDispatcher)]
-        return known
+
+def _patient(kernel: Any) -> bool:
+    return isinstance(kernel, _Patient)
+
+
+def _parts(kernel: CPUDispatcher) -> list[Any]:
+    """The kernels that this one calls."""
+    known: list[Any] | None = kernel.__dict__.get("_called")
+    if known is None:
+        names, there = kernel.py_func.__code__.co_names, kernel.py_func.__globals__
+        known = kernel._called = [there[name] for name in names if isinstance(there.get(name), CPUDispatcher)]
+    return known
 
 
 def compiled(kernel: _Function) -> _Function:
@@ -200,10 +227,11 @@ def at_hand(kernel: Callable[..., Any], *args: Any) -> bool:
     kind = tuple(a is None for a in args)
     if not known.get(kind, False):
         signature = tuple(kernel.typeof_pyval(a) for a in args)
-        known[kind] = kernel.overloads.get(signature) is not None or (
-            # another process may have compiled it meanwhile: looked up once
-            kind not in known and kernel._cache.load_overload(signature, kernel.targetctx) is not None
-        )
+        with global_compiler_lock:
+            known[kind] = kernel.overloads.get(signature) is not None or (
+                # another process may have compiled it meanwhile: looked up once
+                kind not in known and kernel._cache.load_overload(signature, kernel.targetctx) is not None
+            )
     return known[kind]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
@@ -11,9 +10,6 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import limited
-
-#: objects made between two looks of the garbage collector while a verb runs
-_OBJECTS = 50_000
 
 Report = Callable[[float, str], None]
 
@@ -71,10 +67,6 @@ def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
     @functools.wraps(verb)
     def measured(*positional: Arguments.args, **named: Arguments.kwargs) -> Curve:
         begin = perf_counter()
-        before = gc.get_threshold()
-        if before[0] > 0:
-            # a curve makes thousands of small objects that stay: looking through them again and again finds nothing
-            gc.set_threshold(max(before[0], _OBJECTS), *before[1:])
         try:
             result = within(*positional, **named)
         except (ZeroDivisionError, OverflowError) as failure:
@@ -82,8 +74,6 @@ def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
                 f"the numbers left the range of floating point ({failure}): look at the sizes of parameters, loads and "
                 "ranges, or choose units in which they are near one"
             ) from failure
-        finally:
-            gc.set_threshold(*before)
         result.seconds = perf_counter() - begin
         return result
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,11 +27,22 @@ def _controller() -> Any:
     return ThreadpoolController()
 
 
+#: limits that hold: BLAS has one for the process, so several threads lift them in the order last in, first out
+_limits: list[Any] = []
+_changing = threading.Lock()
+
+
 @contextmanager
 def one_thread() -> Iterator[None]:
     """One BLAS thread inside: for matrices of some hundred rows more only wait for each other."""
-    with _controller().limit(limits=1, user_api="blas"):
+    with _changing:
+        _limits.append(_controller().limit(limits=1, user_api="blas").__enter__())
+    try:
         yield
+    finally:
+        with _changing:
+            # perhaps another thread's: the one that leaves last restores what the first one met
+            _limits.pop().__exit__(None, None, None)
 
 
 def length(vector: Array) -> float:

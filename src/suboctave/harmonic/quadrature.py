@@ -15,6 +15,7 @@ after.
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -38,6 +39,7 @@ _SETTLED = 1e-11
 #: how many sets of graded nodes are kept, and those
 _REMEMBERED = 8
 _recent: dict[tuple[bytes, bytes, bytes, int, bool], Array] = {}
+_making_room = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -112,9 +114,10 @@ def graded_motion(motion: ComplexArray, points: Array, widths: Array, top: int, 
         high = motion.shape[0] - 1
         grid = search_grid(high)
         found = graded.sharp_nodes(motion, points, widths, top + high, moving, grid.zr, grid.zi, *rule_tables())
-        while len(_recent) >= _REMEMBERED:
-            _recent.pop(next(iter(_recent)), None)
-        _recent[key] = found
+        with _making_room:
+            while len(_recent) >= _REMEMBERED:
+                del _recent[next(iter(_recent))]
+            _recent[key] = found
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Callable as Function
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,8 @@ _SHORTER = (1.0, 0.1, 0.01)
 _SCALES = (1.0, 0.1, 0.01, 0.001)
 #: how far given derivatives may be from differences, relative to the largest force and slope
 _GIVEN = 1e-5
+#: held while the filters of warnings are changed, which are those of the process
+_filtering = threading.RLock()
 
 
 class Callable(Element):
@@ -118,7 +121,7 @@ class Callable(Element):
         u, v = self._draws()
         c = np.where(np.isnan(self._constant), 0.7, self._constant)
         try:
-            with np.errstate(all="ignore"), warnings.catch_warnings():
+            with _filtering, np.errstate(all="ignore"), warnings.catch_warnings():
                 warnings.simplefilter("error", np.exceptions.ComplexWarning)
                 real = np.asarray(self.function(u, v, *c))
                 for arguments in ((u + 1j * _COMPLEX, v), (u, v + 1j * _COMPLEX)):
