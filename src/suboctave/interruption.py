@@ -31,6 +31,7 @@ __all__ = [
     "limited",
     "pass_on",
     "time_limit",
+    "unlimited",
 ]
 
 Arguments = ParamSpec("Arguments")
@@ -132,6 +133,16 @@ def time_limit(seconds: Any) -> Iterator[Deadline | None]:
         raise TimeLimitError(
             f"the time limit of {number:g} s was reached before there was a result to keep: give more seconds="
         ) from None
+    finally:
+        _DEADLINE.reset(token)
+
+
+@contextmanager
+def unlimited() -> Iterator[None]:
+    """Work within finishes a result: no time limit stops it."""
+    token = _DEADLINE.set(None)
+    try:
+        yield
     finally:
         _DEADLINE.reset(token)
 

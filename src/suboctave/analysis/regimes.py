@@ -40,7 +40,7 @@ from suboctave.analysis.verbs import continue_branch
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.interruption import Interruption, pass_on
+from suboctave.interruption import Interruption, pass_on, unlimited
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 
@@ -155,7 +155,8 @@ def regime_map(
         except KeyboardInterrupt as cause:
             atlas.interruption = Interruption.of(cause)
             atlas.note(f"{atlas.interruption}: the map holds what had been found by then")
-    return RegimeMap(atlas, _strips(atlas, slices), depth, resolution)
+    with unlimited():
+        return RegimeMap(atlas, _strips(atlas, slices), depth, resolution)
 
 
 def _checked_search(search: Any, seeds: Any) -> tuple[int, ...]:

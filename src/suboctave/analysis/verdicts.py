@@ -8,7 +8,7 @@ is the reason: there a multiplier has to be on the circle.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,9 @@ from suboctave.analysis.audit import Unsettled
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.trace import Trace
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.continuation.ending import Ending
+from suboctave.harmonic.state import BalanceState
+from suboctave.interruption import Interruption
 from suboctave.stability import FloquetResult, StabilityMethod
 from suboctave.stability.result import written
 
@@ -34,12 +37,15 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     name
         The free parameter.
     """
+    asking = _Asking(method, not trace.interrupted)
     # right beside another branch a multiplier is as near +1 as one likes
     beside = {0} if trace.departs is not None else set()
     beside |= {len(trace.points) - 1} if trace.arrives is not None else set()
-    points = _settled(trace.points, method, beside)
-    bifurcations = [_at_event(item, method) for item in trace.bifurcations]
-    events = [_at_event(item, method) for item in trace.events]
+    points = _settled(trace.points, asking, beside)
+    bifurcations = [_at_event(item, asking) for item in trace.bifurcations]
+    events = [_at_event(item, asking) for item in trace.events]
+    if asking.interruption is not None:
+        trace.ends(Ending.stopped(asking.interruption, "its end, before open verdicts on stability were settled"))
     in_doubt = [i for i, p in enumerate(points) if not p.floquet.decided]
     # a branch that leaves or meets another does so with a multiplier at +1
     ends = [replace(item, kind="BP") for item in (trace.departs, trace.arrives) if item is not None]
@@ -68,7 +74,32 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     )
 
 
-def _settled(points: Sequence[BranchPoint], method: StabilityMethod, beside: set[int]) -> list[BranchPoint]:
+class _Asking:
+    """A method that is asked until it is interrupted; of an interrupted curve it is not asked at all."""
+
+    def __init__(self, method: StabilityMethod, whole: bool) -> None:
+        self.method = method
+        self.going_on = whole
+        self.interruption: Interruption | None = None
+
+    def settled(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
+        """The verdict where one is open, with witnesses."""
+        return self._asked(lambda: self.method.settled(state, found), found)
+
+    def along(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
+        """The method's multipliers in place of others."""
+        return self._asked(lambda: self.method.along(state), found)
+
+    def _asked(self, question: Callable[[], FloquetResult], known: FloquetResult) -> FloquetResult:
+        if self.going_on:
+            try:
+                return question()
+            except KeyboardInterrupt as cause:
+                self.interruption, self.going_on = Interruption.of(cause), False
+        return known
+
+
+def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -> list[BranchPoint]:
     told: list[BranchPoint] = []
     in_vain = 0
     for number, point in enumerate(points):
@@ -76,25 +107,26 @@ def _settled(points: Sequence[BranchPoint], method: StabilityMethod, beside: set
         if found.decided:
             in_vain = 0
         elif number not in beside and in_vain < _PATIENCE:
-            found = method.settled(point.orbit.state(), found)
+            found = asking.settled(point.orbit.state(), found)
             in_vain = 0 if found.decided else in_vain + 1
         told.append(point if found is point.floquet else replace(point, floquet=found))
     return told
 
 
-def _at_event(item: Bifurcation, method: StabilityMethod) -> Bifurcation:
+def _at_event(item: Bifurcation, asking: _Asking) -> Bifurcation:
     """A located motion with the method's multipliers; asked for a verdict only if more than the critical one is open.
 
     Those of the search are the monodromy matrix's.
     """
     found = item.floquet
-    if method.follows_monodromy and not _others_open(item).any():
+    monodromy = asking.method.follows_monodromy
+    if monodromy and not _others_open(item).any():
         return item
     state = item.orbit.state()
-    if not method.follows_monodromy:
-        found = method.along(state)
+    if not monodromy:
+        found = asking.along(state, found)
     if _others_open(replace(item, floquet=found)).any():
-        found = method.settled(state, found)
+        found = asking.settled(state, found)
     return replace(item, floquet=found)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.state import BalanceState
+from suboctave.interruption import check_time
 from suboctave.stability.methods import Hill, KoopmanHill, Monodromy, StabilityMethod
 from suboctave.stability.monodromy import floquet_multipliers
 from suboctave.stability.result import FloquetResult, written
@@ -68,6 +69,7 @@ class Arbitration(StabilityMethod):
             return replace(found, note=f"{_open(found)}. {skipped}")
         asked, joint, contradictions = [found], found, []
         for witness in self.witnesses:
+            check_time()
             said = witness.multipliers(state)
             asked.append(said)
             if not said.applicable:

@@ -27,6 +27,7 @@ from scipy.linalg import expm
 from suboctave.harmonic import kernels
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.state import BalanceState
+from suboctave.interruption import check_time
 from suboctave.stability.result import FloquetResult
 from suboctave.stability.variational import Variational, liouville, refined
 
@@ -103,26 +104,33 @@ def _by_taylor(
     start: Array, block: Array, parts: list[tuple[Array, Array, Array]], cosine: np.ndarray, frequency: Array
 ) -> Array:
     """`exp(2 pi H)` on `start` by Taylor series of short steps: H is known by its action only."""
-    n = block.shape[0] // 2
-    turn = frequency[:, None, None]
+    n, size, columns = block.shape[0] // 2, len(start), start.shape[2]
+    turn = frequency[:, None]
+    first = int(cosine[0])
+    cosines, sines = slice(first, size, 2), slice(first + 1, size, 2)
+    # with the states first all of them, and what the laws feel, are one product
+    acting = np.vstack([block, *(right for _, right, _ in parts)])
+    felt = np.array([projected for _, _, projected in parts]).reshape(-1, size, size)
+    pushed = np.array([left for left, _, _ in parts]).reshape(-1, n).T
 
     def slope(z: Array) -> Array:
-        out = block @ z
-        out[cosine] -= turn * z[cosine + 1]
-        out[cosine + 1] += turn * z[cosine]
-        for left, right, projected in parts:
-            out[:, n:] -= left[:, None] * (projected @ np.tensordot(right, z, (0, 1)))[:, None, :]
+        both = (acting @ z.reshape(2 * n, -1)).reshape(-1, size, columns)
+        out, inputs = both[: 2 * n], both[2 * n :]
+        out[:, cosines] -= turn * z[:, sines]
+        out[:, sines] += turn * z[:, cosines]
+        out[n:] -= (pushed @ (felt @ inputs).reshape(len(felt), -1)).reshape(n, size, columns)
         return out
 
     # the time scale of H: its norm, were velocities measured in the highest frequency
-    size = float(np.abs(block[n:, :n]).sum(axis=1).max())
-    size += sum(float(np.abs(p).sum(axis=1).max() * np.abs(l).max() * np.abs(r[:n]).sum()) for l, r, p in parts)
+    stiff = float(np.abs(block[n:, :n]).sum(axis=1).max())
+    stiff += sum(float(np.abs(p).sum(axis=1).max() * np.abs(l).max() * np.abs(r[:n]).sum()) for l, r, p in parts)
     drag = float(np.abs(block[n:, n:]).sum(axis=1).max())
-    rate = float(frequency[-1]) + math.sqrt(size) + drag
+    rate = float(frequency[-1]) + math.sqrt(stiff) + drag
     steps = max(1, math.ceil(2.0 * math.pi * rate / 4.0))
     h = 2.0 * math.pi / steps
-    z = start
+    z = np.ascontiguousarray(start.transpose(1, 0, 2))
     for _ in range(steps):
+        check_time()
         term, order = z, 0
         total = z.copy()
         limit = 1e-17 * float(np.abs(z).max())
@@ -131,7 +139,7 @@ def _by_taylor(
             term = slope(term) * (h / order)
             total += term
         z = total
-    return z
+    return z.transpose(1, 0, 2)
 
 
 def koopman_hill_multipliers(state: BalanceState, subharmonic: bool) -> FloquetResult:
