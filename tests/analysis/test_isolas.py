@@ -11,6 +11,9 @@ import pytest
 from scipy.optimize import fsolve
 
 import suboctave as so
+from suboctave.analysis import isola_survey
+from suboctave.analysis.identity import lies_on, mirrored
+from suboctave.analysis.isolas_found import Isolas
 from suboctave.interruption import Interruption
 
 OMEGA = (1.3, 4.5)
@@ -232,6 +235,134 @@ def test_ctrl_c_keeps_what_is_there():
     assert any("interrupted" in note for note in isolas.notes)
 
 
+# ------------------------------------------------------------------------------------------------- symmetric systems
+def hardening(**loads):
+    """A Duffing oscillator with damping 0.05, and further loads."""
+    return so.System(
+        mass=1.0,
+        damping=0.05,
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient=1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F"), *(so.StaticLoad(dof=0, force=f) for f in loads.values())],
+        parameters={"F": 1.0},
+    )
+
+
+def chain():
+    """Two masses on cubic springs."""
+    pattern = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    return so.System(
+        mass=np.eye(2),
+        damping=0.1 * pattern,
+        stiffness=pattern,
+        elements=[so.CubicSpring(dof=0, coefficient=1.0), so.CubicSpring(dof=(0, 1), coefficient=0.5)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 1.0},
+    )
+
+
+def between_stops():
+    """A mass between two equal stops."""
+    return so.System(
+        mass=1.0,
+        damping=0.1,
+        stiffness=1.0,
+        elements=[so.ElasticStop(dof=0, stiffness=5.0, gap=gap) for gap in (1.0, -1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 1.0},
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "omega", "bounds", "harmonics"),
+    [
+        (hardening(), (0.5, 1.2), (0.5, 3.0), "adaptive"),
+        (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 10.0), 9),
+        (chain(), (0.4, 2.5), (0.5, 8.0), 5),
+        pytest.param(between_stops(), (0.4, 2.5), (0.5, 6.0), "adaptive", marks=pytest.mark.slow),
+        (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 30.0), "adaptive"),
+    ],
+)
+def test_a_loop_between_pitchforks_of_the_response_is_no_isola(system, omega, bounds, harmonics):
+    """It closes on itself, and every sweep that passes one of its branch points comes to it."""
+    isolas = so.find_isolas(system, omega, "F", bounds, harmonics, values=3, levels=(), search=())
+    assert list(isolas) == []
+    assert isolas.limit_points
+
+
+def test_a_static_load_makes_such_a_loop_an_isola():
+    """It takes the response over one half of the loop; the other one closes with what was the symmetric response."""
+    system = hardening(static=0.01)
+    given = {"values": [3.0], "levels": (1.5,), "search": ()}
+    (isola,) = so.find_isolas(system, (0.5, 1.2), "F", (0.5, 3.0), 9, **given)
+    assert isola.born.kind == "isola_centre"
+    loop = isola.at(2.0)
+    assert loop.closed
+    assert isola.stable_ranges(2.0)
+    for ends in ((0.4, 1.4), (1.4, 0.4)):
+        sweep = so.frequency_response(system.with_parameters(F=2.0), ends, 9)
+        assert sweep.omega[-1] == ends[1]
+        assert sweep.bifurcations["BP"] == []
+        assert not any(lies_on(orbit, sweep.points) for orbit in loop.orbits[::5])
+
+
+def test_a_true_isola_of_unsymmetric_motions_stays():
+    """Period-2 motions of the symmetric oscillator, isolated from all others, come in pairs: they are listed once."""
+    system = so.library.duffing(c=0.1)
+    given = {"values": [5.0], "search": (2,), "levels": (), "depth": 0, "seeds": so.Seeds(8, 6, 1)}
+    (isola,) = so.find_isolas(system, (2.9, 4.0), "F", (4.0, 5.0), 5, **given)
+    assert isola.born.kind == "isola_centre"
+    loop = isola.at(4.8)
+    image = mirrored(loop.orbits[len(loop) // 2])
+    assert image is not None
+    assert not lies_on(image, loop.points)
+
+
+def test_what_hangs_on_an_isola_is_part_of_it():
+    """The symmetric 3T isola at F = 200 has four pitchforks; the loops between them turn back there, it does not."""
+    system = so.library.duffing(c=0.1).with_parameters(F=200.0)
+    start = so.find_subharmonics(system, (3.0, 9.0), 3, seeds=so.Seeds(16, 6, 1))[0].orbits[5]
+    isola = so.continue_branch(start, "omega", (1.0, 5.0))
+    assert isola.closed
+    assert len(isola.bifurcations["BP"]) == 4
+    survey = isola_survey.Survey(system, "F", (190.0, 210.0), (1.0, 5.0), "adaptive", 0, {}, 0)
+    assert survey.loop_of(isola, 200.0).detached
+    for item in isola.bifurcations["BP"][::2]:
+        hanging = so.switch_branch(item)
+        assert hanging.closed
+        loop = survey.loop_of(hanging, 200.0)
+        assert loop.detached
+        assert lies_on(isola.orbits[len(isola) // 2], loop.branch.points)
+    # were one of these branches reached from the response, all of them would be
+    survey.met[200.0] = [isola]
+    assert not survey.loop_of(hanging, 200.0).detached
+
+
+def test_isolas_are_in_the_order_of_their_births():
+    """A birth at 0 is one."""
+
+    class Born:
+        def __init__(self, born, top):
+            self.born, self.range = born, (-1.0, top)
+
+    given = [Born(0.5, 0.5), Born(None, 0.1), Born(0.0, 3.0), Born(-0.5, 1.0)]
+    found = Isolas(given, hardening(), "F", (-1.0, 3.0), (0.5, 1.2))
+    assert [isola.born for isola in found] == [-0.5, 0.0, 0.5, None]
+
+
+def test_notes_of_searches_under_other_loads_are_kept(monkeypatch):
+    def fails(item, name, *rest, **options):
+        raise so.ConvergenceError(f"no curve over {name}")
+
+    monkeypatch.setattr(isola_survey, "track", fails)
+    given = {"values": [0.05], "levels": (6.0,), "search": (), "depth": 0}
+    isolas = so.find_isolas(so.library.duffing(c=0.1, F=0.05), (0.6, 2.0), "F", (0.01, 0.051), 3, **given)
+    assert len(isolas.notes) == 2
+    for note in isolas.notes:
+        assert note.startswith("at F = 0.05, looking at 6 times the loads: the LP at omega = ")
+        assert note.endswith("could not be followed over load_level: no curve over load_level")
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -242,6 +373,7 @@ def test_ctrl_c_keeps_what_is_there():
         ({"search": (0,)}, "periods"),
         ({"search": "2"}, "periods"),
         ({"levels": (0.0,)}, "levels"),
+        ({"levels": (2.0, 1.0)}, "other ones than 1"),
         ({"depth": -1}, "depth"),
         ({"seconds": 0.0}, "seconds"),
         ({"max_curves": True}, "max_curves"),

@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.analysis.regime_arcs import Arc, Edge
+from suboctave.analysis.regime_atlas import Atlas
+from suboctave.analysis.regime_map import RegimeMap, Strip
+from suboctave.analysis.regime_slices import Slice
 
 DAMPING, STIFF = 0.1, 1.0
 
@@ -34,6 +38,19 @@ def motions_of_duffing(omega, force):
     roots = np.roots([cubic**2, 2.0 * stiff * cubic, stiff**2 + (DAMPING * omega) ** 2, -(force**2)])
     count = np.count_nonzero((np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0))
     return {1: 1, 3: 2}[int(count)]
+
+
+def test_a_raster_has_no_limit_of_arcs():
+    """Seventy overlapping stable arcs: every cell has the label of its centre."""
+    arcs = [Arc(1 + i % 3, False, (Edge(1.0 + 0.01 * i), Edge(1.5 + 0.02 * i)), ()) for i in range(70)]
+    atlas = Atlas(duffing(), "F", (0.0, 1.0), (0.5, 3.5), "adaptive", {}, 1)
+    regimes = RegimeMap(atlas, [Strip(0.0, 0.5, Slice(0.2, arcs=arcs), True), Strip(0.5, 1.0, None, False)], 2, 1e-4)
+    cells, labels = regimes.raster(90, 4)
+    omega = 0.5 + (np.arange(90) + 0.5) / 90 * 3.0
+    for row, value in enumerate((0.125, 0.375, 0.625, 0.875)):
+        for column, place in enumerate(omega):
+            assert labels[cells[row, column]] == regimes.label(place, value)
+    assert max(label.count for label in labels) > 40
 
 
 def test_counts_of_a_closed_form(folded):

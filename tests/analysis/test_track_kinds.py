@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
 import suboctave as so
+from suboctave.analysis.checks import make_settings
+from suboctave.analysis.track_start import Box, solved_start
+from suboctave.continuation import NewtonOptions, SteppingOptions
+from suboctave.continuation.march import March
+from suboctave.continuation.place import Place
+from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.timedomain import locate_by_shooting, state_transition
 
 
@@ -135,6 +143,31 @@ def test_grazing_of_a_linear_oscillator():
     assert line.parameter("gap") / line.parameter("F") == pytest.approx(2.0, rel=1e-8)
     assert set(line.omega) == {touch.omega}
     assert line.parameter("F")[[0, -1]] == pytest.approx([0.2, 1.0])
+
+
+@pytest.mark.parametrize("turns", [-1, 0, 1])
+def test_an_instant_is_compared_on_the_circle(turns):
+    """A curve of grazings of 2T motions, begun a load period later: the same curve, whatever the instant is called."""
+    response = so.frequency_response(so.library.reference_oscillator(p=0.55), (4.5, 1.3), 9)
+    touch = so.switch_branch(response.bifurcations["PD"][0]).grazings[0]
+    system, newton = touch.orbit.system, NewtonOptions()
+    box = Box(None, (0.3, 0.8), None)
+    settings = make_settings(system, None, 0, (), None, None, None, None)
+    balance = HarmonicBalance(system, touch.orbit.basis)
+    start = solved_start(touch, balance, None, ("omega", "p"), box, settings)
+    before, here, behind = islice(March(start, 1.0, box.second, newton, SteppingOptions()), 2, 5)
+
+    def later(point):
+        curve, weights = here.curve, here.weights
+        u = curve.images(point.u)[1]
+        along = curve.images(point.u + point.tangent)[1] - u
+        u[balance.dimension] += turns * 2.0 * math.pi
+        return replace(point, u=u, tangent=along, weights=weights)
+
+    passed = Place(here).passed(later(before), later(behind))
+    assert passed is not None
+    assert passed.parameter == here.parameter
+    assert Place(here).passed(later(behind), later(before)) is None
 
 
 @pytest.fixture(scope="module")

@@ -55,6 +55,9 @@ class Plane:
     def images(self, u):
         return [u * copy for copy in self.copies]
 
+    def unwrapped(self, u, near):
+        return u
+
     def where(self, u):
         return f"p = {u[1]:.6g}"
 

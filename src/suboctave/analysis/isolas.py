@@ -224,6 +224,10 @@ def _checked_levels(levels: Any) -> tuple[float, ...] | None:
     given = tuple(levels) if isinstance(levels, Sequence | np.ndarray) and not isinstance(levels, str) else (None,)
     if not all(is_number(level) and level > 0.0 for level in given):
         raise InputError(f"levels must be positive numbers, those of the loads in units of their own, not {levels!r}")
+    if any(level == 1.0 for level in given):
+        raise InputError(
+            "levels are other ones than 1, that of the loads themselves: responses there are followed anyway"
+        )
     return tuple(float(level) for level in given)
 
 

@@ -47,7 +47,7 @@ class Isolas(Sequence[Isola]):
         said: str = "",
         interruption: Interruption | None = None,
     ) -> None:
-        self._items = tuple(sorted(isolas, key=lambda isola: (isola.born is None, isola.born or isola.range[1])))
+        self._items = tuple(sorted(isolas, key=_birth))
         self.system = system
         self.parameter = parameter
         self.bounds = bounds
@@ -146,3 +146,8 @@ class Isolas(Sequence[Isola]):
         for note in self.notes:
             text += f"\nnote: {note}"
         return text
+
+
+def _birth(isola: Isola) -> tuple[bool, float]:
+    """What isolas are sorted by: the value at which one is born; behind all these, the upper end of its range."""
+    return isola.born is None, isola.range[1] if isola.born is None else isola.born

@@ -36,7 +36,11 @@ def branches_by_load(survey: Survey, value: float, level: float) -> Iterator[Bra
     scaled = system.with_scaled_loads(_LEVEL)
     bounds = (min(1.0, level), max(1.0, level))
     around = Survey(scaled, _LEVEL, bounds, survey.omega, survey.harmonics, survey.depth, survey.options, survey.most)
-    around.look(level)
+    try:
+        around.look(level)
+    finally:
+        for note in around.notes:
+            survey.note(f"at {survey.name} = {value:.6g}, looking at {level:g} times the loads: {note}")
     known = list(survey.met.get(value, []))
     for leg in around.legs:
         if not leg.contains(1.0):

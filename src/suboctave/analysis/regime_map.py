@@ -224,15 +224,15 @@ class RegimeMap:
             if not len(chosen):
                 continue
             ranges = [arc.range(values[chosen]) for arc in strip.arcs]
-            present = np.array([(omega >= a[:, None]) & (omega <= b[:, None]) for a, b in ranges]).reshape(
-                len(ranges), len(chosen), columns
-            )
-            packed = np.einsum("arc,a->rc", present.astype(np.int64), 2 ** np.arange(len(ranges), dtype=np.int64))
-            for code in np.unique(packed):
-                regime = _regime([arc for i, arc in enumerate(strip.arcs) if (int(code) >> i) & 1])
-                number = regimes.setdefault(regime, len(regimes))
-                row, column = np.nonzero(packed == code)
-                cells[chosen[row], column] = number
+            present = [((omega >= a[:, None]) & (omega <= b[:, None])).ravel() for a, b in ranges]
+            numbers = np.zeros(len(chosen) * columns, dtype=int)
+            for there in present:  # cells with the same arcs so far have the same number
+                numbers = np.unique(2 * numbers + there, return_inverse=True)[1]
+            labels = []
+            for cell in np.unique(numbers, return_index=True)[1]:
+                regime = _regime([arc for arc, there in zip(strip.arcs, present, strict=True) if there[cell]])
+                labels.append(regimes.setdefault(regime, len(regimes)))
+            cells[chosen] = np.array(labels)[numbers].reshape(len(chosen), columns)
         known = list(regimes)
         order = sorted(range(len(known)), key=lambda i: -np.count_nonzero(cells == i))
         return np.argsort(order)[cells], tuple(known[i] for i in order)

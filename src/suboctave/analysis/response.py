@@ -300,6 +300,10 @@ class ResponseCurve:
             shifted.append(self.join(y, u[-1]))
         return shifted
 
+    def unwrapped(self, u: Array, near: Array) -> Array:
+        """See `Curve.unwrapped`."""
+        return u
+
     def where(self, u: Array) -> str:
         """The free parameter's value in words."""
         return f"{self.name} = {u[-1]:.6g}"

@@ -255,6 +255,9 @@ class _Homotopy:
     def images(self, u: Array) -> list[Array]:
         return [u]
 
+    def unwrapped(self, u: Array, near: Array) -> Array:
+        return u
+
     def where(self, u: Array) -> str:
         return f"{u[-1]:.1%} of the element forces at {self.curve.name} = {self.value:.6g}"
 

@@ -324,6 +324,13 @@ class TrackedCurve:
             found.append(self.join(y, self.augmentation.shifted(extra, turn), parameters))
         return found
 
+    def unwrapped(self, u: Array, near: Array) -> Array:
+        """See `Curve.unwrapped`."""
+        own = slice(self.balance.dimension, -len(self.names))
+        moved = u.copy()
+        moved[own] = self.augmentation.unwrapped(u[own], near[own])
+        return moved
+
     def named(self, u: Array) -> dict[str, float]:
         """Values of the free parameters by name."""
         return dict(zip(self.names, u[-len(self.names) :].tolist(), strict=True))

@@ -112,6 +112,10 @@ class Augmentation(ABC):
         """Extra unknowns of the motion shifted in time, `x(tau + angle)`."""
         return extra
 
+    def unwrapped(self, extra: Array, near: Array) -> Array:
+        """Extra unknowns, periodic ones moved by whole periods next to others."""
+        return extra
+
     def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
         """Extra unknowns in a basis with other harmonics."""
         return extra
@@ -330,6 +334,10 @@ class GrazingContactEquations(Augmentation):
     def shifted(self, extra: Array, angle: float) -> Array:
         """See `Augmentation.shifted`."""
         return extra - angle
+
+    def unwrapped(self, extra: Array, near: Array) -> Array:
+        """See `Augmentation.unwrapped`: instants count modulo the period of the motion."""
+        return extra - 2.0 * math.pi * np.round((extra - near) / (2.0 * math.pi))
 
 
 class GrazingEquations(Equations):

@@ -78,6 +78,10 @@ class Extremal(Augmentation):
         """See `Augmentation.shifted`."""
         return self.base.shifted(extra, angle)
 
+    def unwrapped(self, extra: Array, near: Array) -> Array:
+        """See `Augmentation.unwrapped`."""
+        return self.base.unwrapped(extra, near)
+
     @abstractmethod
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> ExtremalEquations:
         """See `Augmentation.at`."""

@@ -31,11 +31,14 @@ class Place:
             return None
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
-        for i, image in enumerate(self._images[1]):
+        for i, turned in enumerate(self._images[1]):
+            image = new.curve.unwrapped(turned, point.u)
             if max(kernels.distance(image, point.u, w), kernels.distance(new.u, image, w)) > 1.5 * step:
                 continue
             from_point, to_new = w * (image - point.u), w * (new.u - image)
-            leaving = new.curve.images(new.curve.transfer(own.tangent, own.curve))[i]
+            # a shift in time turns the vector and, where there are instants among the unknowns, moves it
+            start, way = (new.curve.transfer(v, own.curve) for v in (own.u, own.tangent))
+            leaving = new.curve.images(start + way)[i] - turned
             ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
             same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
             if not (ahead and same_way):

@@ -67,6 +67,9 @@ class Curve(Protocol):
     def images(self, u: Array) -> list[Array]:
         """All vectors that stand for the same solution as u (u itself, and shifts in time where there are any)."""
 
+    def unwrapped(self, u: Array, near: Array) -> Array:
+        """The same u with periodic unknowns moved by whole periods next to those of `near`; where none is, u itself."""
+
     def where(self, u: Array) -> str:
         """A place on the curve in words, for messages: 'omega = 2.31'."""
 

@@ -68,6 +68,8 @@ class FindIsolas(FollowingStep):
         for i, level in enumerate(self.levels or ()):
             if level <= 0.0:
                 yield ("levels", i), f"is a level of the loads in units of their own, positive, not {level:g}"
+            if level == 1.0:
+                yield ("levels", i), "is that of the loads themselves, at which responses are followed anyway"
 
     def _check_places(self) -> Iterator[Complaint]:
         low, high = sorted(self.bounds)
