@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import suboctave as so
 from suboctave.study.commands import examples
@@ -15,6 +16,7 @@ ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 FIRST, LAST = TUTORIAL.split("## 5. ")
 LAST, BOUNDARIES = LAST.split("## 6. ")
+BOUNDARIES, LARGE = BOUNDARIES.split("## 7. ")
 CASCADE, SUBHARMONIC = LAST.split("### Sub-harmonics")
 
 
@@ -166,3 +168,18 @@ def test_the_housing_on_a_shaker(suboctave, tmp_path):
     assert first.omega == pytest.approx(high, rel=1e-9)
     assert last.omega == pytest.approx(low, rel=1e-9)
     assert sum(line.startswith(" LP") for line in out.splitlines()) == 2
+
+
+def test_its_large_model():
+    """The reduced system keeps the lowest natural frequencies of the whole one; elements act between its DOFs."""
+    (script,) = blocks("python", LARGE)
+    n = 60
+    stiffness = 1e4 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    scope = {"so": so, "scipy": scipy, "mass": np.eye(n), "damping": 1e-4 * stiffness, "stiffness": stiffness}
+    exec(compile(script, "docs/tutorial.md", "exec"), scope)
+    mass, _, held = scope["reduced"].matrices()
+    kept = 2.0e2 * np.sin(0.5 * np.pi * np.arange(1, 21) / (n + 1))
+    np.testing.assert_allclose(np.sqrt(scipy.linalg.eigh(held, mass)[0]), kept, rtol=1e-9)
+    element = scope["reduced"].elements[0]
+    shape = scope["modes"].T @ np.eye(n)[7]
+    assert element.direction(20) @ shape == pytest.approx((scope["modes"][7] - scope["modes"][4]) @ shape)

@@ -75,8 +75,9 @@ def check_unknowns(size: int, basis: HarmonicBasis) -> None:
     if unknowns > _DENSE_UNKNOWNS:
         raise InputError(
             f"{size} DOFs with {basis.harmonics // basis.nu} harmonics are {unknowns} unknowns with dense matrices, "
-            f"more than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model onto the DOFs that elements and "
-            "loads touch (linear=)"
+            f"more than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model before it becomes a System, for "
+            "example to its lowest modes P (n, m): System(P.T @ M @ P, P.T @ C @ P, P.T @ K @ P, ...), elements and "
+            "loads with direction=P[dof] in place of dof="
         )
 
 

@@ -13,11 +13,11 @@ import numpy as np
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.grazing_instants import extrema
 from suboctave.harmonic.local_force import LocalMotion
-from suboctave.harmonic.rates import coefficient_rates
+from suboctave.harmonic.rates import coefficient_rates, level_rates
 from suboctave.harmonic.state import BalanceState
 from suboctave.model.coupled import CoupledElement, as_coupled, reads
 from suboctave.model.element import BaseElement
-from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpSampling, told_levels
+from suboctave.model.sampling import CornerSampling, PiecewiseLinear, told_levels
 
 
 @dataclass(eq=False, slots=True)
@@ -72,10 +72,8 @@ def level_rate(state: BalanceState, element: int, index: int, name: str) -> floa
     kind = local.kind
     if isinstance(kind, PiecewiseLinear):
         return float(rates[kind.pieces[index].gap])
-    # what a sharp law tells of itself is the point alone: by differences, which are exact where a gap is a coefficient
-    ends = [local.element.sampling(local.coefficients + s * rates) for s in (-1e-3, 1e-3)]
-    points = [end.points[index] for end in ends if isinstance(end, SharpSampling | CornerSampling)]
-    return 500.0 * (points[1] - points[0]) if len(points) == 2 else 0.0
+    by_coefficient = level_rates(local.element, local.coefficients)
+    return float(by_coefficient[index] @ rates) if index < len(by_coefficient) else 0.0
 
 
 def contact_side(local: LocalMotion, index: int) -> int:

@@ -24,6 +24,7 @@ from suboctave.harmonic import instants, kernels
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.quadrature import FEWEST, Nodes, even, graded_nodes, search_grid, uniform_nodes
+from suboctave.harmonic.rates import coefficient_rates, level_rates
 from suboctave.lazy import lazy
 from suboctave.model.coupled import as_coupled
 from suboctave.model.element import BaseElement
@@ -236,20 +237,8 @@ class NodalForce:
 
     @lazy
     def _corner_rates(self) -> Array:
-        """Derivatives of the corners' places by the coefficients, (corners, nc); differences, exact for linear ones."""
-        rates = np.zeros((len(self.corner_rows), len(self.c)))
-        for i, value in enumerate(self.c):
-            h = 1e-3 * (abs(float(value)) or 1.0)
-            places = []
-            for share in (1.0, -1.0, 2.0, -2.0):
-                c = self.c.copy()
-                c[i] += share * h
-                kind = self.own.element.sampling(c)
-                assert isinstance(kind, CornerSampling)
-                places.append(np.array(kind.points + kind.velocities))
-            if len({len(place) for place in places}) == 1:
-                rates[:, i] = (8.0 * (places[0] - places[1]) - (places[2] - places[3])) / (12.0 * h)
-        return rates
+        """Derivatives of the corners' places by the coefficients, (corners, nc)."""
+        return level_rates(self.own.element, self.c)
 
     @lazy
     def _combs(self) -> list[Comb]:
@@ -385,7 +374,5 @@ def nodal_forces(
 
 def rates_of(own: OwnElement, values: Mapping[str, float], name: str) -> Array | None:
     """First change of an element's coefficients with a parameter, (nc,); None if there is none."""
-    from suboctave.harmonic.rates import coefficient_rates
-
     rates = coefficient_rates(own.element, values, {name: 1.0})
     return rates if rates.any() else None

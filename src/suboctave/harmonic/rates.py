@@ -20,6 +20,31 @@ def coefficient_rates(element: BaseElement, values: Mapping[str, float], rates: 
     return result
 
 
+def level_rates(element: BaseElement, c: Array) -> Array:
+    """Derivatives of the levels at which a law has corners or is sharp by its coefficients, (levels, nc).
+
+    Points before velocities. What a law says of itself are the levels alone, hence differences of fourth order in steps
+    of 1e-3 of a coefficient: exact for levels that are polynomials of it, to about 1e-12 else. Zero where the number of
+    levels changes.
+    """
+
+    def levels(at: Array) -> Array:
+        kind = element.sampling(at)
+        return np.array([*getattr(kind, "points", ()), *getattr(kind, "velocities", ())])
+
+    rates = np.zeros((len(levels(c)), len(c)))
+    for i, value in enumerate(c):
+        h = 1e-3 * (abs(float(value)) or 1.0)
+        near = []
+        for share in (1.0, -1.0, 2.0, -2.0):
+            moved = c.copy()
+            moved[i] += share * h
+            near.append(levels(moved))
+        if {len(there) for there in near} == {len(rates)}:
+            rates[:, i] = (8.0 * (near[0] - near[1]) - (near[2] - near[3])) / (12.0 * h)
+    return rates
+
+
 def coefficient_curvature(
     element: BaseElement, values: Mapping[str, float], a: Mapping[str, float], b: Mapping[str, float]
 ) -> Array:
