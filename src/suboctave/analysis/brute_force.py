@@ -374,7 +374,7 @@ def _spread(name: str, given: Any, count: int, positive: bool) -> Array:
         return np.linspace(min(first, last), max(first, last), count)
     try:
         array = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.zeros(0)
     if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (positive and (array <= 0.0).any()):
         what = "finite positive" if positive else "finite"

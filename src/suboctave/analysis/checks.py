@@ -132,7 +132,7 @@ def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, 
     """
     try:
         first, last = (float(b) for b in bounds)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}={bounds!r}: give two numbers, (from, to)") from None
     if not (math.isfinite(first) and math.isfinite(last)) or first == last:
         raise InputError(f"{name}=({first:g}, {last:g}): the range must have two different finite ends")

@@ -318,7 +318,7 @@ class _Follower:
         value = event.function(orbit_of(sample))
         try:
             number = float(value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             number = float("nan")
         if not np.isfinite(number):
             where = sample.point.curve.where(sample.point.u)

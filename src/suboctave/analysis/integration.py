@@ -225,7 +225,7 @@ def start_state(system: System, state: Any) -> Array:
             break
     try:
         array = np.array(state, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.zeros(0)
     if array.shape != (2 * system.n,) or not np.isfinite(array).all():
         raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")

@@ -145,7 +145,7 @@ def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
         return curve.join(given.basis.resized(given.coefficients, basis), value)
     try:
         array = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             "start must be a PeriodicOrbit, a point of a branch, a Bifurcation, a state (x, dx/dt) or coefficients, "
             f"not {type(given).__name__}{' (one of its .orbits?)' if hasattr(given, 'orbits') else ''}"

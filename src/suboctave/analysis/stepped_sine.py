@@ -243,7 +243,7 @@ def _frequencies(omega: Any, steps: int) -> Array:
         return np.linspace(min(first, last), max(first, last), check_count("steps", steps) + 1)
     try:
         array = np.asarray(omega, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.zeros(0)
     if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (array <= 0.0).any():
         raise InputError("omega: give a range (from, to), or an array of positive frequencies")
@@ -253,7 +253,7 @@ def _frequencies(omega: Any, steps: int) -> Array:
 def _multiples(harmonics: Sequence[float], measure: int) -> Array:
     try:
         array = np.atleast_1d(np.asarray(list(harmonics), dtype=float))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.array([np.nan])
     if not array.size or not np.isfinite(array).all() or (array < 0.0).any() or (array >= _SAMPLES / 4).any():
         raise InputError(f"harmonics must be multiples of omega from 0 to {_SAMPLES // 4 - 1}, not {harmonics!r}")

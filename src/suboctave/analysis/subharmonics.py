@@ -267,7 +267,7 @@ def periodic_orbit(
     check_system(system, (float(omega),))
     try:
         given = np.asarray(state, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         given = np.zeros(0)
     if given.shape != (2 * system.n,) or not np.isfinite(given).all():
         raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")

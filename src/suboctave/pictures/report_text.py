@@ -50,7 +50,7 @@ def finite(value: Any) -> bool:
     """Whether something is a finite number."""
     try:
         return math.isfinite(float(value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
 
 

@@ -229,7 +229,7 @@ def shown_multiple(multiple: float) -> str:
 def _check_limits(name: str, limits: Any) -> None:
     try:
         first, last = (float(value) for value in limits)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}={limits!r}: give two numbers, (from, to)") from None
     if not (math.isfinite(first) and math.isfinite(last) and first < last):
         raise InputError(f"{name}=({first:g}, {last:g}): two finite numbers, the smaller one first")
