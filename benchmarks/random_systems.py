@@ -4,7 +4,7 @@ Systems of one to four degrees of freedom are drawn from a seed: exact and round
 polynomial springs, quadratic dampers, parametric stiffness, gyroscopic damping, static loads and loads of several
 harmonics; one in five is symmetric. Each is followed at default options over a range of frequencies, and from its first
 period doubling the branch of twice the period as well. `shooting_judge.py` follows the same curves without a line of
-the package's; its answers lie in `data/random_systems.json` and are computed where they are missing (minutes).
+the package's; its answers lie in `tests/data/random_systems.json` and are computed where they are missing (minutes).
 
 Printed for each curve: the judge's events, those found, missed without a word, missed but said (an unsettled stretch
 names the place), added, verdicts that are wrong at points, unsettled stretches and warnings, and the largest distance of
@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 
 import suboctave as so
 
-ANSWERS = Path(__file__).with_name("data") / "random_systems.json"
+ANSWERS = Path(__file__).parents[1] / "tests" / "data" / "random_systems.json"
 #: distance in omega, relative to the width of the range, up to which an event is the judge's, beyond its uncertainty
 SAME = 2e-4
 #: difference of the motions at two events that are one, relative to the motion
@@ -73,6 +73,9 @@ def describe(seed: int) -> Description:
             {"kind": "parametric", "direction": np.eye(n)[0].tolist(), "stiffness": depth, "harmonic": harmonic}
             | {"phase": rng.uniform(0.0, 2.0 * np.pi)}
         )
+        # without it a parametric resonance may grow beyond all bounds
+        hardening = [0.0, 0.0, 0.1 * depth, 0.0, 0.0]
+        laws.append({"kind": "polynomial", "direction": np.eye(n)[0].tolist(), "coefficients": hardening})
     dof = int(rng.integers(n))
     loads = [{"dof": dof, "amplitude": rng.uniform(0.1, 0.8), "harmonic": 1, "phase": 0.0}]
     if rng.uniform() < 0.25:
@@ -188,9 +191,8 @@ class Answers:
         first, last = description["omega"]
         direction = float(np.sign(last - first)) if branch.nu == 1 else 1.0
         answer = shooting_judge.judged(description, orbit.start(), orbit.omega, direction, branch.nu, PATIENCE)
-        answer = {"question": question, **answer}
+        answer = {"question": question, "system": description, **answer}
         self.known[key] = answer
-        self.path.parent.mkdir(exist_ok=True)
         lines = ",\n".join(f'"{k}": {json.dumps(v)}' for k, v in sorted(self.known.items()))
         self.path.write_text("{\n" + lines + "\n}\n")
         return answer

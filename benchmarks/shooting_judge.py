@@ -211,15 +211,15 @@ def until(e, rate, tau, h, z, first, omega, minv, damping, stiffness, dirs, code
     fb = switch(e, new, k[12], omega, dirs, codes, pars)[index]
     if fa * fb >= 0.0:
         return h
-    side = 0
-    for _ in range(80):
+    side, c = 0, h
+    for count in range(80):
         c = b - fb * (b - a) / (fb - fa)
-        if not a < c < b:
+        if count % 6 == 5 or not a < c < b:
             c = 0.5 * (a + b)
         advance(tau, c, one, slope, omega, *system, k, work, stage, new)
         fc = switch(e, new, k[12], omega, dirs, codes, pars)[index]
-        if abs(fc) < 1e-15 or b - a < 1e-14:
-            return c
+        if abs(fc) < 1e-15 or b - a < 1e-13:
+            break
         if fc * fb > 0.0:
             b, fb = c, fc
             if side == -1:
@@ -230,7 +230,7 @@ def until(e, rate, tau, h, z, first, omega, minv, damping, stiffness, dirs, code
             if side == 1:
                 fb *= 0.5
             side = 1
-    return 0.5 * (a + b)
+    return c
 
 
 @njit(cache=True)
@@ -300,11 +300,15 @@ def flow(start, omega, periods, wide, minv, damping, stiffness, dirs, codes, par
         slope[:, :] = k[12]
         if which >= 0:
             modes[which] = -modes[which]
-            # several laws may change at once: the rate tells which side comes
-            for e in range(codes.shape[0]):
-                g, rate = switch(e, z, slope, omega, dirs, codes, pars)
-                if (codes[e] == STOP or codes[e] == DAMPER) and abs(g) < 1e-12 and abs(rate) > 1e-9:
-                    modes[e] = 1.0 if rate > 0.0 else -1.0
+        changed = which >= 0
+        # where a step ends on a change of several laws, or by chance, the rate tells which side comes
+        for e in range(codes.shape[0]):
+            g, rate = switch(e, z, slope, omega, dirs, codes, pars)
+            if (codes[e] == STOP or codes[e] == DAMPER) and abs(g) < 1e-12 and abs(rate) > 1e-9:
+                mode = 1.0 if rate > 0.0 else -1.0
+                changed = changed or mode != modes[e]
+                modes[e] = mode
+        if changed:
             field_of(tau, z, omega, *system, slope, work)
         for i in range(n):
             peaks[0] = max(peaks[0], abs(z[i, 0]))
@@ -441,14 +445,14 @@ class Judge:
         self.low, self.high = min(bounds), max(bounds)
         self.size = np.zeros(2)
         self.odd = 0.0
-        self.until = time.perf_counter() + seconds
+        self.until = time.process_time() + seconds
 
     # ------------------------------------------------------------------------------------------------------- solving
     def solve(self, y: np.ndarray, row: np.ndarray, value: float, along: np.ndarray, weights: np.ndarray) -> Point:
         """The motion with `row . (weights y) = value`, by Newton's method; its tangent has a positive product with
         `along`.
         """
-        if time.perf_counter() > self.until:
+        if time.process_time() > self.until:
             raise Failure("out of time")
         n2 = 2 * self.system.n
         last = math.inf
@@ -737,29 +741,38 @@ class Judge:
             return float(abs(upper[np.argmin(np.abs(upper - aim))]) - 1.0)
 
         low, high = 0.0, 1.0
-        flow_, fhigh = value(a, 0.0), value(b, 1.0)
-        best, side = (a if abs(flow_) < abs(fhigh) else b), 0
-        if flow_ * fhigh < 0.0:
-            for _ in range(60):
-                share = high - fhigh * (high - low) / (fhigh - flow_)
+        f_low, f_high = value(a, 0.0), value(b, 1.0)
+        best, size, side = (a, abs(f_low), 0) if abs(f_low) < abs(f_high) else (b, abs(f_high), 0)
+        for count in range(80 if f_low * f_high < 0.0 else 0):
+            # a function that jumps, or all but does, is halved
+            wanted = 0.5 * (low + high) if count % 4 == 3 else high - f_high * (high - low) / (f_high - f_low)
+            p = None
+            for share in (wanted, 0.5 * (low + high), 0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high):
                 if not low < share < high:
-                    share = 0.5 * (low + high)
+                    continue
                 try:
                     p = self.between(a, b, share)
+                    break
                 except ArithmeticError:
-                    break
-                f = value(p, share)
-                best = p
-                if abs(f) < 1e-13 or high - low < 1e-10:
-                    break
-                if f * fhigh > 0.0:
-                    high, fhigh = share, f
-                    flow_ *= 0.5 if side == -1 else 1.0
-                    side = -1
-                else:
-                    low, flow_ = share, f
-                    fhigh *= 0.5 if side == 1 else 1.0
-                    side = 1
+                    continue
+            if p is None:
+                break
+            f = value(p, share)
+            if abs(f) < size:
+                best, size = p, abs(f)
+            if abs(f) < 1e-13 or high - low < 1e-11:
+                break
+            if kind == "BP" and high - low < 2e-3:
+                # the equations are singular there: from either side instead
+                return self.beside(kind, a, b, low, high)
+            if f * f_high > 0.0:
+                high, f_high = share, f
+                f_low *= 0.5 if side == -1 else 1.0
+                side = -1
+            else:
+                low, f_low = share, f
+                f_high *= 0.5 if side == 1 else 1.0
+                side = 1
         target = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(kind)
         if target is None:
             assert members is not None
@@ -769,6 +782,32 @@ class Judge:
         else:
             multiplier = complex(best.mu[np.argmin(np.abs(best.mu - target))])
         return Found(kind, best.s, best, multiplier)
+
+    def beside(self, kind: str, a: Point, b: Point, low: float, high: float) -> Found:
+        """A branch point from the cubic through `prod (mu - 1)` at four motions, two on either side of it."""
+        middle, points, shares = 0.5 * (low + high), [], []
+        for way in (-0.02, -0.006, 0.006, 0.02):
+            share = min(1.0, max(0.0, middle + way))
+            try:
+                points.append(a if share == 0.0 else b if share == 1.0 else self.between(a, b, share))
+                shares.append(share)
+            except ArithmeticError:
+                continue
+        if len(points) < 2:
+            raise Failure(f"no motions beside the branch point at omega = {a.omega:.9g}")
+        f = np.array([p.product("fold") for p in points])
+        # where the curve turns back as well, the function has a double zero there and changes no sign
+        if f.min() * f.max() < 0.0:
+            order = np.argsort(f)
+            root = float(lagrange(f[order], np.array(shares)[order], np.zeros(1))[0])
+        else:
+            root = middle
+        y = np.array(
+            [lagrange(np.array(shares), column, np.array([root]))[0] for column in np.array([p.y for p in points]).T]
+        )
+        near = points[int(np.argmin(np.abs(np.array(shares) - root)))]
+        at = Point(y, near.weights, near.jac, near.mu, near.tangent, near.half, a.s + root * (b.s - a.s))
+        return Found(kind, at.s, at, complex(near.mu[np.argmin(np.abs(near.mu - 1.0))]))
 
 
 def pairs_of(mu: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 
@@ -26,8 +27,29 @@ class Unsettled:
     arclength: tuple[float, float]
     reason: str
 
+    @property
+    def length(self) -> float:
+        """Length in scaled arclength."""
+        return self.arclength[1] - self.arclength[0]
+
     def __str__(self) -> str:
         return f"between {self.parameter} = {self.first:.9g} and {self.last:.9g} {self.reason}"
+
+
+def joined(stretches: Iterable[Unsettled]) -> list[Unsettled]:
+    """Stretches in the order of the branch, those at one place as one: what overlaps, or lies no farther apart than the
+    longer of two is long.
+    """
+    result: list[Unsettled] = []
+    for item in sorted(stretches, key=lambda u: u.arclength):
+        last = result[-1] if result else None
+        if last is None or item.arclength[0] - last.arclength[1] > max(last.length, item.length):
+            result.append(item)
+            continue
+        reasons = last.reason if item.reason in last.reason else f"{last.reason}; {item.reason}"
+        end = max(last, item, key=lambda u: u.arclength[1])
+        result[-1] = replace(last, last=end.last, arclength=(last.arclength[0], end.arclength[1]), reason=reasons)
+    return result
 
 
 @dataclass(frozen=True)
@@ -91,4 +113,4 @@ class Audit:
         return text + "\n  ".join([f"{len(self.unsettled)} unsettled:", *map(str, self.unsettled)])
 
 
-__all__ = ["Audit", "Unsettled"]
+__all__ = ["Audit", "Unsettled", "joined"]

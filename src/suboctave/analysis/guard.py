@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from suboctave.analysis.audit import Audit, Unsettled
+from suboctave.analysis.audit import Audit, Unsettled, joined
 from suboctave.analysis.crossings import first_doubtful
 from suboctave.analysis.nearing import CUT, GRAZES, contacts_between
 from suboctave.analysis.response import ResponseCurve
@@ -94,7 +94,7 @@ class StepGuard:
     @property
     def audit(self) -> Audit:
         """What was examined so far."""
-        return Audit(self._finest, self._longest, self._probes, self._refused, tuple(_joined(self._unsettled)))
+        return Audit(self._finest, self._longest, self._probes, self._refused, tuple(joined(self._unsettled)))
 
     def refuses(self, old: Sample, new: Sample) -> bool:
         """True if a step has left its curve, or hides more than can be told while it is that long."""
@@ -302,19 +302,6 @@ def _unsettled(p: Sample, q: Sample, reason: str) -> Unsettled:
     a, b = p.point, q.point
     assert isinstance(a.curve, ResponseCurve)
     return Unsettled(a.curve.name, a.parameter, b.parameter, (a.arclength, b.arclength), reason)
-
-
-def _joined(items: list[Unsettled]) -> list[Unsettled]:
-    """Stretches that touch and are in doubt for the same reason are one."""
-    result: list[Unsettled] = []
-    for item in sorted(items, key=lambda u: u.arclength):
-        last = result[-1] if result else None
-        if last is not None and last.reason == item.reason and item.arclength[0] - last.arclength[1] < 2.0 * FINEST:
-            arclength = (last.arclength[0], item.arclength[1])
-            result[-1] = Unsettled(item.parameter, last.first, item.last, arclength, item.reason)
-        else:
-            result.append(item)
-    return result
 
 
 def _separating(samples: list[Sample]) -> list[Sample]:

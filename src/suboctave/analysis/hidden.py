@@ -12,14 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from suboctave.analysis.refine import guess_at
+from suboctave.analysis.refine import guess_at, solved_in
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import ALL_KINDS, Sample
 from suboctave.bifurcation.finder import Located, locate
 from suboctave.continuation import CurvePoint, NewtonOptions
-from suboctave.continuation.linear import length
-from suboctave.continuation.newton import correct
-from suboctave.continuation.point import make_point
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.selection import AdaptiveHarmonics, choose_harmonics, next_harmonics
@@ -86,7 +83,7 @@ def pair_in(
         balance = curve.with_basis(basis).balance.settle(x, present.omega, present.values)
         curve = curve.with_balance(balance)
         try:
-            first, middle, last = (_solved_in(curve, s, newton, make_sample) for s in samples)
+            first, middle, last = (solved_in(curve, s, newton, make_sample) for s in samples)
         except ConvergenceError:
             break
         samples = (first, middle, last)
@@ -108,17 +105,6 @@ def _wanted(found: list[tuple[Located, Sample, Sample]], options: AdaptiveHarmon
     states = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in found]
     bases = (choose_harmonics(state, options, options.event_tolerance) for state in states)
     return max(bases, key=lambda basis: basis.harmonics)
-
-
-def _solved_in(
-    curve: ResponseCurve, sample: Sample, newton: NewtonOptions, make_sample: Callable[[CurvePoint], Sample]
-) -> Sample:
-    """The same motion with other harmonics."""
-    point = sample.point
-    u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
-    weights = curve.weights(u, 0.0)
-    row = weights * along / length(weights * along)
-    return make_sample(make_point(correct(curve, u, row, weights, newton), curve, along, point.arclength))
 
 
 __all__ = ["REASON", "HiddenDoublings", "Stretch", "pair_in"]

@@ -107,7 +107,7 @@ def _written(method: StabilityMethod) -> str:
 
 def make_branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
     with one_thread():
-        trace = with_verdicts(replace(trace, warnings=trace.sentences, doubts=[]), settings.stability, name)
+        trace = with_verdicts(trace, settings.stability, name)
     context = {"system": system, "parameter": name, **options}
     bifurcations, events = (
         [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
@@ -122,7 +122,7 @@ def make_branch(system: System, name: str, trace: Trace, settings: Settings, opt
         trace.endings,
         settings.observe,
         options,
-        tuple(trace.warnings),
+        tuple(trace.sentences),
         trace.audit,
         None if trace.departs is None else Junction.of(trace.departs),
         None if trace.arrives is None else Junction.of(trace.arrives),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.branching import branching_equation
-from suboctave.bifurcation.finder import Located
+from suboctave.bifurcation.finder import Located, locate, position
 from suboctave.bifurcation.layer import (
     behind_grazing,
     grazing_beside,
@@ -18,8 +19,10 @@ from suboctave.bifurcation.layer import (
     unresolved,
 )
 from suboctave.bifurcation.solve import Guess, Singular
-from suboctave.continuation import CurvePoint
+from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
+from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -28,6 +31,8 @@ from suboctave.harmonic.state import BalanceState
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
+#: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
+_MOVED = 0.05
 #: slope of a branch in its parameter at a branch point, both scaled, below which it turns back there
 _STILL = 1e-5
 
@@ -69,7 +74,7 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
             contact=beside,
         )
     unit = curve.unit(located.sample.point.weights)
-    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit)
+    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
     return replace(found, tangent=_tangent(a, b, located.fraction, found)) if found.kind == "BP" else found
 
 
@@ -89,9 +94,12 @@ def solved_bifurcation(
     warnings: list[str],
     arclength: float = 0.0,
     size: float = 0.0,
+    neighbours: tuple[Sample, Sample] | None = None,
 ) -> Bifurcation:
-    """A solved bifurcation with the harmonics that events ask for, labelled; `size` as in `Guess`."""
-    solution, coarser = _refined(kind, solution, curve, warnings, size)
+    """A solved bifurcation with the harmonics that events ask for, labelled; `size` as in `Guess`; `neighbours`: the
+    samples it was located between.
+    """
+    solution, coarser = _refined(kind, solution, curve, warnings, size, neighbours)
     guess = _guess_from(solution, curve, size)
     state = solution.state
     layer = layer_of(kind, solution, guess)
@@ -158,7 +166,12 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
 
 
 def _refined(
-    kind: BifurcationKind, solution: Singular, curve: ResponseCurve, warnings: list[str], size: float
+    kind: BifurcationKind,
+    solution: Singular,
+    curve: ResponseCurve,
+    warnings: list[str],
+    size: float,
+    neighbours: tuple[Sample, Sample] | None,
 ) -> tuple[Singular, tuple[int, float] | None]:
     """Solved again with the harmonics that events ask for; with how many it was found before that, and where."""
     adaptive = curve.adaptive
@@ -183,6 +196,8 @@ def _refined(
         guess = replace(_guess_from(solution, curve, size), balance=balance, x=x)
         try:
             better = solve_or_behind(kind, guess)
+            if neighbours is not None:
+                better = _of_its_own(kind, better, curve.with_balance(balance), *neighbours)
         except ConvergenceError as failure:
             warnings.append(
                 f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
@@ -202,6 +217,40 @@ def _refined(
         state = _filled(solution.state, curve)
         solution = replace(solution, state=state, residual=max(solution.residual, _residual(state)))
     return solution, coarser
+
+
+def _of_its_own(kind: BifurcationKind, found: Singular, curve: ResponseCurve, a: Sample, b: Sample) -> Singular:
+    """What was solved for with more harmonics, if it still lies between two samples; else what lies between them with
+    these harmonics. Beside a young contact Newton's method may run to the next bifurcation of the kind.
+    """
+    value = found.state.omega if curve.name == "omega" else found.state.values[curve.name]
+    there = b.point.curve.transfer(curve.join(found.state.x, value), curve)
+    share = position(a.point, b.point, there)
+    if a is b or (share is not None and -_MOVED <= share <= 1.0 + _MOVED):
+        return found
+
+    def sample(point: CurvePoint) -> Sample:
+        assert isinstance(point.evaluation, ResponseEvaluation)
+        return Sample(point, point.evaluation.state, b.method)
+
+    newton = NewtonOptions()
+    try:
+        first, last = (solved_in(curve, s, newton, sample) for s in (a, b))
+    except ConvergenceError:
+        return found
+    located = locate(kind, first, last, newton, sample, guess_at) if kind.changed(first, last) else None
+    return found if located is None or located.solution is None else located.solution
+
+
+def solved_in(
+    curve: ResponseCurve, sample: Sample, newton: NewtonOptions, make_sample: Callable[[CurvePoint], Sample]
+) -> Sample:
+    """The same motion with other harmonics."""
+    point = sample.point
+    u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
+    weights = curve.weights(u, 0.0)
+    row = weights * along / length(weights * along)
+    return make_sample(make_point(correct(curve, u, row, weights, newton), curve, along, point.arclength))
 
 
 def _filled(state: BalanceState, curve: ResponseCurve) -> BalanceState:

@@ -16,6 +16,8 @@ from suboctave.stability import StabilityMethod
 
 __all__ = ["Doubt", "Settings", "Trace"]
 
+_REMEDY = "a smaller max_step or more harmonics may settle it, or shooting (so.verify)"
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -83,8 +85,8 @@ class Trace:
 
     @property
     def sentences(self) -> list[str]:
-        """Everything that is to be said of it."""
-        stretches = (f"{u}; a smaller max_step or more harmonics may settle it" for u in self.audit.unsettled)
+        """Everything that is to be said of it; each stretch in doubt in one."""
+        stretches = (f"{u}; {_REMEDY}" for u in self.audit.unsettled)
         return [*self.warnings, *(doubt.text for doubt in self.doubts), *stretches]
 
     def ends(self, ending: Ending) -> None:

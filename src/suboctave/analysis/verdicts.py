@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from suboctave.analysis.audit import Unsettled
+from suboctave.analysis.audit import Unsettled, joined
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.trace import Trace
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
@@ -60,17 +60,15 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         stretch = _between(probe, points, known, name)
         if stretch is not None and not any(_within(stretch, told) for told in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
-            notes.append(f"{stretch}; more harmonics may settle it")
     notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]
     notes += _replaced(points, method, name)
-    in_order = sorted((*trace.audit.unsettled, *unsettled), key=lambda stretch: stretch.arclength)
     return replace(
         trace,
         points=points,
         bifurcations=bifurcations,
         events=events,
         warnings=[*trace.warnings, *notes],
-        audit=replace(trace.audit, unsettled=tuple(in_order)),
+        audit=replace(trace.audit, unsettled=tuple(joined((*trace.audit.unsettled, *unsettled)))),
     )
 
 
@@ -214,7 +212,6 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
             f"stability is open: a multiplier, {worst} by {result.method}, lies within its error of the unit circle",
         )
         stretches.append(stretch)
-        notes.append(f"{stretch}; more harmonics may settle it, or shooting (so.verify)")
     return stretches, notes
 
 

@@ -1,0 +1,64 @@
+"""Systems that nobody chose, against an independent shooting continuation (`benchmarks/shooting_judge.py`).
+
+Its answers lie in `tests/data/random_systems.json`; `python benchmarks/random_systems.py --seeds 4,33` computes what is
+missing there, and prints the same comparison for as many systems as one likes.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.analysis.audit import Unsettled, joined
+
+
+@pytest.fixture(scope="module")
+def systems() -> ModuleType:
+    """The benchmark, as a module."""
+    path = Path(__file__).parents[2] / "benchmarks" / "random_systems.py"
+    spec = importlib.util.spec_from_file_location("random_systems", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def judged(systems: ModuleType, seed: int, nu: int = 1) -> dict[str, Any]:
+    """The judge's answer, which belongs to the system that the seed gives."""
+    answer: dict[str, Any] = systems.Answers().known[f"{seed}:{nu}T"]
+    assert answer["system"] == systems.describe(seed) and not answer["failure"]
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("seed", "reason"),
+    [
+        (4, "two real multipliers outside the circle meet, and cross it as a pair right behind a grazing"),
+        (33, "with more harmonics, Newton's method runs from a limit point behind a grazing to the one before it"),
+    ],
+)
+def test_no_event_is_missed_and_none_added(systems: ModuleType, seed: int, reason: str) -> None:
+    answer = judged(systems, seed)
+    branch = so.frequency_response(systems.system_of(answer["system"]), tuple(answer["system"]["omega"]))
+    row = systems.compare(answer, branch, abs(np.subtract(*answer["system"]["omega"])))
+    assert not (row.missed or row.said or row.added or row.wrong), reason
+    assert row.events == row.found and row.worst < 2e-6
+
+
+def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
+    def stretch(first: float, last: float, reason: str) -> Unsettled:
+        return Unsettled("omega", 1.0 + first, 1.0 + last, (first, last), reason)
+
+    near = [stretch(0.10, 0.11, "one"), stretch(0.115, 0.12, "other"), stretch(0.105, 0.118, "one")]
+    far = stretch(0.5, 0.51, "one")
+    both = joined([far, *near])
+    assert [u.arclength for u in both] == [(0.10, 0.12), (0.5, 0.51)]
+    assert both[0].reason == "one; other" and (both[0].first, both[0].last) == (1.10, 1.12)
