@@ -7,10 +7,10 @@ period doubling the branch of twice the period as well. `shooting_judge.py` foll
 the package's; its answers lie in `tests/data/random_systems.json` and are computed where they are missing (minutes).
 
 Printed for each curve: the judge's events, those found, missed without a word, missed but said (an unsettled stretch
-names the place), added, verdicts that are wrong at points, unsettled stretches and warnings, and the largest distance of
-an event from the judge's.
+names the place), added, verdicts that are wrong at points, unsettled stretches and warnings, and the largest distance
+of an event from the judge's, relative to omega.
 
-    python benchmarks/random_systems.py [--seeds 0:200] [--judge] [--verbose] [--no-doubled]
+    python benchmarks/random_systems.py [--seeds 0:200] [--doubled 4] [--verbose]
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import hashlib
 import json
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -302,7 +303,7 @@ def verdicts(
     if not pairs and total == 0 and not mine:
         stretches.append((0, -np.inf, np.inf))
     marks = [(-1, -1), *pairs, (total, len(mine))]
-    for (i, j), (k, l) in zip(marks, marks[1:], strict=False):
+    for (i, j), (k, l) in pairwise(marks):
         if k == i + 1 and l == j + 1 and i + 1 < len(counts):
             low = mine[j].arclength if j >= 0 else -np.inf
             high = mine[l].arclength if l < len(mine) else np.inf
@@ -312,11 +313,11 @@ def verdicts(
             continue
         for point in branch.points:
             near = min(abs(point.arclength - low), abs(point.arclength - high)) < 1e-4
-            if low < point.arclength < high and not near and point.floquet.decided:
-                if point.floquet.unstable != counts[index] and point.floquet.clearance > 1e-4:
-                    wrong.append(
-                        f"{point.floquet.unstable} unstable at omega = {point.orbit.omega:.7g}, judge {counts[index]}"
-                    )
+            said = not point.floquet.decided or point.floquet.clearance < 1e-4
+            if low < point.arclength < high and not (near or said) and point.floquet.unstable != counts[index]:
+                wrong.append(
+                    f"{point.floquet.unstable} unstable at omega = {point.orbit.omega:.7g}, judge {counts[index]}"
+                )
     return wrong
 
 

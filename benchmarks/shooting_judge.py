@@ -5,16 +5,17 @@ Nothing here is suboctave's. A system comes as plain numbers and lists (`System`
 
     dz/dtau = f(z, tau) / omega,    z = (x, dx/dt),    f = (v, M^-1 (p(tau) - C v - K x - sum_e d_e f_e)),
 
-with the variational equations `dPhi/dtau = f_z Phi / omega` and `dS/dtau = f_z S / omega - f / omega^2` beside them. They are
-integrated over the period by the Runge-Kutta pair of order 8(5,3) of Dormand and Prince with SciPy's table, relative
-tolerance 1e-11; a step ends where a contact begins or ceases to touch and where the velocity across a quadratic damper
-changes its sign (each step sees one smooth law), and at the turning points in between, so that no touch is stepped over.
+with the variational equations `dPhi/dtau = f_z Phi / omega` and `dS/dtau = f_z S / omega - f / omega^2` beside them.
+They are integrated over the period by the Runge-Kutta pair of order 8(5,3) of Dormand and Prince with SciPy's table,
+relative tolerance 1e-11 (`against_scipy` holds it against SciPy's own DOP853); a step ends where a contact begins or
+ceases to touch and where the velocity across a quadratic damper changes its sign, so that each sees one smooth law, and
+at the turning points in between, so that no touch is stepped over.
 
 A curve `z(T; z0, omega) = z0` is followed by pseudo-arclength steps, each so short that the tangent turns and the
 multipliers move little. Four functions are watched: the tangent's omega component (LP), the determinant bordered by the
-tangent (BP), `prod (mu + 1)` (PD), and the modulus of every complex pair, matched from point to point (NS). An interval is
-halved until what changes in it is one event, and until interpolation through the points beside it leaves no room for a
-pair of zeros; events are then solved for to 1e-10 of the interval.
+tangent (BP), `prod (mu + 1)` (PD), and the modulus of every complex pair, matched from point to point (NS). An interval
+is halved until what changes in it is one event, and until interpolation through the points beside it leaves no room for
+a pair of zeros; events are then solved for to 1e-11 of the interval.
 """
 
 from __future__ import annotations
@@ -844,8 +845,8 @@ def changes(a: Point, b: Point) -> list[tuple[str, tuple[complex, complex] | Non
 
 
 def may_vanish_twice(s: np.ndarray, f: np.ndarray, at: int) -> bool:
-    """Whether the interpolant through three or four points, believed up to twice its distance from those of lower order,
-    leaves room between s[at] and s[at + 1] for two zeros beyond those that the ends show.
+    """Whether the interpolant through three or four points, believed up to twice its distance from those of lower
+    order, leaves room between s[at] and s[at + 1] for two zeros beyond those that the ends show.
     """
     top = np.abs(f).max()
     if top == 0.0:

@@ -24,7 +24,8 @@ def systems() -> ModuleType:
     """The benchmark, as a module."""
     path = Path(__file__).parents[2] / "benchmarks" / "random_systems.py"
     spec = importlib.util.spec_from_file_location("random_systems", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
@@ -34,7 +35,8 @@ def systems() -> ModuleType:
 def judged(systems: ModuleType, seed: int, nu: int = 1) -> dict[str, Any]:
     """The judge's answer, which belongs to the system that the seed gives."""
     answer: dict[str, Any] = systems.Answers().known[f"{seed}:{nu}T"]
-    assert answer["system"] == systems.describe(seed) and not answer["failure"]
+    assert answer["system"] == systems.describe(seed)
+    assert not answer["failure"]
     return answer
 
 
@@ -49,8 +51,9 @@ def test_no_event_is_missed_and_none_added(systems: ModuleType, seed: int, reaso
     answer = judged(systems, seed)
     branch = so.frequency_response(systems.system_of(answer["system"]), tuple(answer["system"]["omega"]))
     row = systems.compare(answer, branch, abs(np.subtract(*answer["system"]["omega"])))
-    assert not (row.missed or row.said or row.added or row.wrong), reason
-    assert row.events == row.found and row.worst < 2e-6
+    assert [row.missed, row.said, row.added, row.wrong] == [[], [], [], []], reason
+    assert row.events == row.found
+    assert row.worst < 2e-6
 
 
 def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
@@ -61,4 +64,5 @@ def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
     far = stretch(0.5, 0.51, "one")
     both = joined([far, *near])
     assert [u.arclength for u in both] == [(0.10, 0.12), (0.5, 0.51)]
-    assert both[0].reason == "one; other" and (both[0].first, both[0].last) == (1.10, 1.12)
+    assert both[0].reason == "one; other"
+    assert (both[0].first, both[0].last) == (1.10, 1.12)
