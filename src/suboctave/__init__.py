@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     )
     from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
-    from suboctave.errors import ConvergenceError, InputError, SuboctaveError
+    from suboctave.errors import ConvergenceError, InputError, SuboctaveError, TimeLimitError
     from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
     from suboctave.model import (
         BaseAcceleration,
@@ -181,6 +181,7 @@ _HOME = {
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
+    "TimeLimitError": "suboctave.errors",
 }
 
 __all__ = [
@@ -237,6 +238,7 @@ __all__ = [
     "SuboctaveError",
     "System",
     "TanhFriction",
+    "TimeLimitError",
     "Trajectory",
     "TwoTrajectories",
     "__version__",

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import suboctave as so
+from suboctave import interruption
 from suboctave.analysis import diagram as diagram_module
 from suboctave.analysis.tree import DiagramBranch
 from suboctave.analysis.tree_text import tree_text
@@ -121,6 +122,32 @@ def test_ctrl_c_keeps_the_branches_that_are_there(strong):
     assert diagram.interrupted
     assert [branch.nu for branch in diagram.branches][:2] == [1, 2]
     assert diagram[1].branch.arrives is not None
+
+
+def test_a_time_limit_keeps_the_branches_that_are_there(strong, cascade, monkeypatch):
+    looks = iter(range(10**9))
+    monkeypatch.setattr(interruption, "monotonic", lambda: float(next(looks)))
+    so.bifurcation_diagram(strong, RANGE, depth=2, seconds=1e9, **COARSE)
+    whole = next(looks)
+    said = set()
+    for share in (0.2, 0.4, 0.6, 0.8, 0.95):
+        looks = iter(range(10**9))
+        diagram = so.bifurcation_diagram(strong, RANGE, depth=2, seconds=share * whole, **COARSE)
+        assert diagram.interruption == interruption.Interruption(share * whole)
+        assert diagram.stopped.startswith(f"the time limit of {share * whole:g} s was reached: ")
+        for part, full in zip(diagram.branches, cascade.branches, strict=False):
+            assert part.interrupted or np.array_equal(part.omega, full.omega)
+        said |= {len(diagram)}
+    assert len(said) > 1
+
+
+def test_a_file_holds_what_stopped_a_diagram(strong, monkeypatch, tmp_path):
+    looks = iter(range(10**9))
+    with monkeypatch.context() as patched:
+        patched.setattr(interruption, "monotonic", lambda: float(next(looks)))
+        diagram = so.bifurcation_diagram(strong, RANGE, depth=1, seconds=300, **COARSE)
+    again = so.load(diagram.save(tmp_path / "diagram.nc"))
+    assert again.interruption == diagram.interruption == interruption.Interruption(300.0)
 
 
 @pytest.fixture

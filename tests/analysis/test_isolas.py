@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import fsolve
 
 import suboctave as so
+from suboctave import interruption
 from suboctave.analysis import isola_survey
 from suboctave.analysis.identity import lies_on, mirrored
 from suboctave.analysis.isolas_found import Isolas
@@ -221,6 +222,57 @@ def test_a_budget_ends_it_politely():
     assert list(isolas) == []
     assert isolas.interruption == Interruption(1e-6)
     assert any("time limit of 1e-06 s" in note for note in isolas.notes)
+
+
+def test_a_closed_branch_that_was_interrupted_is_not_kept(isolas, monkeypatch):
+    (isola,) = isolas
+    value = 0.47
+    looks = iter(range(10**6))
+    with monkeypatch.context() as patched:
+        patched.setattr(interruption, "monotonic", lambda: float(next(looks)))
+        part = isola.at(value, seconds=60)
+    assert part.interruption == Interruption(60.0)
+    assert not part.closed
+    assert value not in isola.known
+    whole = isola.at(value)
+    assert whole.closed
+    assert len(whole) > len(part)
+    assert isola.at(value, seconds=1e-9) is whole  # what is known takes no time
+
+
+@pytest.mark.parametrize("share", [0.15, 0.4, 0.6, 0.7, 0.8, 0.97])
+def test_wherever_a_time_limit_falls_the_search_says_so(share, monkeypatch, looks_of_a_search):
+    looks = iter(range(10**9))
+    monkeypatch.setattr(interruption, "monotonic", lambda: float(next(looks)))
+    found = small_search(share * looks_of_a_search)
+    assert found.interruption == Interruption(share * looks_of_a_search)
+    assert any("the time limit of" in note for note in found.notes)
+    assert not any(branch.interrupted for isola in found for branch in isola.known.values())
+    assert not any(curve.interrupted for curve in (*found.limit_points, *found.doublings))
+
+
+def small_search(seconds=None):
+    spring = so.PolynomialSpring(0, {3: "k3"})
+    system = so.System(1.0, 0.05, 1.0, [spring], [so.HarmonicLoad(0, "F")], {"F": 1.0, "k3": 1.0})
+    return so.find_isolas(
+        system, (0.5, 3.0), "F", (0.2, 1.0), 3, values=2, depth=0, levels=(), search=(), seconds=seconds
+    )
+
+
+@pytest.fixture(scope="module")
+def looks_of_a_search():
+    """How often a search looks at the clock."""
+    count = 0
+
+    def clock():
+        nonlocal count
+        count += 1
+        return float(count)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(interruption, "monotonic", clock)
+        assert not small_search(1e9).interrupted
+    return count
 
 
 def test_ctrl_c_keeps_what_is_there():

@@ -204,7 +204,7 @@ class _Follower:
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
         sentences: list[str] = []
         item = bifurcation_at(located, a, b, self.settings.observe, sentences)
-        self.trace.doubts += [Doubt(item.kind, item.arclength, text) for text in sentences]
+        self.trace.doubts += [Doubt(item.orbit, text) for text in sentences]
         return item
 
     def _look_behind(self, passage: Passage) -> None:

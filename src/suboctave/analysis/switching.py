@@ -265,10 +265,8 @@ def leave_along(
     forward = follow(one, 0.0, bounds, settings)
     forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
-        turns = [b for b in forward.bifurcations if _is_turn(b, here)]
         met = [b for b in forward.bifurcations if not (same_event(b, here) or _is_turn(b, here))]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
-        forward.doubts = [d for d in forward.doubts if not any(d.concerns(turn) for turn in turns)]
         forward.settle_end(2.0 * _distance(one, u, curve))
         return forward
     back = follow(other, 0.0, bounds, settings)

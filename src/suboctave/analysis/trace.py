@@ -12,6 +12,7 @@ from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.formulation import BORDERED, Formulation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.stability import StabilityMethod
 
 __all__ = ["Doubt", "Settings", "Trace"]
@@ -43,15 +44,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class Doubt:
-    """What is in doubt of a bifurcation that was located: its kind, its arclength along the trace, and the sentence."""
+    """What is in doubt of a bifurcation that was located: the motion there, and the sentence."""
 
-    kind: str
-    arclength: float
+    orbit: PeriodicOrbit
     text: str
-
-    def concerns(self, item: Bifurcation) -> bool:
-        """Whether it is about a bifurcation."""
-        return (self.kind, self.arclength) == (item.kind, item.arclength)
 
 
 @dataclass
@@ -85,9 +81,13 @@ class Trace:
 
     @property
     def sentences(self) -> list[str]:
-        """Everything that is to be said of it; each stretch in doubt in one."""
+        """Everything that is to be said of it, each stretch in doubt in one; doubts of the bifurcations that are listed in
+        the end.
+        """
+        listed = {id(item.orbit) for item in self.bifurcations}
+        doubts = (doubt.text for doubt in self.doubts if id(doubt.orbit) in listed)
         stretches = (f"{u}; {_REMEDY}" for u in self.audit.unsettled)
-        return [*self.warnings, *(doubt.text for doubt in self.doubts), *stretches]
+        return [*self.warnings, *doubts, *stretches]
 
     def ends(self, ending: Ending) -> None:
         """Why it ends at its last point."""
@@ -109,15 +109,13 @@ class Trace:
         # an event right at the start that both share was met by both
         seam = set() if gap is not None else {event.kind for event in self.events if event.arclength == 0.0}
         events = [event for event in other.events if not (event.arclength == 0.0 and event.kind in seam)]
-        doubts = [replace(d, arclength=whole - d.arclength) for d in self.doubts]
-        doubts += [replace(d, arclength=start + d.arclength) for d in other.doubts]
         return Trace(
             walked(self.points, other.points[1:] if gap is None else other.points),
             walked(self.open, other.open),
             joined(self.bifurcations, other.bifurcations),
             joined(self.events, events),
             self.warnings + other.warnings,
-            doubts,
+            self.doubts + other.doubts,
             self.audit.reversed_before(other.audit, whole, gap or 0.0),
             other.closed,
             (self.endings[1], other.endings[1]),
@@ -136,7 +134,6 @@ class Trace:
         for items in (self.bifurcations, self.events):
             items[:] = [b for b in items if b.arclength <= end]
         self.open = [p for p in self.open if p.arclength <= end]
-        self.doubts = [d for d in self.doubts if d.arclength <= end]
 
     def end_at(self, item: Bifurcation) -> None:
         """Drop what lies behind a bifurcation, which the trace arrives at."""
