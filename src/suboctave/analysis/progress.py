@@ -91,20 +91,42 @@ def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     if progress is None or progress is False:
         yield None
     elif progress is True:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        console = Console(stderr=True)
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[where]}"),
-            TimeElapsedColumn(),
-        )
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-            task = bar.add_task(title, total=1.0, where="")
-            yield lambda share, where: bar.update(task, completed=share, where=where)
+        with bar(title) as report:
+            yield report
     elif callable(progress):
         yield progress
     else:
         raise InputError(f"progress must be None, True or a callable taking (share, text), not {progress!r}")
+
+
+@contextmanager
+def bar(title: str) -> Iterator[Report]:
+    """A bar on standard error with the text in a line below it, gone afterwards; silent where nobody watches."""
+    from rich.console import Console, RenderableType
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.text import Text
+
+    class Lines(Progress):
+        def get_renderables(self) -> Iterator[RenderableType]:
+            """The bars, then what each has to say."""
+            yield self.make_tasks_table(self.tasks)
+            for task in self.tasks:
+                yield Text(str(task.fields["where"]), overflow="ellipsis", no_wrap=True)
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=28),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Lines(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
+        task = shown.add_task(title, total=1.0, where="")
+        furthest = 0.0
+
+        def report(share: float, where: str = "") -> None:
+            nonlocal furthest  # what is done in several parts begins each of them anew; a bar does not
+            furthest = max(furthest, share)
+            shown.update(task, completed=furthest, where=where)
+
+        yield report

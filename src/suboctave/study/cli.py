@@ -170,8 +170,9 @@ def application() -> "typer.Typer":
 
 def run_demo(out: Path, json_wanted: bool = False) -> None:
     """The demonstration: three response curves, a table of their bifurcations on stdout, figures in `out`."""
+    from suboctave.analysis.progress import bar
     from suboctave.study import demo
-    from suboctave.study.screen import bar, console
+    from suboctave.study.screen import console
 
     out.mkdir(parents=True, exist_ok=True)  # before the work: a folder that cannot be made is known now
     screen = console(quiet=json_wanted)

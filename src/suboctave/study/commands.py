@@ -13,6 +13,7 @@ import numpy as np
 
 from suboctave.analysis import BifurcationDiagram, Isola, Isolas, Results, Table, load
 from suboctave.analysis.isola_tables import isola_row
+from suboctave.analysis.progress import bar
 from suboctave.analysis.results import Result
 from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
@@ -22,7 +23,7 @@ from suboctave.study.demo import significant
 from suboctave.study.file import Study, read_study
 from suboctave.study.keeping import recovered
 from suboctave.study.runner import JOURNAL, Finished, Outcome, run_study
-from suboctave.study.screen import bar, console, print_result, print_texts
+from suboctave.study.screen import console, print_result, print_texts
 from suboctave.study.steps import Step
 
 __all__ = ["check", "examples", "new", "run", "show"]

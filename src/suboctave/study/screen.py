@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = [
-    "bar",
     "console",
     "print_branch",
     "print_diagram",
@@ -46,34 +44,6 @@ def console(quiet: bool = False) -> Console:
     from rich.console import Console
 
     return Console(highlight=False, width=min(WIDTH, Console().width), quiet=quiet)
-
-
-@contextmanager
-def bar(name: str) -> Iterator[Callable[[float, str], None]]:
-    """A bar on stderr while something is computed, gone afterwards; silent where nobody watches."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    errors = Console(stderr=True)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=28),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[text]}"),
-        console=errors,
-        transient=True,
-        disable=not errors.is_terminal,
-    ) as shown:
-        task = shown.add_task(_cut(name, 20), total=1.0, text="")
-        furthest = 0.0
-
-        def report(fraction: float, text: str = "") -> None:
-            nonlocal furthest  # a curve that folds back runs through its range again; a bar does not
-            furthest = max(furthest, fraction)
-            shown.update(task, completed=furthest, text=_cut(text, 22))
-
-        yield report
 
 
 def print_events(
@@ -245,10 +215,6 @@ def _number(value: Any) -> str:
     if isinstance(value, int | np.integer):
         return str(value)
     return f"{value:.7g}" if abs(value) >= 1e-3 or value == 0.0 else f"{value:.1e}"
-
-
-def _cut(text: str, width: int) -> str:
-    return text if len(text) <= width else text[: width - 1] + "…"
 
 
 def _escaped(text: str) -> str:
