@@ -105,7 +105,6 @@ class Survey:
     def look(self, value: float) -> None:
         """Follow responses at a value and what bifurcates from them; limit points and doublings over the parameter."""
         for branch, level in self._branches(value):
-            pass_on(branch.interruption)
             if level < self.depth:
                 for item in branch.bifurcations["PD"]:
                     self.doubling(item, value)
@@ -121,11 +120,11 @@ class Survey:
             except ConvergenceError as failure:
                 self.note(f"at {self.name} = {value:.6g}: {failure}")
                 continue
+            pass_on(diagram.interruption)
             for node in diagram:
                 yield node.branch, node.depth
                 for item, why in node.failures:
                     self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
-            pass_on(diagram.interruption)
             root = diagram.root.branch
             if len(root) and root.points[-1].orbit.omega == ends[1]:
                 return

@@ -122,13 +122,12 @@ def _responses(found: Slice, atlas: Atlas, depth: int) -> Iterator[Branch]:
         except ConvergenceError as failure:
             atlas.note(f"at {atlas.name} = {value:.6g}: {failure}")
             continue
+        pass_on(diagram.interruption)
         for node in diagram:
             for item, why in node.failures:
                 atlas.note(f"at {atlas.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
-            pass_on(node.branch.interruption)
             if len(node.branch) and not any(same_branch(node.branch, other) for other in known):
                 yield node.branch
-        pass_on(diagram.interruption)
         root = diagram.root.branch
         known += diagram.branches
         if len(root) and root.points[-1].orbit.omega == ends[1]:
@@ -166,12 +165,12 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
             continue
         detached = one.closed and one.departs is None and one.arrives is None
         diagram = grown_from(one, levels, atlas.options)
+        pass_on(diagram.interruption)
         for node in diagram:
             for item, why in node.failures:
                 atlas.note(f"at {atlas.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
             if not any(same_branch(node.branch, other) for other, _ in found.branches):
                 yield node.branch, detached
-        pass_on(diagram.interruption)
 
 
 def introduce(branch: Branch, value: float, atlas: Atlas) -> None:
