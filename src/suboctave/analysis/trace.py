@@ -81,7 +81,7 @@ class Trace:
 
     @property
     def sentences(self) -> list[str]:
-        """Everything that is to be said of it: a stretch in doubt in one line, doubts of bifurcations that are listed."""
+        """What is to be said of it: a stretch in doubt in one line, doubts of bifurcations that are listed."""
         listed = {id(item.orbit) for item in self.bifurcations}
         doubts = (doubt.text for doubt in self.doubts if id(doubt.orbit) in listed)
         stretches = (f"{u}; {_REMEDY}" for u in self.audit.unsettled)
