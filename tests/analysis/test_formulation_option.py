@@ -155,7 +155,7 @@ def test_the_count_takes_what_is_accounted_for_elsewhere(two):
     for unseen in (False, True):
         check = CountCheck()
         assert check.complaint(ends[0], []) is None
-        assert (check.complaint(ends[1], [], unseen) is None) is unseen
+        assert (check.complaint(ends[1], ["PD"] * unseen) is None) is unseen
 
 
 class _Sample:

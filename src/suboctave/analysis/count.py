@@ -19,13 +19,13 @@ class CountCheck:
         """A bifurcation that belongs to no step."""
         self._since.append(item.kind)
 
-    def complaint(
-        self, sample: Sample, found: list[Bifurcation], unseen: bool = False
-    ) -> tuple[Sample, Sample, str] | None:
+    def complaint(self, sample: Sample, kinds: list[str]) -> tuple[Sample, Sample, str] | None:
         """From where to where, and a sentence, if the count has changed by what the bifurcations since the last clear
-        sample do not explain; `unseen`: a period doubling, too, which is accounted for elsewhere.
+        sample do not explain.
+
+        kinds: those met on the way to the sample, and those whose tests have changed and that are in doubt already.
         """
-        self._since += [item.kind for item in found] + ["PD"] * unseen
+        self._since += kinds
         if not sample.floquet.decided or sample.floquet.clearance < _NEAR_CIRCLE:
             return None
         last, kinds = self._last, self._since

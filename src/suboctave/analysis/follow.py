@@ -10,7 +10,7 @@ import numpy as np
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.count import CountCheck
 from suboctave.analysis.doublings import DoublingWatch
-from suboctave.analysis.guard import Passage, StepGuard
+from suboctave.analysis.guard import Crossing, Passage, StepGuard
 from suboctave.analysis.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.analysis.identity import relation
 from suboctave.analysis.junction import UNSEEN, Meeting, meeting
@@ -22,6 +22,7 @@ from suboctave.bifurcation.finder import Located, locate, locate_near
 from suboctave.bifurcation.grazing import locate_grazings, touches
 from suboctave.bifurcation.kinds import BRANCH_POINT, PERIOD_DOUBLING, changes, solved_by
 from suboctave.bifurcation.layer import behind_their_grazings
+from suboctave.bifurcation.measures import fold
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending
 from suboctave.continuation.events import locate_zero
@@ -32,14 +33,13 @@ from suboctave.continuation.point import make_point, point_between
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import Interruption
 
-#: a limit point closer to a branch point than this, in scaled arclength, is the branch point
-_APART = 1e-5
 #: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
 _NOTHING = 1e-12
 _NOT_FOUND = {
     "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
     "LP": "the branch turns back, but its limit point could not be located",
     "PD": "a multiplier passes -1, but no period doubling could be located",
+    "NS": "a pair of multipliers passes the unit circle, but no Neimark-Sacker point could be located",
 }
 
 
@@ -55,7 +55,8 @@ class _Follower:
         self.trace = Trace()
         self.previous: Sample | None = None
         self._candidate: Sample | None = None
-        self._guard = StepGuard(self._between, lambda a, b: self._located(BRANCH_POINT, a, b) is not None)
+        self._guard = StepGuard(self._between, self._crossing)
+        self._crossings: list[Crossing] = []
         self._again: tuple[Sample, ResponseCurve, Sample] | None = None
         self._count = CountCheck()
         self._hidden = HiddenDoublings()
@@ -160,9 +161,22 @@ class _Follower:
             self._again = known = (sample, curve, again)
         return known[2]
 
-    def _between(self, a: Sample, b: Sample, fraction: float) -> Sample:
+    def _between(self, a: Sample, b: Sample, fraction: float, exactly: bool) -> Sample:
         """The motion at a fraction of the way between two neighbours."""
-        return self._sample(point_between(a.point, b.point, fraction, self.settings.newton))
+        return self._sample(point_between(a.point, b.point, fraction, self.settings.newton, exactly))
+
+    def _crossing(self, a: Sample, b: Sample) -> Crossing | None:
+        """The branch point between two samples of different orientation, if its system can be solved."""
+        known = next((crossing for crossing in self._crossings if crossing.between(a, b)), None)
+        if known is not None:
+            return known
+        located = self._located(BRANCH_POINT, a, b)
+        if located is None or located.solution is None:
+            return None
+        place = a.place + located.fraction * (b.place - a.place)
+        if not turns_at(located, a, b):
+            return Crossing(place, located, None)
+        return Crossing(place, located, fold(self.settings.stability.along(located.solution.state).multipliers))
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
@@ -179,13 +193,14 @@ class _Follower:
                     self._search_here(self.previous, again)
                     self.previous = again
                 passage = self._guard.passage(again, sample)
-                passed = passage.samples
+                passed, self._crossings = passage.samples, passage.crossings
         for new in passed:
             if self.previous is not None:
                 self._search(self.previous, new)
             where = new.point
             self.trace.points.append(BranchPoint(orbit_of(new), new.floquet, where.arclength, where.iterations))
             self.previous = new
+        self._crossings = []
         if passage is not None:
             self._look_behind(passage)
         self._report(point)
@@ -201,21 +216,22 @@ class _Follower:
         where = curve.where(point.u)
         self.settings.report.at(point.parameter, where, len(trace.points), located, basis.harmonics // basis.nu)
 
-    def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation:
+    def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation | None:
         sentences: list[str] = []
         item = bifurcation_at(located, a, b, self.settings.observe, sentences)
-        self.trace.doubts += [Doubt(item.orbit, text) for text in sentences]
+        if item is not None:
+            self.trace.doubts += [Doubt(item.orbit, text) for text in sentences]
         return item
 
     def _look_behind(self, passage: Passage) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
         for stretch in self._hidden.passed(passage.inside):
             found = [] if self._watch else pair_in(stretch, self.settings.newton, self._sample)
-            for located, a, b in found:
-                item = self._bifurcation(located, a, b)
+            items = [item for entry in found if (item := self._bifurcation(*entry)) is not None]
+            for item in items:
                 if self._insert(item):
                     self._count.noted(item)
-            if len(found) < 2:
+            if len(items) < 2:
                 self._guard.doubt(stretch.before, stretch.behind, REASON)
         self.trace.open += [
             BranchPoint(orbit_of(s), s.floquet, s.point.arclength, s.point.iterations)
@@ -232,10 +248,14 @@ class _Follower:
             return
         points = self.trace.points
         reach = points[-1].arclength - points[-2].arclength if len(points) > 1 else self.settings.stepping.initial_step
+        turned = False
         for kind in kinds:
+            if kind.name == "LP" and turned:
+                continue
             located = locate_near(kind, again, reach, guess_at)
-            if located is not None:
-                item = self._bifurcation(located, again, again)
+            item = None if located is None else self._bifurcation(located, again, again)
+            if located is not None and item is not None:
+                turned = turned or (kind is BRANCH_POINT and turns_at(located, again, again))
                 if not any(same_event(item, known) for known in self.trace.bifurcations[-4:]):
                     self.trace.bifurcations.append(item)
                     self._count.noted(item)
@@ -244,30 +264,38 @@ class _Follower:
 
     def _search(self, a: Sample, b: Sample) -> None:
         found: list[tuple[float, Bifurcation]] = []
-        branch_point: Located | None = None
+        missing: list[str] = []
+        turned: Bifurcation | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
         resting = a.at_rest or b.at_rest
         for kind in () if resting else self._changes(a, b):
-            located = self._located(kind, a, b)
-            if kind is BRANCH_POINT:
-                branch_point = located
-            if kind.name == "LP" and branch_point is not None:
-                # at a pitchfork the bifurcating branch turns back exactly at the branch point
-                size = b.point.arclength - a.point.arclength
-                near = located is None or size * abs(located.fraction - branch_point.fraction) < _APART
-                if near or turns_at(branch_point, a, b):
-                    self._turned = found[0][1]
-                    continue
-            if located is None:
-                if kind.name != "NS":  # several real multipliers may pass for a pair: the count tells
-                    self._guard.doubt(a, b, _NOT_FOUND[kind.name])
+            if kind.name == "LP" and turned is not None:
+                self._turned = turned
                 continue
-            found.append((located.fraction, self._bifurcation(located, a, b)))
-        known = [item for _, item in found]
-        complaint = self._count.complaint(b, known, unseen=self._watch is not None and PERIOD_DOUBLING.changed(a, b))
+            crossing = self._crossing(a, b) if kind is BRANCH_POINT else None
+            located = crossing.within(a, b) if crossing is not None else self._located(kind, a, b)
+            item = None if located is None else self._bifurcation(located, a, b)
+            if located is None or item is None:
+                # several real multipliers may pass for a pair: the count tells
+                if located is not None or kind.name != "NS":
+                    missing.append(kind.name)
+                continue
+            found.append((located.fraction, item))
+            if crossing is not None and crossing.turns:
+                # at a pitchfork the bifurcating branch turns back exactly at the branch point
+                turned = item
+        if "BP" in missing and "LP" in missing:
+            # across a jump between branches the slope means nothing
+            missing.remove("LP")
+        if missing:
+            self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
+        unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
+        complaint = self._count.complaint(b, [item.kind for _, item in found] + missing + unseen)
         if not resting and self._guard.grazes(a, b):
             for touched in locate_grazings(a, b, self.settings.newton, self._sample, guess_at):
-                found.append((touched.fraction, self._bifurcation(touched, a, b)))
+                item = self._bifurcation(touched, a, b)
+                if item is not None:
+                    found.append((touched.fraction, item))
         if complaint is not None:
             self._guard.doubt(*complaint)
         if found:
@@ -277,7 +305,11 @@ class _Follower:
             self.trace.bifurcations += behind_their_grazings(fresh)
         if self._watch is not None and not resting:
             for located, p, q in self._watch.passed(a, b):
-                self._insert(self._bifurcation(located, p, q))
+                item = self._bifurcation(located, p, q)
+                if item is None:
+                    self._guard.doubt(p, q, _NOT_FOUND["PD"])
+                else:
+                    self._insert(item)
             self._say_missed()
         for event in self.settings.events:
             crossed = self._event(event, a, b)

@@ -10,15 +10,20 @@ Two events inside one step cancel in every test at its ends. A step is therefore
   which no interpolation across it foretells;
 - no multiplier of modulus above one half moves further than MOVEMENT (a fast rotation may look like none).
 
-Otherwise a motion is solved for where the doubt is largest, and its two halves are looked at. A step whose interior is
-not where its two ends say has jumped from one curve to another that passes close by, as has one across which the
-orientation of the curve changes without a branch point: it is refused and halved by the engine.
+Otherwise a motion is solved for where the doubt is largest, and its two halves are looked at. A branch point in the
+step is located first. Where the curve turns back exactly there (the unsymmetric motions of a pitchfork, mirror images
+of each other on either side of it), turn is odd and fold even in the way s from it: turn / s and (fold - fold_BP) / s^2
+show whatever else there is, and no motion is solved for where the equations are almost singular.
+
+A step whose interior is not where its two ends say has jumped from one curve to another that passes close by, as has
+one across which the orientation of the curve changes without a branch point: it is refused and halved by the engine.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -28,11 +33,13 @@ from suboctave.analysis.crossings import first_doubtful
 from suboctave.analysis.nearing import CUT, GRAZES, contacts_between
 from suboctave.analysis.response import ResponseCurve
 from suboctave.bifurcation import Sample
+from suboctave.bifurcation.finder import Located
 from suboctave.bifurcation.kinds import BRANCH_POINT, NEIMARK_SACKER, changes
 from suboctave.compiled import kernel
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
+from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
@@ -45,24 +52,53 @@ _REMEMBERED = 64
 MOVEMENT = 0.5
 #: intervals shorter than this are not cut because a contact grazes in them
 _LAYER = 1e-3
-#: intervals shorter than this are not cut for the multipliers' movement
+#: intervals shorter than this are not cut for the multipliers' movement, nor for that at +1 beside a branch point
 _EXAMINED = 0.01
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
 #: a step belongs to one curve if its middle lies within this share of its length from where its ends say
 _AWAY = 0.03
+#: distance from a branch point, as a share of an interval, from which on one cuts it
+_CLEAR = 0.1
 #: the ends say so themselves if chord and tangents agree to this share of the length
 _AGREE = 0.03
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A branch point of a curve and its arclength.
+
+    turned: fold at it, where the curve turns back in its parameter exactly there; else None. The double zero of fold
+    lies as far from there as the harmonics left out make it.
+    """
+
+    place: float
+    located: Located
+    turned: float | None
+
+    @property
+    def turns(self) -> bool:
+        """Whether the curve turns back in its parameter exactly there."""
+        return self.turned is not None
+
+    def between(self, a: Sample, b: Sample) -> bool:
+        """Whether it lies between two samples."""
+        return a.place <= self.place <= b.place
+
+    def within(self, a: Sample, b: Sample) -> Located:
+        """It as located between two samples."""
+        return replace(self.located, fraction=(self.place - a.place) / (b.place - a.place))
 
 
 @dataclass
 class Passage:
     """An examined step: the samples that separate its events, its end included, all that were looked at, both ends
-    included, and what stayed in doubt.
+    included, the branch points between them, and what stayed in doubt.
     """
 
     samples: list[Sample]
     inside: list[Sample]
+    crossings: list[Crossing]
     unsettled: list[Unsettled] = field(default_factory=list)
 
 
@@ -72,18 +108,19 @@ class StepGuard:
     Parameters
     ----------
     solve
-        Gives the sample at a fraction of the way between two neighbours; may raise ConvergenceError.
-    is_branch_point
-        Whether a change of orientation between two samples is a branch point.
+        Gives the sample at a fraction of the way between two neighbours, about as exactly as rounding allows where that
+        is asked for; may raise ConvergenceError.
+    branch_point
+        The branch point between two samples of different orientation, None if there is none.
     """
 
     def __init__(
         self,
-        solve: Callable[[Sample, Sample, float], Sample],
-        is_branch_point: Callable[[Sample, Sample], bool],
+        solve: Callable[[Sample, Sample, float, bool], Sample],
+        branch_point: Callable[[Sample, Sample], Crossing | None],
     ) -> None:
         self._solve = solve
-        self._is_branch_point = is_branch_point
+        self._branch_point = branch_point
         self._behind: list[Sample] = []
         self._probes = self._refused = 0
         self._finest, self._longest = np.inf, 0.0
@@ -115,7 +152,7 @@ class StepGuard:
             kept = set(self._behind)
             self._contacts = {pair: known for pair, known in self._contacts.items() if kept.issuperset(pair)}
         inside = step.inside
-        return Passage(_separating(inside), inside, step.unsettled)
+        return Passage(_separating(inside), inside, step.crossings, step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""
@@ -141,7 +178,7 @@ class StepGuard:
             # the last one may have been solved again with other harmonics
             behind = [s for s in self._behind if s.place < old.place]
             behind.append(old)
-            self._last = (old, new, _Step(behind, new, self._solve, self._is_branch_point, self._between))
+            self._last = (old, new, _Step(behind, new, self._solve, self._branch_point, self._between))
         return self._last[2]
 
 
@@ -152,14 +189,16 @@ class _Step:
         self,
         behind: list[Sample],
         new: Sample,
-        solve: Callable[[Sample, Sample, float], Sample],
-        is_branch_point: Callable[[Sample, Sample], bool],
+        solve: Callable[[Sample, Sample, float, bool], Sample],
+        branch_point: Callable[[Sample, Sample], Crossing | None],
         contacts: Callable[[Sample, Sample], int],
     ) -> None:
         self.contacts = contacts
         self.samples = [*behind, new]
         self.old, self.new, self.first = behind[-1], new, len(behind) - 1
         self.solve = solve
+        self.branch_point = branch_point
+        self.crossings: list[Crossing] = []
         self.size = new.place - self.old.place
         self.probes = 0
         self.refused = False
@@ -169,8 +208,7 @@ class _Step:
         # a step may be short already
         least = min(FINEST, self.size / 30.0)
         if self.size > _JUMP:
-            # along one branch the orientation changes at branch points only
-            self.refused = BRANCH_POINT.changed(self.old, new) and not is_branch_point(self.old, new)
+            self._look_for_crossing(self.old, new)
             if not self.refused and self.size > FINEST and _disagreement(self.old.point, new.point) > _AGREE:
                 pending = self._cut(self.old, new, 0.5)
         while pending and not self.refused:
@@ -182,7 +220,7 @@ class _Step:
             share, reason = doubt
             if q.place - p.place <= least:
                 self.settled.append(q.place - p.place)
-                if not changes(p, q) and not (reason in _REASONS[1:] and _open(p, q)):
+                if reason == _BESIDE or (not changes(p, q) and not (reason in _REASONS[1:] and _open(p, q))):
                     # no event, but too close to one to tell it from two; open verdicts are stated as such
                     self.unsettled.append(_unsettled(p, q, reason))
                 continue
@@ -199,11 +237,16 @@ class _Step:
     def _cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
         """The two parts of an interval, the second first; none if there is no motion where the curve should be."""
         a, b = self.old.point, self.new.point
-        place = p.place + share * (q.place - p.place)
+        h = q.place - p.place
+        for crossing in self.crossings:
+            at = (crossing.place - p.place) / h
+            if abs(share - at) < _CLEAR:
+                share = at + math.copysign(2.0 * _CLEAR, 0.5 - at)
+        place = p.place + share * h
         fraction = (place - a.arclength) / self.size
         self.probes += 1
         try:
-            sample = self.solve(self.old, self.new, fraction)
+            sample = self.solve(self.old, self.new, fraction, bool(self.crossings))
         except ConvergenceError:
             self.refused = self.size > _JUMP
             return []
@@ -218,6 +261,9 @@ class _Step:
     def _doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
         """Where to look into an interval, as a fraction of it, and why; None if it is done."""
         h = q.place - p.place
+        crossing = self._look_for_crossing(p, q)
+        if self.refused:
+            return None
         eventful = p.unstable != q.unstable or bool(changes(p, q))
         if eventful and not _explained(p, q):
             return 0.5, (
@@ -226,6 +272,8 @@ class _Step:
             )
         if eventful and _mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
+        if crossing is not None and self._measures(p)[0, 0] != self._measures(q)[0, 0]:
+            return 0.5, _BESIDE
         contacts = self.contacts(p, q)
         if contacts == GRAZES:
             return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
@@ -236,8 +284,44 @@ class _Step:
             return 0.5, "nothing was looked at"
         if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
-        found = first_doubtful([s.place for s in stencil], [s.measures for s in stencil], at)
-        return None if found is None else (found[1], _REASONS[found[0]])
+        found = first_doubtful([s.place for s in stencil], [self._measures(s) for s in stencil], at)
+        if found is None or (_REASONS[found[0]] == _RETURNS and h <= _EXAMINED and self._turned):
+            # right beside the branch point the multiplier at +1 is known up to its error only
+            return None
+        return found[1], _REASONS[found[0]]
+
+    def _look_for_crossing(self, p: Sample, q: Sample) -> Crossing | None:
+        """The branch point between two samples; the step is refused if the orientation changes without one, which it
+        does not along one branch.
+        """
+        if not BRANCH_POINT.changed(p, q):
+            return None
+        known = next((crossing for crossing in self.crossings if crossing.between(p, q)), None)
+        if known is None:
+            known = self.branch_point(p, q)
+            if known is not None:
+                self.crossings.append(known)
+        self.refused = self.refused or (known is None and self.size > _JUMP)
+        return known
+
+    def _measures(self, sample: Sample) -> Array:
+        """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
+        crossing = self._turned
+        if crossing is None or crossing.turned is None:
+            return sample.measures
+        tests = sample.measures.copy()
+        way = sample.place - crossing.place or math.ulp(1.0)
+        change = tests[0, 1] * math.exp(tests[1, 1]) - crossing.turned
+        tests[0, 0] *= math.copysign(1.0, way)
+        tests[1, 0] -= math.log(abs(way))
+        tests[0, 1] = math.copysign(1.0, change)
+        tests[1, 1] = (math.log(abs(change)) if change else -math.inf) - 2.0 * math.log(abs(way))
+        return tests
+
+    @property
+    def _turned(self) -> Crossing | None:
+        """The branch point of the step at which the curve turns back."""
+        return next((crossing for crossing in self.crossings if crossing.turns), None)
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
         """The samples to interpolate through, up to two on either side, and the position of p among them.
@@ -285,12 +369,16 @@ class _Step:
         return chosen, first
 
 
+_RETURNS = "a multiplier may pass +1 and come back"
 _REASONS = (
     "the branch may turn back and turn again",
-    "a multiplier may pass +1 and come back",
+    _RETURNS,
     "a multiplier may pass -1 and come back",
     "a pair of multipliers may leave the unit circle and come back",
 )
+
+
+_BESIDE = "the branch turns back beside a branch point, too close to tell where"
 
 
 def _open(p: Sample, q: Sample) -> bool:

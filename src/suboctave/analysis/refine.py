@@ -11,6 +11,7 @@ from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
 from suboctave.bifurcation import Bifurcation, BifurcationKind, Sample
 from suboctave.bifurcation.branching import branching_equation
 from suboctave.bifurcation.finder import Located, locate, position
+from suboctave.bifurcation.kinds import BRANCH_POINT
 from suboctave.bifurcation.layer import (
     behind_grazing,
     grazing_beside,
@@ -37,10 +38,11 @@ _MOVED = 0.05
 _STILL = 1e-5
 
 
-def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> Bifurcation:
+def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> Bifurcation | None:
     """The bifurcation located between two neighbours: solved again with the harmonics that events ask for, labelled.
 
-    What could only be bracketed, or was not found again, is noted in `warnings`.
+    None if the change of its test is all that is known. Beside the grazing of an exact contact, where Newton's method
+    has no chance, that is enough: it is noted in `warnings`, as is what was not found again.
     """
     arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
     curve = b.point.curve
@@ -50,17 +52,19 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         guess = guess_at(located.sample.point.u, located.sample.point, _kappa(located))
         solution = behind_grazing(located.kind, guess) or _with_more_harmonics(located, a, b)
     if solution is None:
+        beside = grazing_beside(guess)
+        # the bracket of a grazing shows the excursion itself; across a branch point other tests change, too
+        if located.bracket is not None and (beside is None or BRANCH_POINT.changed(*located.bracket)):
+            return None
         orbit = orbit_of(located.sample)
         if orbit.basis.kept is not None:
             state = _filled(located.sample.state, curve)
             orbit = as_orbit(state, _residual(state), truncation(state), curve)
-        beside = grazing_beside(guess)
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
         width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
         warnings.append(
             f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
-            f"to +- {width:.1e}: "
-            + (f"{beside.label} grazes there" if beside else "too few harmonics are kept, or a law is rough there")
+            f"to +- {width:.1e}: " + (f"{beside.label} grazes there" if beside else "a law is rough there")
         )
         return Bifurcation(
             located.kind.name,
@@ -131,9 +135,10 @@ def turns_at(located: Located, a: Sample, b: Sample) -> bool:
         equation = branching_equation(solution.state, curve.name, curve.span, solution.vectors)
     except ConvergenceError:
         return False
-    here = curve.with_balance(solution.state.balance)
-    chord = equation.weights * here.transfer(b.point.u - curve.transfer(a.point.u, a.point.curve), curve)
-    along = max((equation.weights * d for d in equation.directions), key=lambda d: abs(float(d @ chord)))
+    here, weights = curve.with_balance(solution.state.balance), b.point.weights
+    chord = weights * (b.point.tangent if a is b else b.point.u - curve.transfer(a.point.u, a.point.curve))
+    ways = [weights * curve.transfer(direction, here) for direction in equation.directions]
+    along = max((way / length(way) for way in ways), key=lambda way: abs(float(way @ chord)))
     return abs(float(along[-1])) < _STILL
 
 

@@ -17,7 +17,6 @@ import numpy as np
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import check_bounds, make_settings
 from suboctave.analysis.follow import follow, same_event
-from suboctave.analysis.identity import relation
 from suboctave.analysis.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of, own_linear_part
 from suboctave.analysis.progress import reporting, timed
@@ -41,8 +40,6 @@ __all__ = ["Inherited", "check_left", "leave_along", "switch_branch"]
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
-#: relative distance in the parameter within which a turn belongs to the branch point beside it
-_TURN = 1e-6
 
 _NO_OTHER = {
     "LP": "at a limit point the branch only turns back, and nothing leaves it",
@@ -265,9 +262,12 @@ def leave_along(
     forward = follow(one, 0.0, bounds, settings)
     forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
-        met = [b for b in forward.bifurcations if not (same_event(b, here) or _is_turn(b, here))]
+        # a closed curve comes back through the branch point, located there with other harmonics perhaps
+        reach = 2.0 * _distance(one, u, curve)
+        last = forward.points[-1].arclength - reach if forward.closed else math.inf
+        met = [b for b in forward.bifurcations if not (same_event(b, here) or (b.kind == "BP" and b.arclength > last))]
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
-        forward.settle_end(2.0 * _distance(one, u, curve))
+        forward.settle_end(reach)
         return forward
     back = follow(other, 0.0, bounds, settings)
     gap = _distance(one, u, curve) + _distance(other, u, curve)
@@ -276,15 +276,6 @@ def leave_along(
     at = sum(b.arclength < place for b in trace.bifurcations)
     trace.bifurcations.insert(at, replace(here, arclength=place))
     return trace
-
-
-def _is_turn(item: Bifurcation, here: Bifurcation) -> bool:
-    """Whether a limit point is where a branch turns back as it passes its branch point, told from it by rounding and by
-    the harmonics that are kept there.
-    """
-    name = here.parameter_name
-    near = math.isclose(item.parameter(name), here.parameter(name), rel_tol=_TURN)
-    return item.kind == "LP" and near and relation(item.orbit, here.orbit, math.sqrt(_TURN)).one
 
 
 def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:

@@ -142,7 +142,7 @@ class Trace:
         self.events = [b for b in self.events if b.arclength < item.arclength]
         self.open = [p for p in self.open if p.arclength < end]
         self.audit = replace(self.audit, unsettled=tuple(u for u in self.audit.unsettled if u.arclength[1] <= end))
-        self.closed, self.arrives = False, item
+        self.closed, self.arrives = False, replace(item, arclength=end)
         name = item.parameter_name
         where = f"{name} = {item.parameter(name):.6g}"
         self.ends(Ending(EndReason.MET_BRANCH, where, f"met the branch that it leaves at the branch point at {where}"))

@@ -21,7 +21,7 @@ from suboctave.analysis.track_start import Box, curve_through, spans_of
 from suboctave.analysis.track_switch import limit_point_beside
 from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bordered import null_vectors
+from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
@@ -112,13 +112,8 @@ def _symmetric(item: TrackedEvent, names: tuple[str, ...]) -> bool:
     The equations of a limit point hold there, too, but are singular.
     """
     state = item.orbit.state()
-    left = null_vectors(state, Kind.INTEGER).left
-    scale = state.balance.row_weights(len(left))
-    for name in names:
-        slope = state.residual_by(name) * scale
-        if abs(float(left @ slope)) > _FORCED * length(slope):
-            return False
-    return True
+    vectors = null_vectors(state, Kind.INTEGER)
+    return all(transversality(state, vectors, name) <= _FORCED for name in names)
 
 
 def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:

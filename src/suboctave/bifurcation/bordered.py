@@ -26,7 +26,7 @@ import numpy as np
 from suboctave.bifurcation.bordered_kernels import border_at
 from suboctave.compiled import at_hand, ready
 from suboctave.continuation import kernels
-from suboctave.continuation.linear import Factor
+from suboctave.continuation.linear import Factor, length
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import jacobian
 from suboctave.harmonic.linear_part import StructuralMatrices
@@ -148,6 +148,18 @@ def of_equations(state: BalanceState, kind: Kind, vector: np.ndarray) -> np.ndar
     if kind is Kind.INTEGER and state.basis.kept is not None:
         return state.balance.packed(vector.reshape(state.x.shape))
     return vector
+
+
+def transversality(state: BalanceState, vectors: NullVectors, name: str) -> float:
+    """`|psi . R_p| / (|psi| |R_p|)` in mass weights, psi the left null vector of R_X and p a parameter: how far R_p is
+    from the range of a singular R_X.
+
+    Zero at branch points; a branch turns back in p, simply, where it is not.
+    """
+    left = of_equations(state, Kind.INTEGER, vectors.left)
+    slope = state.residual_by(name) * state.balance.row_weights(len(left))
+    size = length(left) * length(slope)
+    return abs(float(left @ slope)) / size if size > 0.0 else 0.0
 
 
 def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:

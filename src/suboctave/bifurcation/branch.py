@@ -18,8 +18,9 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
 from suboctave.harmonic.state import BalanceState
 
-#: unfolding, in units of the forces that balance, above which a located point is no branch point
-_UNFOLDING = 1e-8
+#: unfolding, in units of the forces that balance, above which a located point is no branch point: a hundred times what
+#: rounding makes of a branch point that a symmetry forces. One of beta parts the branches of a pitchfork by beta^(1/3)
+_UNFOLDING = 1e-13
 
 
 def locate_branch_point(guess: Guess) -> Singular:

@@ -2,7 +2,8 @@
 
 First the bordered system from an interpolated start; where it does not converge into the step, the step is bisected
 on the test function and the solver tries again from a nearer point. If it never converges (at a grazing contact the
-equations are not smooth enough), the bracket itself is the answer, with its width.
+equations are not smooth enough), the bracket of the test's change is all that is known: what it means is for others to
+say.
 """
 
 from __future__ import annotations
@@ -25,12 +26,14 @@ from suboctave.errors import ConvergenceError
 _SLACK = 1e-7
 #: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics
 _BEFORE = 1e-2
+#: corrections of a place on a step, at most, and one that settles it, as a share of the step
+_ROUNDS, _SETTLED = 20, 1e-12
 
 
 @dataclass(frozen=True)
 class Located:
-    """A bifurcation between two neighbours: solved (`solution`), or only bracketed (`sample`, with the bracket's
-    width).
+    """A bifurcation between two neighbours: solved (`solution`), or only the change of its test bracketed (`bracket`,
+    its second end `sample`, with its width).
     """
 
     kind: BifurcationKind
@@ -38,6 +41,7 @@ class Located:
     sample: Sample
     solution: Singular | None
     width: float
+    bracket: tuple[Sample, Sample] | None = None
 
 
 def locate(
@@ -80,12 +84,12 @@ def locate(
             if found is not None:
                 place = low + found[1] * (high - low)
                 if -(_BEFORE if begins else _SLACK) <= place <= 1.0 + _SLACK:
-                    return Located(kind, max(place, 0.0), nearer, found[0], 0.0)
+                    return Located(kind, min(1.0, max(place, 0.0)), nearer, found[0], 0.0)
         middle = None
         for part in (0.5, 0.4, 0.65):
             try:
                 at = low + part * (high - low)
-                middle = make_sample(point_between(a.point, b.point, at, newton))
+                middle = make_sample(point_between(a.point, b.point, at, newton, exactly=True))
                 break
             except ConvergenceError:
                 continue
@@ -98,7 +102,7 @@ def locate(
         else:
             return None
     names = abs(at_high.point.parameter - at_low.point.parameter)
-    return Located(kind, 0.5 * (low + high), at_high, None, 0.5 * names)
+    return Located(kind, 0.5 * (low + high), at_high, None, 0.5 * names, (at_low, at_high))
 
 
 def _try(
@@ -164,9 +168,11 @@ def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
     if size == 0.0:
         return None
     fraction = float((b.weights * (u - ua)) @ chord) / size**2
-    for _ in range(3):
+    for _ in range(_ROUNDS):
         # the interpolating cubic runs at uneven speed along the chord
         rest = float((b.weights * (u - between(a, b, fraction))) @ chord) / size**2
         fraction += rest
+        if abs(rest) < _SETTLED:
+            break
     away = length(b.weights * (u - between(a, b, min(1.0, max(0.0, fraction)))))
     return fraction if away <= 0.1 * size + 1e-7 else None

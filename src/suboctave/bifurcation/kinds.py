@@ -19,6 +19,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from suboctave.bifurcation import measures
+from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.bifurcation.branch import locate_branch_point
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.formulation import BORDERED, Formulation
@@ -33,6 +34,9 @@ from suboctave.lazy import lazy
 from suboctave.stability import FloquetResult, Monodromy, StabilityMethod
 
 _MONODROMY = Monodromy()
+#: transversality of a limit point, at least. Newton's method leaves one located on a branch point by mistake within
+#: 1e-9 of it, where it is as much; at a peak it is the damping ratio
+_TRANSVERSAL = 1e-7
 
 
 class Sample:
@@ -138,6 +142,11 @@ class LimitPoint(BifurcationKind):
     def fraction(self, a: Sample, b: Sample) -> float:
         """See `BifurcationKind.fraction`."""
         return _zero(a.slope, b.slope)
+
+    def genuine(self, found: Singular, guess: Guess) -> bool:
+        """At a branch point R_X is singular, too, but R_p lies in its range."""
+        vectors = found.vectors or null_vectors(found.state, Kind.INTEGER)
+        return transversality(found.state, vectors, guess.name) > _TRANSVERSAL
 
 
 class BranchPoint(BifurcationKind):

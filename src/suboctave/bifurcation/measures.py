@@ -52,6 +52,12 @@ def torus(mu: ComplexArray) -> Array:
     return column
 
 
+def fold(mu: ComplexArray) -> float:
+    """fold alone, of any multipliers."""
+    sign, log = measured(_ONE, _ONE, 0, mu)[:, 1]
+    return float(sign * math.exp(log))
+
+
 def half_sign(state: BalanceState) -> float:
     """Sign of det J_half."""
     linear = state.linear

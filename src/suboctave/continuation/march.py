@@ -18,7 +18,7 @@ from suboctave.continuation import kernels
 from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import length
-from suboctave.continuation.newton import NewtonOptions, Solved, correct
+from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
 from suboctave.continuation.place import Place
 from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array, Curve
@@ -34,9 +34,9 @@ _HALVED = 20
 #: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; up to which of them, and
 #: how many times as far from the corner, it is taken without further question
 _BEYOND, _AT_ONCE, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 1e-5, 100.0
-#: steps below which points are solved for more closely anyway, the share of the tolerance that is left then and its
-#: least, and the share of the step that a point may lie off where rounding leaves more
-_CLOSELY, _SHARE, _LEAST, _LEFT = 1e-4, 1e-3, 1e-13, 1e-2
+#: steps below which points are solved for more closely anyway, and the share of the step that a point may lie off where
+#: rounding leaves more
+_CLOSELY, _LEFT = 1e-4, 1e-2
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-4
 
@@ -91,7 +91,7 @@ class March:
         self.ending = Ending(EndReason.NOT_STARTED)
         self._direction = direction
         self._range = Bounds(lambda curve: curve.parameter, *bounds)
-        self._close = replace(newton, tolerance=min(newton.tolerance, max(_SHARE * newton.tolerance, _LEAST)))
+        self._close = closely(newton)
 
     @property
     def ended(self) -> str:

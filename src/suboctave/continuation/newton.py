@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,8 @@ SHORT = 1e-3
 #: rate at which corrections shrink, twice in succession, that comes to nothing: at a corner of the equations Newton's
 #: method goes to and fro between its sides
 STALLED = 0.8
+#: share of the tolerance that `closely` leaves, and its least
+_SHARE, _LEAST = 1e-3, 1e-13
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,11 @@ class Solved:
     contraction: float
     tangent: Array | None = None
     sign: float | None = None
+
+
+def closely(options: NewtonOptions) -> NewtonOptions:
+    """The same for points that are wanted about as exactly as rounding allows."""
+    return replace(options, tolerance=min(options.tolerance, max(_SHARE * options.tolerance, _LEAST)))
 
 
 def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:

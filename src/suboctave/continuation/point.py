@@ -8,8 +8,9 @@ import numpy as np
 
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor, length
-from suboctave.continuation.newton import NewtonOptions, Solved, correct, tangent
+from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError
 
 __all__ = ["CurvePoint", "between", "make_point", "point_between", "solve_at"]
 
@@ -63,8 +64,13 @@ def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     return result
 
 
-def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonOptions) -> CurvePoint:
+def point_between(
+    a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonOptions, exactly: bool = False
+) -> CurvePoint:
     """The point of the curve at a fraction of the way between two neighbours.
+
+    exactly: about as rounding allows. Beside a branch point what is left of the equations moves a point by as much over
+    the distance to it, and turns its tangent.
 
     Raises
     ------
@@ -74,5 +80,11 @@ def point_between(a: CurvePoint, b: CurvePoint, fraction: float, newton: NewtonO
     guess = between(a, b, fraction)
     chord = b.u - b.curve.transfer(a.u, a.curve)
     row = b.weights * chord
-    solved = correct(b.curve, guess, row / length(row), b.weights, newton)
+    row /= length(row)
+    try:
+        solved = correct(b.curve, guess, row, b.weights, closely(newton) if exactly else newton)
+    except ConvergenceError:
+        if not exactly:
+            raise
+        solved = correct(b.curve, guess, row, b.weights, newton)
     return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
