@@ -239,6 +239,43 @@ def test_searches_in_time_end_with_what_is_there(duffing_curve, ticks):
         so.integrate(system, omega=1.0, periods=2000, seconds=0.5)
 
 
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95])
+def test_wherever_a_time_limit_falls_the_basins_say_so_and_are_a_part_of_the_whole(share, whole_basins, ticks):
+    """Among other places while the neighbourhoods are looked for in which trajectories are trapped."""
+    whole, looks = whole_basins
+    try:
+        part = basins_of_a_duffing_oscillator(share * looks)
+    except so.TimeLimitError:
+        return
+    assert (part.complete, part.interruption) == (False, Interruption(share * looks))
+    computed = part.labels != -3
+    assert not computed.all() or part.followed == 0
+    assert np.array_equal(part.labels[computed], whole.labels[computed])
+
+
+def basins_of_a_duffing_oscillator(seconds):
+    system = so.library.duffing(c=0.2, F=0.3)
+    box = ((-2.0, 2.0), (-2.0, 2.0))
+    return so.basins(system, omega=1.5, box=box, grid=(8, 8), periods=60, workers=1, seconds=seconds)
+
+
+@pytest.fixture(scope="module")
+def whole_basins():
+    """The basins, and how often the clock is looked at for them."""
+    count = 0
+
+    def clock():
+        nonlocal count
+        count += 1
+        return float(count)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(interruption, "monotonic", clock)
+        whole = basins_of_a_duffing_oscillator(1e9)
+    assert whole.complete
+    return whole, count
+
+
 def test_a_search_for_subharmonics_gives_the_branches_that_it_has(ticks):
     spring = so.PolynomialSpring(0, {3: 1.0})
     system = so.System(1.0, 0.02, 1.0, [spring], [so.HarmonicLoad(0, 4.0)])

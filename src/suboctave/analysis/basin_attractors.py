@@ -14,6 +14,7 @@ from suboctave.analysis.branch import Branch
 from suboctave.analysis.tree import BifurcationDiagram
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow
@@ -147,12 +148,14 @@ class Catalogue:
     def _cycle(self, solution: PeriodicSolution) -> tuple[Array, Array]:
         flow = Flow(self.system, "accurate", tolerance=1e-12)
         motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1)
+        pass_on(motions.interruption)
         points = np.vstack([solution.state[None], motions.states[0][:-1]])
         return points, self._extents(points)
 
     def _extents(self, points: Array) -> Array:
         flow = Flow(self.system, "accurate", tolerance=1e-10)
         motions = flow.over(points[0], self.omega, len(points), self.values, measure=True, workers=1)
+        pass_on(motions.interruption)
         assert motions.peaks is not None
         mass = np.diagonal(self.system.mass.value({**self.system.parameters, **self.values}))
         return extents(motions.peaks[0].max(axis=0), self.omega, mass)

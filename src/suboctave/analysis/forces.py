@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from suboctave.errors import InputError
+from suboctave.interruption import pass_on
 from suboctave.model.coupled import as_coupled
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -30,7 +31,9 @@ def check_forces(system: System, state: Array, omega: float, values: Mapping[str
     if not asked:
         return
     flow = Flow(system, "newmark", _SAMPLES, _SAMPLES, lanes=8)
-    states = flow.over(state, omega, _PERIODS, values).states[0]
+    motions = flow.over(state, omega, _PERIODS, values)
+    pass_on(motions.interruption)
+    states = motions.states[0]
     states = np.vstack([state[None], states[np.isfinite(states).all(axis=1)]])
     n = system.n
     for placed in asked:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
+from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.timedomain.batch import Flow
@@ -70,7 +71,8 @@ def traps_about(
     n, size = points.shape
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=size, transition=True)
     at_points = flow.over(points, omega, n, values, workers=workers)
-    if at_points.failed.any() or not at_points.finished.all():
+    pass_on(at_points.interruption)
+    if at_points.failed.any():
         return []
     assert at_points.tangents is not None
     traps = []
@@ -105,7 +107,8 @@ def _largest(
     def contracts(radius: float) -> bool:
         for some in (ball[:_FIRST], ball[_FIRST:]):
             motions = flow.over(point + radius * some @ back, omega, periods, values, skip=periods, workers=workers)
-            if motions.failed.any() or not motions.finished.all():
+            pass_on(motions.interruption)
+            if motions.failed.any():
                 return False
             assert motions.tangents is not None
             derivative = factor @ motions.tangents @ back.T
