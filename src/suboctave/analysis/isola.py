@@ -13,18 +13,23 @@ import numpy as np
 
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.checks import is_number
+from suboctave.analysis.identity import lies_on
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.limit_curves import Leg, as_point
+from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.tracked_branch import TrackedBranch, TrackedPoint
 from suboctave.analysis.verbs import continue_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.interruption import limited
+from suboctave.interruption import limited, pass_on
 from suboctave.model.system import System
 
 __all__ = ["Isola", "IsolaEnd"]
+
+#: share of a closed branch's length by which points are beside a bifurcation, not at it
+_CLEAR = 1e-4
 
 
 class IsolaEnd(TrackedEvent, float):
@@ -233,6 +238,44 @@ def closed_branch(
     margin = 0.02 * (high - low)
     bounds = (max(low - margin, 0.5 * low), high + margin)
     return continue_branch(limit_point, "omega", bounds, progress=progress, **options)
+
+
+def carrier_of(branch: Branch, attached: Iterable[Branch], options: dict[str, Any]) -> Branch | None:
+    """Of the closed branches that one is connected with by branch points that on which the others hang; None if one of
+    them is not closed, or meets a branch that leads to the ends of the range, as those `attached` do.
+
+    A loop hangs on another if it turns back where it meets it, as what leaves a pitchfork does.
+
+    Raises
+    ------
+    ConvergenceError, InputError
+        If what crosses one of them at a branch point cannot be followed.
+    """
+    met, connected = list(attached), [branch]
+    for one in connected:  # which grows on the way
+        if not one.closed or one.departs is not None or one.arrives is not None:
+            return None
+        for item in one.bifurcations["BP"]:
+            if any(lies_on(item.orbit, other.points) for other in met):
+                return None
+            if any(lies_on(item.orbit, other.points) for other in connected if other is not one):
+                continue
+            crossing = switch_branch(item, **options)
+            pass_on(crossing.interruption)
+            if not any(lies_on(crossing.points[len(crossing) // 2].orbit, other.points) for other in connected):
+                connected.append(crossing)
+    crossed = (one for one in connected if not any(_turns_back(one, item) for item in one.bifurcations["BP"]))
+    return next(crossed, branch)
+
+
+def _turns_back(branch: Branch, item: Bifurcation) -> bool:
+    """Whether a closed branch lies on one side, in omega, of a bifurcation that it passes."""
+    whole = float(branch.arclength[-1])
+    ahead = (branch.arclength - item.arclength) % whole
+    # points right beside it are off by less than its frequency is known
+    clear = np.flatnonzero((ahead > _CLEAR * whole) & (ahead < (1.0 - _CLEAR) * whole))
+    after, before = clear[np.argmin(ahead[clear])], clear[np.argmax(ahead[clear])]
+    return bool((branch.omega[after] - item.omega) * (branch.omega[before] - item.omega) > 0.0)
 
 
 def stable_ranges(branch: Branch) -> list[tuple[float, float]]:

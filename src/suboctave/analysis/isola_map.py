@@ -16,7 +16,7 @@ import numpy as np
 
 from suboctave.analysis.borders import Border, borders_of
 from suboctave.analysis.checks import check_bounds, check_parameter, is_number
-from suboctave.analysis.isola import Isola, IsolaEnd, closed_branch
+from suboctave.analysis.isola import Isola, IsolaEnd, carrier_of, closed_branch
 from suboctave.analysis.isola_region import IsolaMap, IsolaRegion, Probe
 from suboctave.analysis.isola_sheets import spans_of
 from suboctave.analysis.isolas_found import Isolas
@@ -244,6 +244,7 @@ def _probe(region: IsolaRegion, border: Border, node: TrackedPoint, isola: Isola
         at = legs[int(np.argmin([abs(leg.omega_near(middle)[0] - node.orbit.omega) for leg in legs]))]
         branch = closed_branch(at.limit_point(middle), isola.omega, name, legs, options)
         pass_on(branch.interruption)
+        detached = carrier_of(branch, (), options) is not None
     except (ConvergenceError, InputError) as failure:
         return Probe(place, middle, (low, high), None, str(failure))
     turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]
@@ -252,7 +253,6 @@ def _probe(region: IsolaRegion, border: Border, node: TrackedPoint, isola: Isola
         for end in region.span.ends
         if isinstance(end, Border) and not any(abs(t - float(end.across(place))) <= _AGREES * width for t in turns)
     ]
-    detached = branch.closed and branch.departs is None and branch.arrives is None
     said = "" if detached else "the branch there is not detached"
     if missed and detached:
         said = f"its curve of limit points does not turn at {name} = {missed[0]:.7g}"

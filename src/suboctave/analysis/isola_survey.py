@@ -10,15 +10,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.identity import Relation, lies_on, relation
-from suboctave.analysis.isola import closed_branch
+from suboctave.analysis.isola import carrier_of, closed_branch
 from suboctave.analysis.limit_curves import Leg, legs_of
 from suboctave.analysis.making import Harmonics
-from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch
 from suboctave.bifurcation import Bifurcation
@@ -33,8 +30,6 @@ __all__ = ["SAME_OMEGA", "Loop", "Survey"]
 SAME_OMEGA = 1e-6
 #: events that are closer, in units of the range, are met together
 _TOGETHER = 1e-7
-#: share of a closed branch's length by which points are beside a bifurcation, not at it
-_CLEAR = 1e-4
 #: a limit point lies at most this many distances between neighbours away from the curve's chord
 _BESIDE = 3.0
 
@@ -209,7 +204,11 @@ class Survey:
 
         `known` are legs of the given branch.
         """
-        carrier = self._carrier(branch, value)
+        try:
+            carrier = carrier_of(branch, self.met.get(value, ()), self.options)
+        except (ConvergenceError, InputError) as failure:
+            self.note(f"whether a closed branch at {self.name} = {value:.6g} is isolated is open: {failure}")
+            carrier = None
         if carrier is None or carrier is branch:
             return Loop(value, branch, self._legs_on(branch, value, *known), carrier is branch)
         self._explained |= {(value, id(leg)) for leg in known}
@@ -219,35 +218,6 @@ class Survey:
         """The legs that a branch's limit points lie on, each once, those that are known first."""
         found = (self.known(item, value) for item in branch.bifurcations["LP"])
         return tuple(dict.fromkeys([*known, *(leg for leg in found if leg is not None)]))
-
-    def _carrier(self, branch: Branch, value: float) -> Branch | None:
-        """Of the closed branches that a branch is connected with by branch points that on which the others hang.
-
-        A loop hangs on another if it turns back where it meets it, as what leaves a pitchfork does. None where one of
-        them is not closed, or meets a branch that leads to the ends of the range.
-        """
-        connected = [branch]
-        for one in connected:  # which grows on the way
-            if not one.closed or one.departs is not None or one.arrives is not None:
-                return None
-            for item in one.bifurcations["BP"]:
-                if any(lies_on(item.orbit, other.points) for other in self.met.get(value, ())):
-                    return None
-                if any(lies_on(item.orbit, other.points) for other in connected if other is not one):
-                    continue
-                try:
-                    crossing = switch_branch(item, **self.options)
-                except (ConvergenceError, InputError) as failure:
-                    self.note(
-                        f"a closed branch meets another one at the BP at omega = {item.omega:.6g}, {self.name} = "
-                        f"{value:.6g}, which could not be followed: whether it is isolated is open ({failure})"
-                    )
-                    return None
-                pass_on(crossing.interruption)
-                if not any(lies_on(crossing.points[len(crossing) // 2].orbit, other.points) for other in connected):
-                    connected.append(crossing)
-        crossed = (one for one in connected if not any(_turns_back(one, item) for item in one.bifurcations["BP"]))
-        return next(crossed, branch)
 
     def attach(self, loop: Loop) -> None:
         """A branch that is not detached: its limit points at that value are explained."""
@@ -282,16 +252,6 @@ class Survey:
             group.append(event)
         if group:
             yield group[0].parameter(self.name), group
-
-
-def _turns_back(branch: Branch, item: Bifurcation) -> bool:
-    """Whether a closed branch lies on one side, in omega, of a bifurcation that it passes."""
-    whole = float(branch.arclength[-1])
-    ahead = (branch.arclength - item.arclength) % whole
-    # points right beside it are off by less than its frequency is known
-    clear = np.flatnonzero((ahead > _CLEAR * whole) & (ahead < (1.0 - _CLEAR) * whole))
-    after, before = clear[np.argmin(ahead[clear])], clear[np.argmax(ahead[clear])]
-    return bool((branch.omega[after] - item.omega) * (branch.omega[before] - item.omega) > 0.0)
 
 
 def _beside(a: Bifurcation, b: Bifurcation) -> bool:

@@ -15,6 +15,7 @@ from suboctave.analysis.borders import Border
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.diagram import bifurcation_diagram, grown_from
 from suboctave.analysis.identity import lies_on, mirrored
+from suboctave.analysis.isola import carrier_of
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.regime_arcs import Arc, Edge, Stretch, same_branch, stretches
 from suboctave.analysis.regime_atlas import Atlas
@@ -163,7 +164,12 @@ def _through(border: Border, value: float, atlas: Atlas, depth: int, found: Slic
         if any(same_branch(one, other) for other, _ in found.branches):
             found.explained.append(border)
             continue
-        detached = one.closed and one.departs is None and one.arrives is None
+        try:
+            attached = [known for known, isolated in found.branches if not isolated]
+            detached = carrier_of(one, attached, atlas.options) is not None
+        except (ConvergenceError, InputError) as failure:
+            atlas.note(f"whether the branch through the limit point at {where} is isolated is open: {failure}")
+            detached = False
         diagram = grown_from(one, levels, atlas.options)
         pass_on(diagram.interruption)
         for node in diagram:
