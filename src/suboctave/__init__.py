@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     )
     from suboctave.bifurcation import Alcorta2019, Bifurcation, BorderedSystem, ExtendedSystem
     from suboctave.continuation import Event, NewtonOptions, SteppingOptions
-    from suboctave.errors import ConvergenceError, InputError, SuboctaveError, TimeLimitError
+    from suboctave.errors import ConvergenceError, InputError, NegativeDampingWarning, SuboctaveError, TimeLimitError
     from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, PeriodicOrbit
     from suboctave.model import (
         BaseAcceleration,
@@ -180,6 +180,7 @@ _HOME = {
     "write_report": "suboctave.pictures",
     "SuboctaveError": "suboctave.errors",
     "InputError": "suboctave.errors",
+    "NegativeDampingWarning": "suboctave.errors",
     "ConvergenceError": "suboctave.errors",
     "TimeLimitError": "suboctave.errors",
 }
@@ -222,6 +223,7 @@ __all__ = [
     "LyapunovMap",
     "Measured",
     "Monodromy",
+    "NegativeDampingWarning",
     "NewtonOptions",
     "PeriodicOrbit",
     "PoincareSections",

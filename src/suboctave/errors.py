@@ -19,6 +19,10 @@ class InputError(SuboctaveError, ValueError):
     """Wrong input, refused before any work was done."""
 
 
+class NegativeDampingWarning(UserWarning):
+    """A system was made whose damping, or a damper, feeds energy in: a wrong sign, or self-excitation that is meant."""
+
+
 class ConvergenceError(SuboctaveError, ArithmeticError):
     """An iteration that did not arrive; the message says where on the curve and what to change."""
 

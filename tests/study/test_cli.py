@@ -122,3 +122,13 @@ def test_ctrl_c_has_the_status_a_shell_expects(monkeypatch, capsys):
     with pytest.raises(SystemExit) as stopped:
         cli.main()
     assert stopped.value.code == 130
+
+
+def test_negative_damping_is_a_note_once_and_the_study_runs(study_file, suboctave):
+    path = study_file()
+    path.write_text(path.read_text().replace('damping = "c"', 'damping = "-c"'))
+    status, out, err = suboctave("check", path)
+    assert status == 0
+    assert err.count("note: the damping matrix feeds energy into some motions") == 1
+    assert "damping_check" not in err
+    assert "in order" in out

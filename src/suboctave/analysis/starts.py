@@ -154,16 +154,14 @@ def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
         raise InputError("start contains numbers that are not finite")
     if array.ndim == 1 and array.size == 2 * size:
         return _integrated(curve, value, array)
-    if array.ndim == 1 and size == 1:
+    shape = np.shape(given)
+    if array.ndim == 1 and size == 1:  # coefficients of one degree of freedom
         array = array[:, None]
-    if array.ndim == 2 and array.shape[1] == size and array.shape[0] % 2 == 1:
-        own = HarmonicBasis(max(1, array.shape[0] // 2), basis.nu)
-        padded = np.zeros((own.size, size))
-        padded[: array.shape[0]] = array
-        return curve.join(own.resized(padded, basis), value)
+    if array.ndim == 2 and array.shape[1] == size and array.shape[0] % 2 == 1 and array.shape[0] > 1:
+        return curve.join(HarmonicBasis(array.shape[0] // 2, basis.nu).resized(array, basis), value)
     raise InputError(
         f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * size}, or coefficients of shape "
-        f"(2 H + 1, {size}); got an array of shape {array.shape}"
+        f"(2 H + 1, {size}), H at least 1; got an array of shape {shape}"
     )
 
 

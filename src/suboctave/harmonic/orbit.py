@@ -62,7 +62,7 @@ class PeriodicOrbit:
         """The system at the orbit's parameter values."""
         system = self.balance.system
         changed = {k: v for k, v in self.values.items() if v != system.parameters[k]}
-        return system.with_parameters(**changed) if changed else system
+        return system.moved_to(changed) if changed else system
 
     @property
     def period(self) -> float:

@@ -20,7 +20,7 @@ from suboctave.errors import InputError
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient, coefficient
 from suboctave.model.sampling import Piece, PiecewiseLinear, RoundedPiece, SharpSampling
-from suboctave.model.stops import ElasticStop
+from suboctave.model.stops import ElasticStop, check_stiffness
 
 __all__ = ["Clearance", "Freeplay"]
 
@@ -69,7 +69,8 @@ class _Play(Element):
         return f"{type(self).__name__}({', '.join(shown)})"
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
-        """Refuse sides that have changed places, and a sharpness that is not positive."""
+        """Refuse a negative stiffness, sides that have changed places, and a sharpness that is not positive."""
+        check_stiffness(self, values)
         left, right = (source.value(values) for source in self.coefficients[1:3])
         if left > right:
             raise InputError(f"{self.label}: the play is negative ({right - left:g}) at the system's parameters")

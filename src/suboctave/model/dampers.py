@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
+from suboctave.model.damping_check import warn_of_negative
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient
 from suboctave.model.sampling import CornerSampling, SharpVelocitySampling
@@ -34,6 +35,11 @@ class QuadraticDamper(Element):
     ) -> None:
         required("QuadraticDamper", coefficient=coefficient)
         super().__init__(dof, [coefficient], direction=direction)  # type: ignore[list-item]
+
+    def check(self, values: Mapping[str, float], first: bool) -> None:
+        """Say when a system is made that it is driven instead of damped."""
+        if first and self.coefficients[0].value(values) < 0.0:
+            warn_of_negative(f"{self.label} feeds energy into motions")
 
     def sampling(self, c: Array) -> CornerSampling:
         """Corner at rest."""
@@ -89,7 +95,9 @@ class TanhFriction(Element):
             self._check_velocity(self.coefficients[1].value({}))
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
-        """Refuse a velocity that is not positive."""
+        """Refuse a velocity that is not positive; say when a system is made that friction drives."""
+        if first and self.coefficients[0].value(values) < 0.0:
+            warn_of_negative(f"{self.label} feeds energy into motions")
         self._check_velocity(self.coefficients[1].value(values))
 
     def _check_velocity(self, v: float) -> None:

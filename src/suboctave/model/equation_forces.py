@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from suboctave.model.element import BaseElement
+from suboctave.model.expression import coefficient
 from suboctave.model.expression_element import Expression
 from suboctave.model.law_code import expanded_size
 from suboctave.model.law_syntax import PRIME, corner_functions, symbol
@@ -28,8 +29,8 @@ class Forces:
     vector of those places says along which direction it acts.
     """
 
-    def __init__(self, names: list[str], where: Callable[[int], str]) -> None:
-        self.names, self.where = names, where
+    def __init__(self, names: list[str], where: Callable[[int], str], parameters: Mapping[str, float]) -> None:
+        self.names, self.where, self.parameters = names, where, parameters
         self.n = len(names)
         self.x = [symbol(name) for name in names]
         self.v = [symbol(name + PRIME) for name in names]
@@ -124,10 +125,13 @@ class Forces:
             or argument.free_symbols & (varying - {self.u})
         ):
             return None
+        stiffness = as_text(factor * slope)
+        if coefficient(stiffness).value(self.parameters) < 0.0:  # gets softer there: a spring, but no stop
+            return None
         gap = -argument.subs(self.u, 0) / slope
         side = "right" if slope > 0 else "left"
         place = self._place(direction)
-        return ElasticStop(stiffness=as_text(factor * slope), gap=as_text(gap), side=side, **place)
+        return ElasticStop(stiffness=stiffness, gap=as_text(gap), side=side, **place)
 
     def _spring(self, law: Any, direction: tuple[float, ...]) -> BaseElement | None:
         """A polynomial in the displacement."""

@@ -111,7 +111,7 @@ class _Equations:
         self.stiffness: list[list[Any]] = [[0] * self.n for _ in range(self.n)]
         self.waves: list[list[tuple[str, int, str]]] = [[] for _ in range(self.n)]
         self.static: list[Any] = [0] * self.n
-        self.forces = Forces(self.names, self.where)
+        self.forces = Forces(self.names, self.where, self.parameters)
         for i, equation in enumerate(equations):
             for term in self._terms(equation):
                 self._sort(i, term)

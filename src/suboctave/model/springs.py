@@ -17,6 +17,8 @@ from suboctave.model.sampling import PolynomialSampling
 __all__ = ["CubicSpring", "PolynomialSpring"]
 
 Number = float | str | Coefficient
+#: largest power of a displacement, as in texts: 2**1024 is no floating-point number any more
+LARGEST_POWER = 1000
 
 
 class PolynomialSpring(Element):
@@ -123,6 +125,11 @@ def _read(kind: str, coefficients: Any) -> tuple[tuple[int, ...], list[Number]]:
         if index < 1 or isinstance(power, bool):
             hint = "; a constant force is a load with static=" if index == 0 else ""
             raise InputError(f"{kind}: a power must be a positive integer, not {power!r}{hint}")
+        if index > LARGEST_POWER:
+            raise InputError(
+                f"{kind}: a power is larger than {LARGEST_POWER}, from which on u**power is no number at u = 2 and "
+                "beyond; a wall is an ElasticStop"
+            )
         if isinstance(factor, str | Coefficient) or factor != 0:
             read[index] = factor
     if not read:

@@ -28,9 +28,19 @@ from suboctave.model.expression import Coefficient
 from suboctave.model.rounding import at_rest, at_rest_by_gap, at_rest_by_sharpness
 from suboctave.model.sampling import Piece, PiecewiseLinear, RoundedPiece, SharpSampling
 
-__all__ = ["ElasticStop"]
+__all__ = ["ElasticStop", "check_stiffness"]
 
 _SIDES = {"right": 1, "left": -1}
+
+
+def check_stiffness(element: Element, values: Mapping[str, float]) -> None:
+    """Refuse a stop or a joint, its stiffness the first coefficient, that would pull instead of push."""
+    stiffness = element.coefficients[0].value(values)
+    if stiffness < 0.0:
+        raise InputError(
+            f"{element.label}: the stiffness is {stiffness:g}; what touches pushes back, with a positive stiffness. A "
+            "spring that gets softer beyond a gap is Expression(dof, '-k*max(x - gap, 0)')"
+        )
 
 
 class ElasticStop(Element):
@@ -82,8 +92,9 @@ class ElasticStop(Element):
         return [f"side={self.side!r}"]
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
-        """Refuse a sharpness that is not positive and, when a system is made, an ambiguous side."""
+        """Refuse a negative stiffness, a sharpness that is not positive and, first, an ambiguous side."""
         gap = self.coefficients[1]
+        check_stiffness(self, values)
         if first and not self._side_given and gap.value(values) < 0.0:
             start = f"ElasticStop({self.place}, stiffness={self.coefficients[0].text}, gap={gap.text!r}"
             raise InputError(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, suggest
 from suboctave.model.coupled import CoupledElement
+from suboctave.model.damping_check import check_damping
 from suboctave.model.element import Array, BaseElement
 from suboctave.model.expression import RESERVED, Coefficient
 from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
@@ -140,6 +141,11 @@ class System:
         result._check_values(changed)
         return result
 
+    def moved_to(self, values: Mapping[str, float]) -> System:
+        """As `with_parameters`, at values where a motion was solved: nothing is checked, or said, any more."""
+        parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
+        return _assemble(*parts, {**self.parameters, **values}, self.name, self.dof_names)
+
     def with_scaled_loads(self, name: str = "load_scale") -> System:
         """The same system whose oscillating loads are multiplied by a new parameter, 1 to begin with.
 
@@ -215,6 +221,9 @@ class System:
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
             check_mass(mass)
+        if first:
+            damping = self.damping.sparse_value if self.damping.sparse else self.damping.value
+            check_damping(damping(self.parameters), mass.diagonal())
 
     # --------------------------------------------------------------------------------------------------- matrices
     def matrices(self, values: Mapping[str, float] | None = None) -> tuple[Array, Array, Array]:

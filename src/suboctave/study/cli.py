@@ -9,10 +9,12 @@ Everything heavy is imported when a command runs, so that `--help` and a mistype
 
 import json
 import sys
+import warnings
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from suboctave.errors import InputError, SuboctaveError
+from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -29,7 +31,10 @@ FAILED, WRONG, INTERRUPTED = 1, 2, 130  # 130 is what a shell reports after Ctrl
 def main() -> None:
     """Runs the command line. A failure is one readable message and an exit status, never a traceback."""
     try:
-        application()()
+        with warnings.catch_warnings():
+            warnings.simplefilter("once", NegativeDampingWarning)
+            warnings.showwarning = partial(_note, warnings.showwarning)
+            application()()
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)
@@ -43,6 +48,14 @@ def main() -> None:
         else:
             print(_readable(f"suboctave: {_said(error)}"), file=sys.stderr)
         sys.exit(status)
+
+
+def _note(usual: Any, message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+    """A warning of a system is a note to the reader of a study, who has no line of Python to look at."""
+    if category is NegativeDampingWarning:
+        print(_readable(f"note: {str(message).split(' If this')[0]}"), file=sys.stderr)
+    else:
+        usual(message, category, *place, **more)
 
 
 def _said(error: Exception) -> str:
