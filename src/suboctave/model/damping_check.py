@@ -41,5 +41,5 @@ def warn_of_negative(what: str) -> None:
         f"{what}: they grow until another force limits them. If this self-excitation is meant, silence the warning "
         "with warnings.simplefilter('ignore', suboctave.NegativeDampingWarning); else change the sign",
         NegativeDampingWarning,
-        stacklevel=4,
+        stacklevel=5,  # the line that makes the system
     )
