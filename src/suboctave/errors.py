@@ -6,9 +6,13 @@ Every message says what happened, where, and what to change. Wrong input is refu
 from __future__ import annotations
 
 import difflib
+import os
+import reprlib
 from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
-__all__ = ["ConvergenceError", "InputError", "SuboctaveError", "TimeLimitError", "suggest"]
+__all__ = ["ConvergenceError", "InputError", "SuboctaveError", "TimeLimitError", "path_of", "shortened", "suggest"]
 
 
 class SuboctaveError(Exception):
@@ -31,6 +35,15 @@ class TimeLimitError(SuboctaveError):
     """A time limit (`seconds=`) that was reached before there was anything to keep."""
 
 
+_shown = reprlib.Repr()
+_shown.maxstring = _shown.maxother = 60
+
+
+def shortened(value: Any) -> str:
+    """What a user has given, as messages show it: in one line, and only the ends of what is long."""
+    return " ".join(_shown.repr(value).split())
+
+
 def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:
     """The tail of a message on an unknown name: the closest known names, or else all of them (at most `limit`).
 
@@ -45,3 +58,16 @@ def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:
         return f" (did you mean {' or '.join(repr(lower[match]) for match in close)}?)"
     listed = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")
     return f"; known: {listed}"
+
+
+def path_of(given: Any) -> Path:
+    """The path that a user has given; InputError for what cannot be one."""
+    if not isinstance(given, str | os.PathLike) or isinstance(os.fspath(given), bytes):
+        raise InputError(f"a file is given by its name, a text or a Path, not by {type(given).__name__}")
+    path = Path(given)
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:  # longer than names may be
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{shortened(str(path))} cannot be the name of a file: {reason}") from None
+    return path

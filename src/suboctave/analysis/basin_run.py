@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from suboctave.analysis.attractors import attractor_of
 from suboctave.analysis.basin_attractors import Catalogue, Given, enter_attractors
-from suboctave.errors import InputError
+from suboctave.errors import InputError, path_of
 from suboctave.interruption import pass_on
 from suboctave.model.description import describe
 from suboctave.model.element import Array
@@ -57,7 +57,7 @@ class BasinRun:
         if keep is None:
             enter_attractors(self.catalogue, given)
             return
-        place = Path(keep)
+        place = path_of(keep)
         mark = self._mark()
         if place.exists():
             self.journal = Journal.reopen(place)

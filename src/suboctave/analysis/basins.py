@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from suboctave.analysis.attractors import TOLERANCE
 from suboctave.analysis.basin_attractors import BasinAttractor, Catalogue, read_attractors
 from suboctave.analysis.basin_run import APERIODIC, GONE, OPEN, BasinRun
-from suboctave.analysis.checks import check_range, is_number
+from suboctave.analysis.checks import check_range, is_number, read_values
 from suboctave.analysis.integration import start_state
 from suboctave.analysis.poincare import check_observe
 from suboctave.analysis.progress import reporting, timed
@@ -22,7 +22,7 @@ from suboctave.interruption import Interruption
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.arrays import padded
-from suboctave.timedomain.batch import check_count
+from suboctave.timedomain.batch import check_count, check_extent
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -261,16 +261,15 @@ def basins(
     InputError
         Before any work.
     """
-    values = {name: float(value) for name, value in (parameters or {}).items()}
+    values = read_values(system, parameters)
     state = start_state(system, rest)
-    for name in values:
-        system.check_parameter(name)
     if not (is_number(omega) and omega > 0.0):
         raise InputError(f"omega must be a positive number, not {omega!r}")
     observe = check_observe(system, observe)
     columns = check_plane(system, plane, observe)
     sides, counts = _box(box), _grid(grid)
     periods = check_count("periods", periods)
+    check_extent(counts[0] * counts[1], periods, counts[0] * counts[1] * 2 * system.n)
     ends = [np.linspace(low, high, count) for (low, high), count in zip(sides, counts, strict=True)]
     states = np.repeat(state[None], counts[0] * counts[1], axis=0)
     states[:, columns[0]], states[:, columns[1]] = np.tile(ends[0], counts[1]), np.repeat(ends[1], counts[0])

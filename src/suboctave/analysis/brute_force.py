@@ -25,7 +25,7 @@ from suboctave.interruption import Interruption, pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
-from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.batch import Flow, check_count, check_extent
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -220,6 +220,8 @@ def brute_force_diagram(
     samples = _samples(method, steps_per_period)
     labels = (*names, *(f"state {i}" for i in range(len(fresh))))
     shape = (len(labels), len(grid), periods)
+    trajectories = len(labels) * len(grid)
+    check_extent(trajectories, transient + periods, trajectories * periods * 2 * system.n)
     points = np.full((*shape, 2 * system.n), np.nan)
     largest = np.full((*shape, system.n), np.nan)
     run = _Scan(system, name, at, grid, transient, periods, points, largest, workers)

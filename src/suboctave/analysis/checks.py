@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from suboctave.analysis.trace import Settings
 from suboctave.bifurcation import KINDS
 from suboctave.bifurcation.formulation import Formulation, formulation_of
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod, method_of
@@ -36,7 +36,7 @@ def make_settings(
     events = tuple(events) if isinstance(events, Iterable) and not isinstance(events, Event) else (events,)
     for event in events:
         if not isinstance(event, Event):
-            raise InputError(f"events must be Event objects, got {event!r}")
+            raise InputError(f"events must be Event objects, got {shortened(event)}")
     if len({e.name for e in events}) < len(events):
         raise InputError("two events have the same name")
     for event in events:
@@ -48,13 +48,13 @@ def make_settings(
     stepping = stepping or SteppingOptions()
     if max_step is not None:
         if not (is_number(max_step) and max_step > 0.0):
-            raise InputError(f"max_step must be a positive number, not {max_step!r}")
+            raise InputError(f"max_step must be a positive number, not {shortened(max_step)}")
         if max_step <= stepping.min_step:
             raise InputError(f"max_step={max_step:g} is below the smallest step that is taken, {stepping.min_step:g}")
         stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
     dof = system.observed_dof if observe is None else observe
     if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
-        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
+        raise InputError(f"observe={shortened(dof)} is out of range: the system has {system.n} DOFs, numbered from 0")
     solving = formulation_of(formulation)
     return Settings(newton or NewtonOptions(), stepping, method_of(stability), events, int(dof), solving)
 
@@ -119,7 +119,24 @@ def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
 
 
 def is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
+    """Whether it is a finite real number that a float can hold."""
+    try:
+        return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
+def read_values(system: System, parameters: Any) -> dict[str, float]:
+    """Values of some parameters of a system; InputError for what is none."""
+    if parameters is None:
+        return {}
+    if not isinstance(parameters, Mapping):
+        raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
+    for name, value in parameters.items():
+        system.check_parameter(name)
+        if isinstance(value, bool) or not is_number(value):
+            raise InputError(f"parameters: {name!r} must be a finite number, not {shortened(value)}")
+    return {name: float(value) for name, value in parameters.items()}
 
 
 def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:
@@ -133,7 +150,7 @@ def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, 
     try:
         first, last = (float(b) for b in bounds)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name}={bounds!r}: give two numbers, (from, to)") from None
+        raise InputError(f"{name}={shortened(bounds)}: give two numbers, (from, to)") from None
     if not (math.isfinite(first) and math.isfinite(last)) or first == last:
         raise InputError(f"{name}=({first:g}, {last:g}): the range must have two different finite ends")
     if positive and min(first, last) <= 0.0:

@@ -347,7 +347,13 @@ class _Follower:
         return found
 
     def _event_value(self, event: Event, sample: Sample) -> float:
-        value = event.function(orbit_of(sample))
+        orbit = orbit_of(sample)
+        try:
+            value = event.function(orbit)
+        except Exception as failure:
+            where = sample.point.curve.where(sample.point.u)
+            failure.add_note(f"raised by the function of the event {event.name!r} at {where}")
+            raise
         try:
             number = float(value)
         except (TypeError, ValueError, OverflowError):

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.analysis.checks import is_number
+from suboctave.analysis.checks import is_number, read_values
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
-from suboctave.errors import InputError
+from suboctave.errors import InputError, shortened
 from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -185,7 +185,7 @@ def integrate(
     start = start_state(system, state)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
     transient = _not_negative("transient", transient)
-    values = {name: float(value) for name, value in (parameters or {}).items()}
+    values = read_values(system, parameters)
     with reporting(progress, "integrating") as report:
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
@@ -238,5 +238,5 @@ def _samples(method: str, given: int | None) -> int:
 
 def _not_negative(name: str, value: Any) -> int:
     if not (is_number(value) and float(value).is_integer() and value >= 0):
-        raise InputError(f"{name} must be a whole number of periods, not {value!r}")
+        raise InputError(f"{name} must be a whole number of periods, not {shortened(value)}")
     return int(value)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
+from suboctave.analysis.checks import read_values
 from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.progress import reporting, timed
@@ -28,7 +29,7 @@ from suboctave.errors import InputError, suggest
 from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.batch import Flow, check_count, check_extent
 from suboctave.timedomain.motions import check_motions
 from suboctave.timedomain.recognition import extents
 from suboctave.version import __version__
@@ -266,7 +267,7 @@ def lyapunov_exponents(
         If a motion leaves the range of numbers.
     """
     first = start_state(system, state)
-    values = {name: float(value) for name, value in (parameters or {}).items()}
+    values = read_values(system, parameters)
     if method == "two_trajectories":
         method = TwoTrajectories()
     if isinstance(method, TwoTrajectories):
@@ -280,6 +281,7 @@ def lyapunov_exponents(
         raise InputError(f"count={count}: a system of {system.n} degrees of freedom has {size} exponents")
     periods, trajectories = check_count("periods", periods), check_count("trajectories", trajectories)
     transient = _not_negative("transient", transient)
+    check_extent(trajectories, transient + periods, trajectories * periods * (count + 1))
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=count)
     with reporting(progress, "Lyapunov exponents") as report:
         check_forces(system, first, float(omega), values)

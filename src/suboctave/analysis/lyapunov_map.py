@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.analysis.brute_force import _grid, _spread
-from suboctave.analysis.checks import check_parameter
+from suboctave.analysis.checks import check_parameter, read_values
 from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.lyapunov import smooth_weights
@@ -21,7 +21,7 @@ from suboctave.errors import InputError
 from suboctave.model.element import Array
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
-from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.batch import Flow, check_count, check_extent
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -173,20 +173,19 @@ def lyapunov_map(
     """
     first = start_state(system, state)
     check_parameter(system, parameter)
-    fixed = {name: float(value) for name, value in (parameters or {}).items()}
-    for name in fixed:
-        system.check_parameter(name)
+    fixed = read_values(system, parameters)
     if parameter in fixed:
         raise InputError(f"parameters= fixes {parameter}, which is to be varied")
     if not (isinstance(counts, tuple | list) and len(counts) == 2):
         raise InputError(f"counts={counts!r}: give the number of frequencies and that of values, such as (60, 40)")
+    transient, periods = _not_negative("transient", transient), check_count("periods", periods)
+    if periods < 2 * _STRETCHES:
+        raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
+    cells = check_count("counts", counts[0]) * check_count("counts", counts[1])
+    check_extent(cells, transient + periods, 2 * cells * periods * system.n)
     frequencies = _spread("omega", omega, check_count("counts", counts[0]), True)
     at = system.with_parameters(fixed) if fixed else system
     _, _, column = _grid(at, float(frequencies[0]), parameter, values, check_count("counts", counts[1]))
-    transient = _not_negative("transient", transient)
-    periods = check_count("periods", periods)
-    if periods < 2 * _STRETCHES:
-        raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
     check_forces(at, first, float(frequencies[0]), {parameter: float(column[0])})
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=1)
     shape = len(column), len(frequencies)

@@ -11,7 +11,7 @@ import numpy as np
 
 from suboctave.analysis.checks import is_number
 from suboctave.continuation.problem import Array
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, path_of, suggest
 
 __all__ = ["Measured", "read_measured"]
 
@@ -69,7 +69,7 @@ def read_measured(
     for name, value in (("scale", scale), ("omega_scale", omega_scale)):
         if not (is_number(value) and value > 0.0):
             raise InputError(f"{name} must be a positive number, not {value!r}")
-    place = Path(path)
+    place = path_of(path)
     try:
         with place.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)

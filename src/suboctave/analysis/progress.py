@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import Any, ParamSpec, Protocol, TypeVar
 
+from suboctave.analysis.extreme_numbers import extreme_number
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import limited
 
@@ -70,9 +71,12 @@ def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
         try:
             result = within(*positional, **named)
         except (ZeroDivisionError, OverflowError) as failure:
+            extreme = extreme_number(*positional, *named.values())
+            if extreme is None or hasattr(failure, "__notes__"):  # a mistake of ours, or of a user's function
+                raise
             raise ConvergenceError(
-                f"the numbers left the range of floating point ({failure}): look at the sizes of parameters, loads and "
-                "ranges, or choose units in which they are near one"
+                f"the numbers left the range of floating point ({failure}), with {extreme} among them: choose units in "
+                "which sizes are nearer to 1"
             ) from failure
         result.seconds = perf_counter() - begin
         return result

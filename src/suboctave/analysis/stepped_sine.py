@@ -29,7 +29,7 @@ from suboctave.harmonic.basis import ComplexArray
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.batch import Flow, check_count, check_extent
 from suboctave.timedomain.motions import Motions, check_motions
 
 __all__ = ["check_stepped_sine", "stepped_sine"]
@@ -138,6 +138,8 @@ def _checked(
         raise InputError(f"noise must be a standard deviation in the unit of the response, 0 or more, not {noise!r}")
     check_tolerance(period_tolerance)
     _loads(system, float(grid[0]))
+    tests = len(grid) * (2 if direction == "both" else 1)
+    check_extent(tests, settle + measure, tests * 2 * system.n * (len(multiples) + 3))
     test = _Test(system, grid, settle, measure, multiples, float(noise), check_observe(system, observe))
     return test, start, _tap(system, tap, grid)
 

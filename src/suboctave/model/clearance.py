@@ -20,7 +20,7 @@ from suboctave.errors import InputError
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient, coefficient
 from suboctave.model.sampling import Piece, PiecewiseLinear, RoundedPiece, SharpSampling
-from suboctave.model.stops import ElasticStop, check_stiffness
+from suboctave.model.stops import ElasticStop, check_sharpness, check_stiffness
 
 __all__ = ["Clearance", "Freeplay"]
 
@@ -74,8 +74,8 @@ class _Play(Element):
         left, right = (source.value(values) for source in self.coefficients[1:3])
         if left > right:
             raise InputError(f"{self.label}: the play is negative ({right - left:g}) at the system's parameters")
-        if self.regularised and self.coefficients[3].value(values) <= 0.0:
-            raise InputError(f"{self.label}: regularization must be positive (1 / length, larger is sharper)")
+        if self.regularised:
+            check_sharpness(self.label, self.coefficients[3].value(values), max(abs(left), abs(right)))
 
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at both ends of the play."""

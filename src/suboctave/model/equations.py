@@ -21,7 +21,7 @@ from suboctave.model.element import BaseElement
 from suboctave.model.equation_forces import Forces
 from suboctave.model.expression import RESERVED
 from suboctave.model.law_code import expanded_size, harmonic_of
-from suboctave.model.law_syntax import PRIME, corner_functions, read, symbol
+from suboctave.model.law_syntax import LONGEST, PRIME, corner_functions, read, symbol
 from suboctave.model.law_text import as_text
 from suboctave.model.loads import HarmonicLoad, Load
 
@@ -35,6 +35,9 @@ def parts_of(equations: str | Sequence[str], parameters: Mapping[str, float]) ->
     texts = [equations] if isinstance(equations, str) else list(equations)
     if not texts or any(not isinstance(text, str) for text in texts):
         raise InputError("equations must be a text or a sequence of texts, such as [\"x'' + x = p*cos(omega*t)\"]")
+    longest = max(map(len, texts))
+    if longest > LONGEST:
+        raise InputError(f"an equation of {longest} characters is too long (at most {LONGEST})")
     texts = [text.replace("\u2032", "'").replace("\u2019", "'") for text in texts]
     return _Equations(texts, dict(parameters)).parts()
 

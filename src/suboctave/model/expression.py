@@ -205,7 +205,7 @@ def _shortened(text: str) -> str:
 class _Form:
     """A node that has been read: its names, its closure, and what is known about it."""
 
-    __slots__ = ("affine", "constant", "evaluate", "names")
+    __slots__ = ("affine", "constant", "evaluate", "names", "power")
 
     def __init__(
         self,
@@ -213,11 +213,13 @@ class _Form:
         names: frozenset[str] = frozenset(),
         constant: float | None = None,
         affine: dict[str, float] | None = None,
+        power: float = 1.0,
     ) -> None:
         self.evaluate = evaluate
         self.names = names
         self.constant = constant  # its number, if no name occurs
         self.affine = affine  # the factor of every name, if it is affine in all of them
+        self.power = power  # the highest power of anything in it, powers of powers multiplied
 
 
 class _Reader:
@@ -275,7 +277,7 @@ class _Reader:
         f, value = inner.evaluate, inner.constant
         if value is not None:
             return self.number(lambda: -value)
-        return _Form(lambda values: -f(values), inner.names, None, _scaled(inner.affine, -1.0))
+        return _Form(lambda values: -f(values), inner.names, None, _scaled(inner.affine, -1.0), inner.power)
 
     def call(self, name: str, inner: _Form) -> _Form:
         function, f, value = FUNCTIONS[name], inner.evaluate, inner.constant
@@ -285,8 +287,11 @@ class _Reader:
 
     def binary(self, operation: ast.operator, left: _Form, right: _Form) -> _Form:
         a, b, evaluate = left.constant, right.constant, None
-        if isinstance(operation, ast.Pow) and b is not None and abs(b) > _LARGEST_POWER:
-            raise self.refuse(f"the power {b:g} is larger than {_LARGEST_POWER}")
+        power = max(left.power, right.power)
+        if isinstance(operation, ast.Pow) and b is not None:
+            power = left.power * abs(b)
+            if max(power, abs(b)) > _LARGEST_POWER:
+                raise self.refuse(f"the power {max(power, abs(b)):g} is larger than {_LARGEST_POWER}")
         evaluate = _operation(operation, left.evaluate, right.evaluate, a, b)
         if evaluate is None:
             other = "; write ** for a power" if isinstance(operation, ast.BitXor) else ""
@@ -294,7 +299,8 @@ class _Reader:
         if a is not None and b is not None:
             compute = evaluate
             return self.number(lambda: compute({}))
-        return _Form(evaluate, left.names | right.names, None, self.affine(operation, left, right))
+        affine = self.affine(operation, left, right)
+        return _Form(evaluate, left.names | right.names, None, affine, max(1.0, power))
 
     def affine(self, operation: ast.operator, left: _Form, right: _Form) -> dict[str, float] | None:
         """Factors of the names, where the operation keeps the expression affine with finite factors."""

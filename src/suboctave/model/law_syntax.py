@@ -18,7 +18,7 @@ from typing import Any
 from suboctave.errors import InputError, suggest
 from suboctave.model.expression import FUNCTIONS
 
-__all__ = ["PRIME", "corner_functions", "read", "symbol"]
+__all__ = ["LONGEST", "PRIME", "corner_functions", "read", "symbol"]
 
 #: what a prime is written as while Python parses the text: a letter of the same length
 PRIME = "\u02c8"
@@ -28,7 +28,7 @@ _ELSEWHERE = {
     "ln": "log", "arctan": "atan", "arcsin": "asin", "arccos": "acos", "fabs": "abs", "Abs": "abs", "Max": "max",
     "Min": "min", "sgn": "sign", "Heaviside": "heaviside", "step": "heaviside", "pow": "x**y instead",
 }  # fmt: skip
-_LONGEST, _DEEPEST, _LARGEST_POWER, _LARGEST_INTEGER = 10_000, 300, 1000, 10**12
+LONGEST, _DEEPEST, _LARGEST_POWER, _LARGEST_INTEGER = 10_000, 300, 1000, 10**12
 _MOST_OPERATIONS = 500
 
 
@@ -78,8 +78,8 @@ def read(text: str, where: str, names: Iterable[str] | None = None) -> Any:
         With the column and the part of the text that is not allowed.
     """
     plain = text.replace("\u2032", "'").replace("\u2019", "'").replace("'", PRIME)
-    if len(plain) > _LONGEST:
-        raise InputError(f"{where}: {len(plain)} characters are too many (at most {_LONGEST})")
+    if len(plain) > LONGEST:
+        raise InputError(f"{where}: {len(plain)} characters are too many (at most {LONGEST})")
     begin = len(plain) - len(plain.lstrip())
     try:
         tree = ast.parse(plain.strip(), mode="eval").body
@@ -91,7 +91,29 @@ def read(text: str, where: str, names: Iterable[str] | None = None) -> Any:
         column = getattr(error, "offset", None)
         at = f" at column {begin + column}" if column else ""
         raise InputError(f"{where}{at}: cannot read {_shortened(text)}: {getattr(error, 'msg', error)}") from None
-    return _Reader(plain, begin, where, None if names is None else frozenset(names)).read(tree, 0)
+    found = _Reader(plain, begin, where, None if names is None else frozenset(names)).read(tree, 0)
+    import sympy
+
+    if not all(_has_float(number) for number in found.atoms(sympy.Number)):
+        raise InputError(f"{where}: a factor of {_shortened(text)} is not a finite real number")
+    return found
+
+
+def _has_float(number: Any) -> bool:
+    try:
+        return math.isfinite(float(number))
+    except OverflowError:
+        return False
+
+
+def _power(expression: Any) -> float:
+    """The highest power of anything in an expression; powers of powers are multiplied."""
+    if expression.is_Pow and expression.exp.is_number:
+        return _power(expression.base) * abs(float(expression.exp))
+    parts = [_power(part) for part in expression.args] if expression.is_Add or expression.is_Mul else []
+    if not parts:
+        return 1.0 if expression.free_symbols else 0.0
+    return sum(parts) if expression.is_Mul else max(parts)
 
 
 def _shortened(text: str) -> str:
@@ -219,7 +241,7 @@ class _Reader:
             case ast.Pow():
                 if not b.free_symbols:
                     exponent = self.real(node, b)
-                    if abs(exponent) > _LARGEST_POWER:
+                    if max(1.0, _power(a)) * abs(exponent) > _LARGEST_POWER:
                         raise self.refuse(node, f"the power is larger than {_LARGEST_POWER}")
                     if float(2.0 * exponent).is_integer():
                         b = sympy.Rational(int(2.0 * exponent), 2)

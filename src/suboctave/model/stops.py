@@ -43,6 +43,21 @@ def check_stiffness(element: Element, values: Mapping[str, float]) -> None:
         )
 
 
+#: sharpness, and sharpness times gap, beyond which the squares of rounded laws leave the range of floats
+_SHARPEST = 1e100
+
+
+def check_sharpness(label: str, s: float, gap: float = 0.0) -> None:
+    """Refuse a regularization that is not positive, or so sharp or so blunt that its law has no numbers."""
+    if s <= 0.0:
+        raise InputError(f"{label}: regularization must be positive (1 / length, larger is sharper), not {s:g}")
+    if not 1.0 / _SHARPEST <= s <= _SHARPEST / max(1.0, abs(gap)):
+        raise InputError(
+            f"{label}: regularization={s:g} with a gap of {gap:g} is beyond what numbers resolve (1e-100 to 1e100): "
+            "leave it out for the exact law, or choose units in which the gap is nearer to 1"
+        )
+
+
 class ElasticStop(Element):
     """A one-sided spring: force `stiffness * (u - gap)` beyond the gap (`side="right"`: u > gap, `"left"`: u < gap).
 
@@ -81,7 +96,7 @@ class ElasticStop(Element):
         self._sign = _SIDES[side]
         self._rounded = (RoundedPiece(0, 1, 2, self._sign),)
         if self.regularised and self.coefficients[2].constant:
-            self._check_sharpness(self.coefficients[2].value({}))
+            check_sharpness(self.label, self.coefficients[2].value({}))
 
     @property
     def label(self) -> str:
@@ -103,13 +118,7 @@ class ElasticStop(Element):
                 f"preloaded stop that acts above it"
             )
         if self.regularised:
-            self._check_sharpness(self.coefficients[2].value(values))
-
-    def _check_sharpness(self, s: float) -> None:
-        if s <= 0.0:
-            raise InputError(
-                f"{self.label}: regularization must be positive (1 / length, larger is sharper), not {s:g}"
-            )
+            check_sharpness(self.label, self.coefficients[2].value(values), gap.value(values))
 
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gap with width 1/s."""

@@ -172,7 +172,7 @@ class System:
             has = suggest(str(name), self.parameters) or "; it has none"
             raise InputError(f"the system has no parameter {name!r}{has}")
 
-    def _expressions(self) -> Iterator[tuple[str, Coefficient, bool]]:
+    def expressions(self) -> Iterator[tuple[str, Coefficient, bool]]:
         """Every expression: where it stands, itself, and whether it may contain omega."""
         for matrix in (self.mass, self.damping, self.stiffness):
             for source in matrix.coefficients:
@@ -186,7 +186,7 @@ class System:
 
     def _check_names(self) -> None:
         used: set[str] = set()
-        for where, source, in_load in self._expressions():
+        for where, source, in_load in self.expressions():
             for name in sorted(source.names):
                 if name == "omega" and not in_load:
                     raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
@@ -202,7 +202,7 @@ class System:
 
     def _check_values(self, changed: Mapping[str, float]) -> None:
         """Refuse values at which an expression has no number or the mass is not a mass."""
-        for where, source, _ in self._expressions():
+        for where, source, _ in self.expressions():
             if source.names and "omega" not in source.names:
                 try:
                     source.value(self.parameters)
@@ -366,7 +366,10 @@ def _name(name: Any) -> str:
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise InputError(f"parameter {name!r} must be a number, not {value!r}")
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        number = math.inf
     if not math.isfinite(number):
         raise InputError(f"parameter {name!r} must be finite, not {number}")
     return number

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, path_of, suggest
 from suboctave.pictures import style
 from suboctave.pictures.legend import place_legend
 from suboctave.pictures.periods import curve_styles, period_name, period_of, styles_of_periods
@@ -261,9 +261,8 @@ def draw_gaps(frames: Frames, datasets: Sequence[xarray.Dataset], view: MotionVi
 
 def check_path(path: str | Path | None) -> None:
     """InputError for a file of a form that figures do not have, before any work."""
-    if path is not None and Path(path).suffix.lower() not in SUFFIXES:
-        suffix = Path(path).suffix.lower()
-        raise InputError(f"cannot tell the form of {Path(path).name!r} from its suffix{suggest(suffix, SUFFIXES)}")
+    if path is not None and (suffix := path_of(path).suffix.lower()) not in SUFFIXES:
+        raise InputError(f"cannot tell the form of {path_of(path).name!r} from its suffix{suggest(suffix, SUFFIXES)}")
 
 
 def _columns(frames: int, size: str | tuple[float, float] | None) -> int:

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, path_of, suggest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: float = 300.0) -> Path
     """
     import matplotlib
 
-    target = Path(path)
+    target = path_of(path)
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"cannot tell the form of {target.name!r} from its suffix{suggest(suffix, SUFFIXES)}")

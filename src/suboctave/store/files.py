@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, path_of
 from suboctave.store.blocks import digest
 from suboctave.store.layout import LAYOUT
 from suboctave.version import __version__
@@ -33,7 +33,7 @@ def free_place(path: str | Path, overwrite: bool = False, suffixes: tuple[str, .
 
     Raises InputError where a file exists and `overwrite` is not given, or the folder is missing or not writable.
     """
-    target = Path(path)
+    target = path_of(path)
     if suffixes and target.suffix.lower() not in suffixes:
         raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
     if target.is_dir():
@@ -110,7 +110,7 @@ def read(path: str | Path) -> dict[str, xarray.Dataset]:
 
     Raises InputError for what is missing, no results file, damaged, or written by a newer version.
     """
-    source = Path(path)
+    source = path_of(path)
     if not source.exists():
         raise InputError(f"there is no file {source}")
     if source.is_dir():

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, path_of
 from suboctave.store.blocks import pack, unpack
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def read_journal(path: str | Path) -> tuple[list[Record], int, bool]:
 
     Raises InputError where the file is missing or no journal.
     """
-    source = Path(path)
+    source = path_of(path)
     try:
         content = source.read_bytes()
     except OSError as error:
@@ -93,7 +93,7 @@ class Journal:
     @classmethod
     def create(cls, path: str | Path) -> Journal:
         """A new journal; InputError if there is one already."""
-        place = Path(path)
+        place = path_of(path)
         try:
             file = open(place, "xb")  # noqa: SIM115 - it stays open
         except FileExistsError:
@@ -109,7 +109,7 @@ class Journal:
     @classmethod
     def reopen(cls, path: str | Path) -> Journal:
         """The journal of an earlier run, its torn end cut off."""
-        place = Path(path)
+        place = path_of(path)
         records, end, torn = read_journal(place)
         try:
             file = open(place, "r+b")  # noqa: SIM115 - it stays open

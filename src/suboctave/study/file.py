@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, path_of, suggest
 from suboctave.model.description import describe
 from suboctave.model.system import System
 from suboctave.study.curve_figures import CURVE_FIGURES, CurveFigure
@@ -101,7 +101,7 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
 
     Raises StudyError (an InputError) with every mistake and its line.
     """
-    source = Path(path)
+    source = path_of(path)
     text = _text(source)
     content = _parsed(source, text)
     mistakes = Mistakes(str(source), Lines(text))

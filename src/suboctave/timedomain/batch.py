@@ -19,7 +19,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.interruption import Interruption, check_time
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -36,8 +36,9 @@ METHODS = ("accurate", "newmark")
 Report = Callable[[float, str], None]
 #: seconds between two looks at whether to go on
 _LOOK = 0.1
-#: numbers that one answer may hold
-_LARGEST = 400_000_000
+#: numbers that one answer may hold, periods of the load that all trajectories together may take (weeks on one
+#: processor), and the largest count of anything
+_LARGEST, _LONGEST, _MOST = 400_000_000, 100_000_000_000, 100_000_000
 
 
 class Flow:
@@ -134,11 +135,7 @@ class Flow:
         x, w, varied = self._broadcast(states, omega, parameters or {})
         total = periods * self.samples
         skip = min(max(int(skip), 0), total)
-        if len(x) * (total - skip) * 2 * self.structure.n > _LARGEST:
-            raise InputError(
-                f"{len(x)} trajectories with {total - skip} states each are more than fit: keep fewer (a longer "
-                "transient, or fewer trajectories at once)"
-            )
+        check_extent(len(x), periods, len(x) * (total - skip) * 2 * self.structure.n)
         which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
         numbers = self.structure.numbers(w, varied)
         return _Run(self, numbers, x, which, total, skip, measure).go(workers, report)
@@ -169,11 +166,11 @@ class Flow:
         self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
     ) -> tuple[Array, Array, dict[str, Array]]:
         n = self.structure.n
-        x, w = np.asarray(states, dtype=float), np.asarray(omega, dtype=float)
+        x, w = _floats("states", states), _floats("omega", omega)
         varied = {}
         for name, values in parameters.items():
             self.system.check_parameter(name)
-            varied[name] = np.asarray(values, dtype=float)
+            varied[name] = _floats(name, values)
         if x.ndim not in (1, 2) or x.shape[-1] != 2 * n:
             raise InputError(
                 f"states of {n} degrees of freedom have the shape ({2 * n},) or (B, {2 * n}): displacements, then "
@@ -362,8 +359,31 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
+def _floats(name: str, given: ArrayLike) -> Array:
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be a finite number or an array of them, not {shortened(given)}") from None
+
+
 def check_count(name: str, value: int) -> int:
     """A positive whole number, or `InputError`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InputError(f"{name} must be a positive whole number, not {value!r}")
+        raise InputError(f"{name} must be a positive whole number, not {shortened(value)}")
+    if value > _MOST:
+        raise InputError(f"{name}={shortened(int(value))} is more than {_MOST}, the largest count that is taken")
     return int(value)
+
+
+def check_extent(trajectories: int, periods: int, numbers: int) -> None:
+    """Refuse what would not fit in memory (so many numbers are kept), or would take years."""
+    if numbers > _LARGEST:
+        raise InputError(
+            f"{trajectories} trajectories over {periods} periods leave {numbers:.1e} numbers, more than fit (at most "
+            f"{_LARGEST:.1e}): keep fewer (a longer transient, fewer trajectories at once, a coarser grid)"
+        )
+    if trajectories * periods > _LONGEST:
+        raise InputError(
+            f"{trajectories} trajectories over {periods} periods are {trajectories * periods:.1e} periods of the load, "
+            f"more than can be waited for (at most {_LONGEST:.1e}): take fewer of either"
+        )

@@ -1,0 +1,140 @@
+"""What no computer can do, or no number can hold, is refused before any work; what users raise stays their own."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.errors import ConvergenceError, InputError
+
+DUFFING = so.library.duffing()
+HUGE = 10**400
+SQUARE = {"omega": 1.0, "box": ((-1, 1), (-1, 1))}
+
+
+def expression(text):
+    return so.System(1.0, 0.1, 1.0, [so.Expression(0, text)], [so.HarmonicLoad(0, 1.0)])
+
+
+def spring(text):
+    return so.System(1.0, 0.1, 1.0, [so.CubicSpring(0, text)], [so.HarmonicLoad(0, 1.0)], parameters={"a": 1 / 9})
+
+
+MISTAKES = {
+    "steps that would not fit": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), steps=10**9), "count"),
+    "steps beyond any array": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), steps=HUGE), "count"),
+    "settling for years": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), settle=10**8, steps=10**4), "waited"),
+    "a grid that would not fit": (lambda: so.basins(DUFFING, **SQUARE, grid=(10**6, 10**6)), "fit"),
+    "a side beyond any array": (lambda: so.basins(DUFFING, **SQUARE, grid=(HUGE, 2)), "count"),
+    "basins for years": (lambda: so.basins(DUFFING, **SQUARE, grid=(2000, 2000), periods=10**8), "waited"),
+    "a box of no numbers": (lambda: so.basins(DUFFING, omega=1.0, box=((-HUGE, 1), (-1, 1))), "two numbers"),
+    "periods for years": (lambda: so.integrate(DUFFING, omega=1.0, periods=10**12), "count"),
+    "a transient for years": (lambda: so.integrate(DUFFING, omega=1.0, periods=1, transient=10**12), "count"),
+    "sections that would not fit": (lambda: so.poincare_sections(DUFFING, omega=1.0, periods=10**8 * 3), "count"),
+    "a diagram that would not fit": (
+        lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1.0), count=10**7, periods=100),
+        "fit",
+    ),
+    "exponents for years": (
+        lambda: so.lyapunov_exponents(DUFFING, omega=1.0, periods=10**4, trajectories=10**8),
+        "fit",
+    ),
+    "a map that would not fit": (
+        lambda: so.lyapunov_map(DUFFING, omega=(0.5, 1.0), parameter="F", values=(0.5, 1.0), counts=(10**5, 10**5)),
+        "fit",
+    ),
+    "a parameter of 400 digits": (lambda: so.library.duffing(F=HUGE), "finite"),
+    "another one": (lambda: DUFFING.with_parameters({"F": HUGE}), "finite"),
+    "of the integrator": (lambda: so.integrate(DUFFING, omega=1.0, parameters={"F": HUGE}), "finite number"),
+    "a parameter that is none": (lambda: so.integrate(DUFFING, omega=1.0, parameters={"F": "1"}), "finite number"),
+    "parameters that are none": (lambda: so.integrate(DUFFING, omega=1.0, parameters=[("F", 1.0)]), "mapping"),
+    "a mass of 400 digits": (lambda: so.System(HUGE, 0.1, 1.0, loads=[so.HarmonicLoad(0, 1.0)]), "finite"),
+    "a range of 400 digits": (lambda: so.frequency_response(DUFFING, (0.5, HUGE)), "two numbers"),
+    "a frequency of 400 digits": (lambda: so.integrate(DUFFING, omega=HUGE), "finite number"),
+    "a step of 400 digits": (lambda: so.frequency_response(DUFFING, (0.5, 0.6), max_step=HUGE), "max_step"),
+    "a state of 400 digits": (lambda: so.integrate(DUFFING, [HUGE, 0], omega=1.0), "finite numbers"),
+    "too sharp a stop": (lambda: so.library.reference_oscillator(regularization=1e300), "exact law"),
+    "too blunt a stop": (lambda: so.library.reference_oscillator(regularization=1e-300), "exact law"),
+    "too sharp a play": (
+        lambda: so.System(1.0, 0.1, 1.0, [so.Freeplay(0, 1.0, 0.5, regularization=1e300)], [so.HarmonicLoad(0, 1.0)]),
+        "exact law",
+    ),
+    "powers of powers": (lambda: expression("((x**1000)**1000)**1000"), "power"),
+    "powers of sums of powers": (lambda: expression("((x + 1)**1000 + 1)**1000"), "power"),
+    "factors beyond floats": (lambda: expression("1e308*1e308*x"), "finite"),
+    "powers of powers of a parameter": (lambda: spring("(((9*a)**1000)**1000)**1000"), "power"),
+    "a tower": (lambda: expression("9**9**9**9*x"), "power"),
+    "an equation with a tower": (
+        lambda: so.System.from_equations("x'' + ((x**1000)**1000)**1000 = cos(omega*t)"),
+        "power",
+    ),
+    "an equation of a megabyte": (lambda: so.System.from_equations("x" * 10**6 + "=1"), "too long"),
+    "no file": (lambda: so.load(None), "name"),
+    "a number for a file": (lambda: so.load(12), "name"),
+    "bytes for a file": (lambda: so.load(b"a.nc"), "name"),
+    "a name too long for a file": (lambda: so.load("a" * 5000), "too long"),
+    "a folder for a file": (lambda: so.load("."), "folder"),
+    "nowhere to save to": (lambda: so.integrate(DUFFING, omega=1.0, periods=1).save(None), "name"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_what_cannot_be_done_is_refused_in_one_line(case):
+    call, words = MISTAKES[case]
+    begin = perf_counter()
+    with pytest.raises(InputError) as refused:
+        call()
+    message = str(refused.value)
+    assert words in message
+    assert "\n" not in message
+    assert len(message) < 400
+    assert perf_counter() - begin < 2.0  # far below what any of them would take
+
+
+@pytest.mark.parametrize("verb", [so.frequency_response, so.bifurcation_diagram])
+@pytest.mark.parametrize("mistake", [ZeroDivisionError, OverflowError, KeyError, RuntimeError])
+def test_what_the_function_of_an_event_raises_is_its_users(verb, mistake):
+    def fails(orbit):
+        if orbit.omega > 0.55:
+            raise mistake("mine")
+        return 1.0
+
+    with pytest.raises(mistake, match="mine") as raised:
+        verb(so.library.duffing(c=0.1), (0.5, 0.6), harmonics=3, events=[so.Event("hot", fails)])
+    (note,) = raised.value.__notes__
+    assert "'hot' at omega = 0.55" in note
+    assert raised.traceback[-1].name == "fails"
+
+
+def test_a_mistake_in_the_program_is_not_taken_for_one_of_units(monkeypatch):
+    """Searches go on after a ConvergenceError: a division by zero of ours must not be one."""
+
+    def divides(*arguments):
+        return 1 // 0
+
+    monkeypatch.setattr("suboctave.analysis.verbs.check_system", divides)
+    with pytest.raises(ZeroDivisionError):
+        so.frequency_response(DUFFING, (0.5, 0.6))
+
+
+@pytest.mark.parametrize(
+    ("system", "omega", "culprit"),
+    [
+        (so.library.duffing(m=1e-100), (0.5, 0.6), "m = 1e-100"),
+        (so.library.duffing(F=1e100), (0.5, 0.6), "F = 1e+100"),
+        (DUFFING, (1e-100, 2e-100), "1e-100"),
+    ],
+)
+def test_numbers_that_leave_the_range_of_floats_are_named(system, omega, culprit):
+    with pytest.raises(ConvergenceError, match="choose units") as refused:
+        so.frequency_response(system, omega, harmonics=3)
+    assert culprit in str(refused.value)
+
+
+def test_numbers_of_numpy_are_numbers():
+    one = so.integrate(DUFFING, omega=1.0, periods=1, parameters={"F": 0.5})
+    other = so.integrate(DUFFING, omega=np.float64(1.0), periods=np.int64(1), parameters={"F": np.float32(0.5)})
+    np.testing.assert_array_equal(one.displacement, other.displacement)
