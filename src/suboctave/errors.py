@@ -1,4 +1,4 @@
-"""What the package raises, and how it helps with a misspelt name.
+"""What the package raises, how it helps with a misspelt name, and how it reads what users give.
 
 Every message says what happened, where, and what to change. Wrong input is refused before any work.
 """
@@ -6,13 +6,18 @@ Every message says what happened, where, and what to change. Wrong input is refu
 from __future__ import annotations
 
 import difflib
+import math
+import numbers
 import os
 import reprlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["ConvergenceError", "InputError", "SuboctaveError", "TimeLimitError", "path_of", "shortened", "suggest"]
+__all__ = [
+    "ConvergenceError", "InputError", "SuboctaveError", "TimeLimitError", "check_numbers", "is_number", "path_of",
+    "shortened", "suggest",
+]  # fmt: skip
 
 
 class SuboctaveError(Exception):
@@ -33,6 +38,21 @@ class ConvergenceError(SuboctaveError, ArithmeticError):
 
 class TimeLimitError(SuboctaveError):
     """A time limit (`seconds=`) that was reached before there was anything to keep."""
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite real number that a float can hold."""
+    try:
+        return isinstance(value, numbers.Real) and math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
+def check_numbers(**given: Any) -> None:
+    """Refuse what is no finite number, by its name."""
+    for name, value in given.items():
+        if isinstance(value, bool) or not is_number(value):
+            raise InputError(f"{name} must be a finite number, not {shortened(value)}")
 
 
 _shown = reprlib.Repr()

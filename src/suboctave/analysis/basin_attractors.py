@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from suboctave.analysis.attractors import Attractor
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.tree import BifurcationDiagram
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
 from suboctave.model.element import Array
@@ -199,7 +199,7 @@ def read_attractors(catalogue: Catalogue, given: Any) -> list[Given]:
     elif isinstance(given, Iterable):
         named = [(None, one) for one in given]
     else:
-        raise InputError(f"attractors={given!r}: give motions, branches or diagrams, in a sequence or by name")
+        raise InputError(f"attractors={shortened(given)}: give motions, branches or diagrams, in a sequence or by name")
     read = []
     for name, one in named:
         if isinstance(one, BifurcationDiagram):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from suboctave.analysis.attractors import TOLERANCE
 from suboctave.analysis.basin_attractors import BasinAttractor, Catalogue, read_attractors
 from suboctave.analysis.basin_run import APERIODIC, GONE, OPEN, BasinRun
-from suboctave.analysis.checks import check_range, is_number, read_values
+from suboctave.analysis.checks import check_omega, check_range, read_values
 from suboctave.analysis.integration import start_state
 from suboctave.analysis.poincare import check_observe
 from suboctave.analysis.progress import reporting, timed
@@ -263,8 +263,7 @@ def basins(
     """
     values = read_values(system, parameters)
     state = start_state(system, rest)
-    if not (is_number(omega) and omega > 0.0):
-        raise InputError(f"omega must be a positive number, not {omega!r}")
+    check_omega(omega)
     observe = check_observe(system, observe)
     columns = check_plane(system, plane, observe)
     sides, counts = _box(box), _grid(grid)

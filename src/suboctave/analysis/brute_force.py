@@ -335,13 +335,18 @@ def _starts(start: str | Sequence[str]) -> list[str]:
             raise InputError(
                 f"start is one of {', '.join(_STARTS)}, or several of them, not {one!r}{suggest(str(one), _STARTS)}"
             )
+    if not listed:
+        raise InputError(f"start is one of {', '.join(_STARTS)}, or several of them, not none")
     return list(dict.fromkeys(listed))
 
 
 def _fresh(system: System, states: Any) -> Array:
     if states is None:
         return np.zeros((0, 2 * system.n))
-    array = np.atleast_2d(np.asarray(states, dtype=float))
+    try:
+        array = np.atleast_2d(np.asarray(states, dtype=float))
+    except (TypeError, ValueError, OverflowError):
+        array = np.zeros(0)
     if array.ndim != 2 or array.shape[1] != 2 * system.n or not np.isfinite(array).all():
         raise InputError(f"states must be finite numbers of shape (k, {2 * system.n}), got {array.shape}")
     return array

@@ -13,7 +13,7 @@ from suboctave.analysis.trace import Settings
 from suboctave.bifurcation import KINDS
 from suboctave.bifurcation.formulation import Formulation, formulation_of
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
-from suboctave.errors import InputError, shortened, suggest
+from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod, method_of
@@ -102,8 +102,15 @@ def _check_held(system: System) -> None:
 
 def check_parameter(system: System, name: str) -> None:
     """Refuse a name that is neither "omega" nor a parameter."""
-    if name != "omega" and name not in system.parameters:
+    if not isinstance(name, str) or (name != "omega" and name not in system.parameters):
         raise InputError(f"unknown parameter {name!r}{suggest(str(name), ['omega', *system.parameters])}")
+
+
+def check_omega(omega: Any) -> float:
+    """One circular frequency of the load."""
+    if not (is_number(omega) and omega > 0.0):
+        raise InputError(f"omega must be a positive number, not {shortened(omega)}")
+    return float(omega)
 
 
 def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
@@ -116,14 +123,6 @@ def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
             except InputError as failure:
                 raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
     return first, last
-
-
-def is_number(value: Any) -> bool:
-    """Whether it is a finite real number that a float can hold."""
-    try:
-        return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
-    except OverflowError:  # a whole number of hundreds of digits
-        return False
 
 
 def read_values(system: System, parameters: Any) -> dict[str, float]:

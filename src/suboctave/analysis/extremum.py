@@ -35,7 +35,7 @@ from suboctave.compiled import computation_begins
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import Factor, length, one_thread
 from suboctave.continuation.problem import Array
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.interruption import check_time, limited
 
@@ -77,7 +77,8 @@ def locate_extremum(
         If Newton's method does not converge.
     """
     if not is_extremum(extremum):
-        raise InputError(f"locate_extremum starts from one of the .extrema of a tracked curve, not {extremum!r}")
+        given = shortened(extremum)
+        raise InputError(f"locate_extremum starts from one of the .extrema of a tracked curve, not {given}")
     if len(extremum.names) != 2:
         raise InputError(f"this extremum lies on a curve in {', '.join(extremum.names)}: give one in two parameters")
     chosen = formulation_of(formulation)

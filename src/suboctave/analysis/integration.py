@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.analysis.checks import is_number, read_values
+from suboctave.analysis.checks import check_omega, is_number, read_values
 from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.time_result import TimeResult
-from suboctave.errors import InputError, shortened
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow, check_count
+from suboctave.timedomain.batch import METHODS, Flow, check_count
 from suboctave.timedomain.motions import check_motions
 from suboctave.version import __version__
 
@@ -185,7 +185,7 @@ def integrate(
     start = start_state(system, state)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
     transient = _not_negative("transient", transient)
-    values = read_values(system, parameters)
+    values, omega = read_values(system, parameters), check_omega(omega)
     with reporting(progress, "integrating") as report:
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
@@ -233,6 +233,8 @@ def start_state(system: System, state: Any) -> Array:
 
 
 def _samples(method: str, given: int | None) -> int:
+    if method not in METHODS:
+        raise InputError(f"method={shortened(method)}{suggest(str(method), METHODS)}")
     return check_count("steps_per_period", _SAMPLES.get(method, 200) if given is None else given)
 
 

@@ -39,12 +39,15 @@ from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import NewtonOptions, SteppingOptions
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 
-__all__ = ["find_isolas"]
+__all__ = ["MOST_VALUES", "find_isolas"]
+
+#: values of a parameter at which whole responses are followed
+MOST_VALUES = 10_000
 
 #: share of the work that the responses make, for progress
 _SHARE = 0.6
@@ -209,8 +212,11 @@ def find_isolas(
 
 def _checked_values(values: Any, low: float, high: float) -> list[float]:
     if isinstance(values, int) and not isinstance(values, bool):
-        if values < 2:
-            raise InputError(f"values must be at least 2, or the values of the parameter themselves, not {values}")
+        if not 2 <= values <= MOST_VALUES:
+            raise InputError(
+                f"values must be from 2 to {MOST_VALUES}, or the values of the parameter themselves, not "
+                f"{shortened(values)}"
+            )
         return [float(v) for v in np.linspace(low, high, values)]
     given = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
     if not given or not all(is_number(v) and low <= v <= high for v in given):

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
-from suboctave.analysis.checks import read_values
+from suboctave.analysis.checks import check_omega, read_values
 from suboctave.analysis.forces import check_forces
 from suboctave.analysis.integration import _not_negative, start_state
 from suboctave.analysis.progress import reporting, timed
@@ -267,7 +267,7 @@ def lyapunov_exponents(
         If a motion leaves the range of numbers.
     """
     first = start_state(system, state)
-    values = read_values(system, parameters)
+    values, omega = read_values(system, parameters), check_omega(omega)
     if method == "two_trajectories":
         method = TwoTrajectories()
     if isinstance(method, TwoTrajectories):

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.analysis import contacts, transmission
 from suboctave.continuation.problem import Array
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.system import System
 from suboctave.store.columns import parameter_column
@@ -325,6 +325,8 @@ def _on_points(branch: Any, reading: Reading) -> Array:
 def _listed(branch: Any, names: Iterable[str] | bool) -> list[Reading]:
     if isinstance(names, bool):
         names = branch.available_readings() if names else []
+    if not isinstance(names, Iterable):
+        raise InputError(f"readings must be names, or True for all, not {shortened(names)}")
     chosen = [names] if isinstance(names, str) else list(names)
     return [read_reading(name) for name in dict.fromkeys(chosen)]
 

@@ -28,6 +28,7 @@ from suboctave.analysis.checks import (
     make_settings,
 )
 from suboctave.analysis.identity import lies_on
+from suboctave.analysis.isolas import MOST_VALUES
 from suboctave.analysis.isolas_found import Isolas
 from suboctave.analysis.junction import period_name
 from suboctave.analysis.making import Harmonics, rule_of
@@ -38,7 +39,7 @@ from suboctave.analysis.regime_slices import Slice, beyond, introduce, looked
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.analysis.verbs import continue_branch
 from suboctave.continuation import NewtonOptions, SteppingOptions
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, pass_on, unlimited
 from suboctave.model.system import System
@@ -130,6 +131,8 @@ def regime_map(
     for name, number, least in wanted:
         if isinstance(number, bool) or not isinstance(number, int) or number < least:
             raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
+        if name == "values" and number > MOST_VALUES:
+            raise InputError(f"values={shortened(number)}: whole responses are followed at each, at most {MOST_VALUES}")
     if not is_number(resolution) or not 0.0 < resolution < 0.5:
         raise InputError(f"resolution must be a share of the range between 0 and 0.5, not {resolution!r}")
     if isolas is not None and (not isinstance(isolas, Isolas) or isolas.parameter != parameter):
@@ -175,8 +178,10 @@ def _checked_motions(
     for orbit in given:
         if not isinstance(orbit, PeriodicOrbit):
             raise InputError(f"motions must be PeriodicOrbit objects, not {type(orbit).__name__}")
+        if set(orbit.values) != set(system.parameters):
+            raise InputError(f"the motion {orbit!r} is one of another system")
         inside = bounds[0] <= orbit.values[name] <= bounds[1] and omega[0] <= orbit.omega <= omega[1]
-        if not inside or set(orbit.values) != set(system.parameters):
+        if not inside:
             raise InputError(f"the motion {orbit!r} does not lie in the plane of the map")
         others = [n for n, v in system.parameters.items() if n != name and orbit.values[n] != v]
         if others:

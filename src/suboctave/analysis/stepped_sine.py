@@ -24,7 +24,7 @@ from suboctave.analysis.integration import FEW, start_state
 from suboctave.analysis.poincare import check_observe, check_tolerance
 from suboctave.analysis.progress import Report, reporting, timed
 from suboctave.analysis.stepped_result import SteppedSine
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.element import Array
@@ -88,7 +88,7 @@ def stepped_sine(
     ConvergenceError
         If the motion leaves the range of numbers.
     """
-    given = (steps, direction, settle, measure, state, tap, harmonics, noise, period_tolerance, observe)
+    given = (steps, direction, settle, measure, state, tap, harmonics, noise, seed, period_tolerance, observe)
     test, start, where = _checked(system, omega, *given)
     grid, directions = test.grid, ("up", "down") if direction == "both" else (direction,)
     flows = tuple(Flow(system, "accurate", samples, 1000, tolerance, lanes=FEW) for samples in (1, _SAMPLES))
@@ -109,8 +109,7 @@ def stepped_sine(
 
 def check_stepped_sine(system: System, omega: Any, **arguments: Any) -> None:
     """Refuse arguments of `stepped_sine`; nothing is computed."""
-    arguments.pop("seed", None)
-    _checked(system, omega, period_tolerance=TOLERANCE, **arguments)
+    _checked(system, omega, **{"seed": 0, **arguments}, period_tolerance=TOLERANCE, **arguments)
 
 
 def _checked(
@@ -124,6 +123,7 @@ def _checked(
     tap: Any,
     harmonics: Sequence[float],
     noise: float,
+    seed: int,
     period_tolerance: float,
     observe: int | None,
 ) -> tuple[_Test, Array, tuple[float, int, float] | None]:
@@ -137,6 +137,10 @@ def _checked(
     if not (is_number(noise) and noise >= 0.0):
         raise InputError(f"noise must be a standard deviation in the unit of the response, 0 or more, not {noise!r}")
     check_tolerance(period_tolerance)
+    try:
+        np.random.default_rng(seed)
+    except (TypeError, ValueError):
+        raise InputError(f"seed must be a whole number, 0 or more, not {shortened(seed)}") from None
     _loads(system, float(grid[0]))
     tests = len(grid) * (2 if direction == "both" else 1)
     check_extent(tests, settle + measure, tests * 2 * system.n * (len(multiples) + 3))

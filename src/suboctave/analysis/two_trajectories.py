@@ -9,14 +9,14 @@ changes the trajectory: the step, the offset, where it begins. Here it is taken 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from suboctave.analysis.time_result import TimeResult
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened
 from suboctave.interruption import pass_on
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -62,6 +62,16 @@ class TwoTrajectories:
         if self.integrator not in METHODS:
             raise InputError(f"integrator={self.integrator!r} must be one of {', '.join(METHODS)}")
         check_count("periods", self.periods)
+        given: Any
+        for name, given in (("steps_per_period", self.steps_per_period), ("tolerances", self.tolerances)):
+            if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+                raise InputError(f"{name} must be several numbers, one for each setting, not {shortened(given)}")
+        given = self.offset if isinstance(self.offset, tuple) else (self.offset,)
+        if not given:
+            raise InputError("offset must be a number or several of them, not none")
+        for value in given:
+            check_numbers(offset=value)
+        check_numbers(saturation=self.saturation)
         for steps in self.steps_per_period:
             check_count("steps_per_period", steps)
         if not all(0.0 < offset < 1.0 for offset in self.offsets):

@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.problem import Array, Curve, Evaluation
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, check_numbers
 from suboctave.interruption import check_time
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
@@ -48,6 +48,7 @@ class NewtonOptions:
     damped: bool = False
 
     def __post_init__(self) -> None:
+        check_numbers(tolerance=self.tolerance, correction=self.correction, iterations=self.iterations)
         if not (0.0 < self.tolerance < 1e-2 and 0.0 < self.correction < 1.0 and self.iterations >= 1):
             raise InputError(
                 f"NewtonOptions out of range: {self}; tolerance in (0, 1e-2), correction in (0, 1), iterations >= 1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, check_numbers
 
 __all__ = ["SteppingOptions"]
 
@@ -40,6 +40,7 @@ class SteppingOptions:
     max_points: int = 20000
 
     def __post_init__(self) -> None:
+        check_numbers(**vars(self))
         if not 0.0 < self.min_step <= self.initial_step:
             raise InputError(
                 f"initial_step={self.initial_step:g} must be positive and not below min_step={self.min_step:g}"

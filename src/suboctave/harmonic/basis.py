@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, is_number, shortened
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -39,6 +39,8 @@ def harmonic_index(k: float, nu: int) -> int:
     InputError
         If it is none of them, with the nearest that is.
     """
+    if not is_number(k):
+        raise InputError(f"k must be a multiple of omega, not {shortened(k)}")
     index = k * nu
     if math.isfinite(index) and index > -1e-9 and abs(index - round(index)) <= 1e-9:
         return round(index)

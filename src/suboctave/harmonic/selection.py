@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
-from suboctave.errors import InputError
+from suboctave.errors import InputError, check_numbers
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.state import BalanceState, length
 from suboctave.lazy import lazy
@@ -72,6 +72,7 @@ class AdaptiveHarmonics:
     maximum: int = 127
 
     def __post_init__(self) -> None:
+        check_numbers(**vars(self))
         if not (0.0 < self.event_tolerance <= self.tolerance < 0.1):
             raise InputError(
                 f"need 0 < event_tolerance <= tolerance < 0.1, got {self.event_tolerance:g} and {self.tolerance:g}"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, check_numbers, shortened
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.element import Array, BaseElement, Element
 from suboctave.model.sampling import (
@@ -73,6 +73,11 @@ def check_derivatives(
     numbers. Errors are relative to the largest value that the derivative takes there; `rtol` bounds them. Of a coupled
     element, u and v are (m, N), one row per input.
     """
+    if not isinstance(element, BaseElement):
+        raise InputError(f"the first argument must be an element such as CubicSpring(..), not {shortened(element)}")
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
+    check_numbers(**{str(name): value for name, value in (parameters or {}).items()})
     c = element.coefficient_values(parameters or {})
     if isinstance(element, CoupledElement):
         from suboctave.model.derivative_check_coupled import check_coupled

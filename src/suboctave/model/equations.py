@@ -32,7 +32,7 @@ _MOST_TERMS = 500
 
 def parts_of(equations: str | Sequence[str], parameters: Mapping[str, float]) -> dict[str, Any]:
     """Mass, damping, stiffness, elements, loads and names of the DOFs: the arguments of `System`."""
-    texts = [equations] if isinstance(equations, str) else list(equations)
+    texts = [equations] if isinstance(equations, str) else list(equations) if isinstance(equations, Iterable) else []
     if not texts or any(not isinstance(text, str) for text in texts):
         raise InputError("equations must be a text or a sequence of texts, such as [\"x'' + x = p*cos(omega*t)\"]")
     longest = max(map(len, texts))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.coupled import CoupledElement
 from suboctave.model.damping_check import check_damping
 from suboctave.model.element import Array, BaseElement
@@ -132,6 +132,8 @@ class System:
     # ------------------------------------------------------------------------------------------------- parameters
     def with_parameters(self, changes: Mapping[str, float] | None = None, /, **more: float) -> System:
         """The same system with other values of some parameters; the sides of its stops stay as they are."""
+        if changes is not None and not isinstance(changes, Mapping):
+            raise InputError(f"values of parameters are given as a mapping {{name: number}}, not {shortened(changes)}")
         changed = {**(changes or {}), **more}
         for name, value in changed.items():
             self.check_parameter(name)
@@ -168,7 +170,7 @@ class System:
 
     def check_parameter(self, name: str) -> None:
         """Raise `InputError`, with a suggestion, if there is no parameter of this name."""
-        if name not in self.parameters:
+        if not isinstance(name, str) or name not in self.parameters:
             has = suggest(str(name), self.parameters) or "; it has none"
             raise InputError(f"the system has no parameter {name!r}{has}")
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, shortened
 from suboctave.pictures import style
 from suboctave.pictures.boundary_lines import is_boundary, plane_of
 from suboctave.pictures.interactive import figure_data
@@ -73,6 +73,8 @@ def write_report(
         If there is nothing to show, or the file exists and is not to be replaced, or cannot be written there.
     """
     target = free_place(path, overwrite, (".html", ".htm"))
+    if not isinstance(results, Mapping):
+        raise InputError(f"results must be a mapping {{name: curve}}, not {shortened(results)}")
     parts = {str(name): _part(str(name), item) for name, item in results.items()}
     if not parts:
         raise InputError("a report needs at least one result")

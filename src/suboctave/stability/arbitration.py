@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.state import BalanceState
 from suboctave.interruption import check_time
 from suboctave.stability.methods import Hill, KoopmanHill, Monodromy, StabilityMethod
@@ -42,6 +42,8 @@ class Arbitration(StabilityMethod):
     follows_monodromy: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        if not isinstance(self.witnesses, Sequence):
+            raise InputError(f"witnesses must be several methods, as (Hill(),), not {shortened(self.witnesses)}")
         for witness in self.witnesses:
             if not isinstance(witness, StabilityMethod) or isinstance(witness, Arbitration):
                 raise InputError(f"a witness must be a method such as Hill() or KoopmanHill(), not {witness!r}")

@@ -19,7 +19,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from suboctave.errors import InputError, shortened, suggest
+from suboctave.errors import InputError, check_numbers, shortened, suggest
 from suboctave.interruption import Interruption, check_time
 from suboctave.model.element import Array
 from suboctave.model.system import System
@@ -78,6 +78,7 @@ class Flow:
         if method not in METHODS:
             raise InputError(f"method={method!r}{suggest(str(method), METHODS)}")
         tolerance = 1e-10 if tolerance is None else tolerance
+        check_numbers(tolerance=tolerance)
         if not 1e-15 <= tolerance <= 1e-2:
             raise InputError(f"tolerance={tolerance!r}: give a number from 1e-15 to 1e-2, relative to the motion")
         samples = check_count("samples", samples)
@@ -168,6 +169,8 @@ class Flow:
         n = self.structure.n
         x, w = _floats("states", states), _floats("omega", omega)
         varied = {}
+        if not isinstance(parameters, Mapping):
+            raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
         for name, values in parameters.items():
             self.system.check_parameter(name)
             varied[name] = _floats(name, values)
@@ -228,7 +231,7 @@ class _Run:
 
     def go(self, workers: int | None, report: Report | None) -> Motions:
         """Follow all of them."""
-        many = min(workers or _processors(), len(self.groups))
+        many = min(_processors() if workers is None else check_count("workers", workers), len(self.groups))
         try:
             if many <= 1:
                 for g in range(len(self.groups)):
