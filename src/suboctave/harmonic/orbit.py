@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, shortened
 from suboctave.harmonic import instants
 from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex
@@ -100,7 +100,11 @@ class PeriodicOrbit:
 
     def _series(self, t: Array | float, order: int) -> Array:
         rate = self.basis.multiples * self.omega
-        waves = np.exp(1j * np.multiply.outer(np.atleast_1d(np.asarray(t, float)), rate)) * (1j * rate) ** order
+        try:
+            times = np.atleast_1d(np.asarray(t, float))
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(f"t must be a time or an array of times, not {shortened(t)}") from None
+        waves = np.exp(1j * np.multiply.outer(times, rate)) * (1j * rate) ** order
         result = np.real(waves @ self.amplitudes).T
         return result[:, 0] if np.ndim(t) == 0 else result
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, shortened
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient
 from suboctave.model.sampling import AdaptiveSampling
@@ -143,6 +143,8 @@ class Callable(Element):
     def _value(self, u: Array, v: Array, c: Array) -> Array:
         try:
             f = np.asarray(self.function(u, v, *c))
+            if f.dtype.kind not in "biufc":
+                raise TypeError(f"it returned {shortened(f.tolist())}, no numbers")
         except Exception as error:
             raise InputError(f"{self.label}: the function failed with {type(error).__name__}: {error}") from error
         if np.iscomplexobj(f) or f.shape != u.shape:

@@ -70,6 +70,10 @@ class QuadraticDamper(Element):
         return np.zeros((1, 1, len(u)))
 
 
+#: velocity of smoothing below which squares of its inverse leave the range of floats
+_SLOWEST = 1e-100
+
+
 class TanhFriction(Element):
     """`f = force * tanh(v / velocity)`: dry friction, smoothed over the velocity given. Units: force, velocity.
 
@@ -103,6 +107,10 @@ class TanhFriction(Element):
     def _check_velocity(self, v: float) -> None:
         if v <= 0.0:
             raise InputError(f"{self.label}: velocity must be positive (smaller is closer to dry friction), not {v:g}")
+        if v < _SLOWEST:
+            raise InputError(
+                f"{self.label}: velocity={v:g} is below {_SLOWEST:g}: choose units in which it is nearer to 1"
+            )
 
     def sampling(self, c: Array) -> SharpVelocitySampling:
         """Poles of tanh at `v = +- i pi / 2 velocity`."""

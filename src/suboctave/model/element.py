@@ -54,7 +54,10 @@ class Place:
         return dofs
 
     def _read_vector(self, direction: ArrayLike) -> Array:
-        vector = np.array(direction, dtype=float)
+        try:
+            vector = np.array(direction, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            vector = np.zeros(0)
         if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
             raise InputError(f"{self.owner}: direction must be a vector of finite numbers, not all zero")
         vector.setflags(write=False)

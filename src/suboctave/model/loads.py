@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, shortened
 from suboctave.model.element import Array, Dof, Place, required
 from suboctave.model.expression import ZERO, Coefficient, coefficient
 from suboctave.model.matrix import MatrixCoefficient
@@ -20,6 +20,8 @@ from suboctave.model.recorded import Recorded
 __all__ = ["HarmonicLoad", "Load", "LoadComponent", "Matrices"]
 
 Number = float | str | Coefficient
+#: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
+_HIGHEST = 10_000
 #: mass, damping and stiffness of the structure that a load acts on
 Matrices = tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]
 
@@ -70,6 +72,8 @@ class Load(Recorded, ABC, family="load"):
             harmonic = -1
         if harmonic < least or isinstance(given, bool):
             raise InputError(f"{self.label}: harmonic must be an integer from {least} on, not {given!r}")
+        if harmonic > _HIGHEST:
+            raise InputError(f"{self.label}: harmonic={shortened(harmonic)} is more than {_HIGHEST}, the highest taken")
         return harmonic
 
 

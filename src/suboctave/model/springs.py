@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, is_number
 from suboctave.model.element import Array, Dof, Element, required
 from suboctave.model.expression import Coefficient
 from suboctave.model.sampling import PolynomialSampling
@@ -130,7 +130,7 @@ def _read(kind: str, coefficients: Any) -> tuple[tuple[int, ...], list[Number]]:
                 f"{kind}: a power is larger than {LARGEST_POWER}, from which on u**power is no number at u = 2 and "
                 "beyond; a wall is an ElasticStop"
             )
-        if isinstance(factor, str | Coefficient) or factor != 0:
+        if not is_number(factor) or factor != 0:
             read[index] = factor
     if not read:
         raise InputError(f"{kind}: every coefficient is zero")

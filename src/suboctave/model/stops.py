@@ -28,7 +28,7 @@ from suboctave.model.expression import Coefficient
 from suboctave.model.rounding import at_rest, at_rest_by_gap, at_rest_by_sharpness
 from suboctave.model.sampling import Piece, PiecewiseLinear, RoundedPiece, SharpSampling
 
-__all__ = ["ElasticStop", "check_stiffness"]
+__all__ = ["ElasticStop", "check_sharpness", "check_stiffness"]
 
 _SIDES = {"right": 1, "left": -1}
 
