@@ -34,6 +34,8 @@ ANSWERS = Path(__file__).parents[1] / "tests" / "data" / "random_systems.json"
 SAME = 2e-4
 #: difference of the motions at two events that are one, relative to the motion
 ALIKE = 0.03
+#: seeds from which on loads are strong and ranges wide
+STRONG = 200
 #: seconds that the judge may take for one curve
 PATIENCE = 60.0
 Description = dict[str, Any]
@@ -78,7 +80,10 @@ def describe(seed: int) -> Description:
         hardening = [0.0, 0.0, 0.1 * depth, 0.0, 0.0]
         laws.append({"kind": "polynomial", "direction": np.eye(n)[0].tolist(), "coefficients": hardening})
     dof = int(rng.integers(n))
-    loads = [{"dof": dof, "amplitude": rng.uniform(0.1, 0.8), "harmonic": 1, "phase": 0.0}]
+    # from here on the loads are strong and the range is wide
+    strong = seed >= STRONG
+    amplitude = rng.uniform(0.8, 3.0) if strong else rng.uniform(0.1, 0.8)
+    loads = [{"dof": dof, "amplitude": amplitude, "harmonic": 1, "phase": 0.0}]
     if rng.uniform() < 0.25:
         harmonic = 3 if symmetric else int(rng.integers(2, 4))
         phase = rng.uniform(0.0, 2.0 * np.pi)
@@ -86,7 +91,7 @@ def describe(seed: int) -> Description:
     if not symmetric and rng.uniform() < 0.25:
         loads.append({"dof": int(rng.integers(n)), "amplitude": rng.uniform(0.05, 0.5), "harmonic": 0, "phase": 0.0})
     natural = np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
-    low, high = 0.7 * float(natural.min()), 2.4 * float(natural.min())
+    low, high = (share * natural.min() for share in ((0.5, 3.0) if strong else (0.7, 2.4)))
     ends = [low, high] if rng.uniform() < 0.5 else [high, low]
     plain = {"mass": mass.tolist(), "damping": damping.tolist(), "stiffness": stiffness.tolist()}
     # plain numbers of Python's, as a file of JSON holds them

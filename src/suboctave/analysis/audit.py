@@ -7,6 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 
+#: scaled arclength up to which two stretches in doubt are at one place of the branch: a share of a usual step
+PLACE = 0.01
+
+
 @dataclass(frozen=True)
 class Unsettled:
     """A stretch of a branch in which something may have happened that is not in the list.
@@ -37,13 +41,13 @@ class Unsettled:
 
 
 def joined(stretches: Iterable[Unsettled]) -> list[Unsettled]:
-    """Stretches in the order of the branch, those at one place as one: what overlaps, or lies no farther apart than the
-    longer of two is long.
+    """Stretches in the order of the branch, those at one place as one: what overlaps, or lies no farther apart than
+    PLACE or than the longer of two is long.
     """
     result: list[Unsettled] = []
     for item in sorted(stretches, key=lambda u: u.arclength):
         last = result[-1] if result else None
-        if last is None or item.arclength[0] - last.arclength[1] > max(last.length, item.length):
+        if last is None or item.arclength[0] - last.arclength[1] > max(PLACE, last.length, item.length):
             result.append(item)
             continue
         reasons = last.reason if item.reason in last.reason else f"{last.reason}; {item.reason}"
@@ -113,4 +117,4 @@ class Audit:
         return text + "\n  ".join([f"{len(self.unsettled)} unsettled:", *map(str, self.unsettled)])
 
 
-__all__ = ["Audit", "Unsettled", "joined"]
+__all__ = ["PLACE", "Audit", "Unsettled", "joined"]
