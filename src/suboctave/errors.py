@@ -52,7 +52,7 @@ def check_numbers(**given: Any) -> None:
     """Refuse what is no finite number, by its name."""
     for name, value in given.items():
         if isinstance(value, bool) or not is_number(value):
-            raise InputError(f"{name} must be a finite number, not {shortened(value)}")
+            raise InputError(f"{name}={shortened(value)}: give a finite number")
 
 
 _shown = reprlib.Repr()

@@ -214,7 +214,7 @@ def _checked_values(values: Any, low: float, high: float) -> list[float]:
     if isinstance(values, int) and not isinstance(values, bool):
         if not 2 <= values <= MOST_VALUES:
             raise InputError(
-                f"values must be from 2 to {MOST_VALUES}, or the values of the parameter themselves, not "
+                f"values must be at least 2 and at most {MOST_VALUES}, or the values of the parameter themselves, not "
                 f"{shortened(values)}"
             )
         return [float(v) for v in np.linspace(low, high, values)]

@@ -109,7 +109,7 @@ def stepped_sine(
 
 def check_stepped_sine(system: System, omega: Any, **arguments: Any) -> None:
     """Refuse arguments of `stepped_sine`; nothing is computed."""
-    _checked(system, omega, **{"seed": 0, **arguments}, period_tolerance=TOLERANCE, **arguments)
+    _checked(system, omega, **{"seed": 0, **arguments}, period_tolerance=TOLERANCE)
 
 
 def _checked(
