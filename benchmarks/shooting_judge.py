@@ -695,6 +695,8 @@ class Judge:
             return f"the count of unstable multipliers changes by {difference}, {explained} explained"
         if movement(a.mu, b.mu) > 2.0 * MOVEMENT:
             return "multipliers move fast"
+        if a.product("torus") * b.product("torus") < 0.0 and not changed_pair(a, b):
+            return "a pair may cross the circle and become real"
         return ""
 
     def hides(self, points: list[Point], i: int) -> str:
@@ -842,6 +844,17 @@ def changes(a: Point, b: Point) -> list[tuple[str, tuple[complex, complex] | Non
         if both and (abs(p) > 1.0) != (abs(q) > 1.0):
             found.append(("NS", (p, q)))
     return found
+
+
+def changed_pair(a: Point, b: Point) -> bool:
+    """Whether what changes the sign of prod (1 - mu_i mu_j) is seen: a complex pair that crosses the circle, or two
+    real multipliers that become each other's inverses.
+    """
+    pairs = matched(a.mu, b.mu)
+    real = [(p.real, q.real) for p, q in pairs if max(abs(p.imag) / abs(p), abs(q.imag) / abs(q)) <= 1e-9]
+    saddles = sum((p * r - 1.0) * (q * s - 1.0) < 0.0 for i, (p, q) in enumerate(real) for r, s in real[:i])
+    crossings = sum(kind == "NS" for kind, _ in changes(a, b))
+    return bool((saddles + crossings) % 2)
 
 
 def may_vanish_twice(s: np.ndarray, f: np.ndarray, at: int) -> bool:

@@ -198,7 +198,7 @@ class _Follower:
             if self.previous is not None:
                 self._search(self.previous, new)
             where = new.point
-            self.trace.points.append(BranchPoint(orbit_of(new), new.floquet, where.arclength, where.iterations))
+            self.trace.points.append(BranchPoint(orbit_of(new), new.verdict, where.arclength, where.iterations))
             self.previous = new
         self._crossings = []
         if passage is not None:

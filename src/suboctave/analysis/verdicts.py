@@ -17,6 +17,7 @@ from suboctave.analysis.audit import Unsettled, joined
 from suboctave.analysis.branch import BranchPoint
 from suboctave.analysis.trace import Trace
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.measures import fold_sign, half_sign, in_doubt
 from suboctave.continuation.ending import Ending
 from suboctave.harmonic.state import BalanceState
 from suboctave.interruption import Interruption
@@ -82,7 +83,11 @@ class _Asking:
 
     def settled(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
         """The verdict where one is open, with witnesses."""
-        return self._asked(lambda: self.method.settled(state, found), found)
+
+        def question() -> FloquetResult:
+            return in_doubt(self.method.settled(state, found), fold_sign(state), half_sign(state))
+
+        return self._asked(question, found)
 
     def along(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
         """The method's multipliers in place of others."""

@@ -54,6 +54,13 @@ class Sample:
         return self.method.along(self.state)
 
     @lazy
+    def verdict(self) -> FloquetResult:
+        """Multipliers whose errors cover what det J_0 and det J_half say of them."""
+        if self.at_rest:
+            return self.floquet
+        return measures.in_doubt(self.floquet, self.point.orientation * self.slope, self.half_sign)
+
+    @lazy
     def at_rest(self) -> bool:
         """Whether the motion counts as rest, where its curve can tell."""
         return bool(getattr(self.point.evaluation, "at_rest", False))

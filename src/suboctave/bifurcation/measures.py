@@ -18,6 +18,7 @@ they tell whether something may hide, not what has happened.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import jacobian
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.state import BalanceState
+from suboctave.stability import FloquetResult
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
@@ -56,6 +58,31 @@ def fold(mu: ComplexArray) -> float:
     """fold alone, of any multipliers."""
     sign, log = measured(_ONE, _ONE, 0, mu)[:, 1]
     return float(sign * math.exp(log))
+
+
+def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResult:
+    """Multipliers whose errors cover what the signs of det J_0 (`integer`) and det J_half say of them.
+
+    The signs are the parities of the real multipliers beyond +1 and beyond -1. Where one differs from that of the
+    multipliers, which belong to the motion completed by what it lacks, the one nearest to there lies on either side.
+    """
+    if not result.applicable:
+        return result
+    sign = measured(_ONE, _ONE, 0, result.multipliers)[0]
+    for target, solved, completed in ((1.0, integer, sign[1]), (-1.0, half, sign[2])):
+        if solved * completed >= 0.0:
+            continue
+        distance = np.abs(result.multipliers - target)
+        errors = result.errors.copy()
+        nearest = int(np.argmin(np.where(np.abs(result.multipliers.imag) <= 1e-9, distance, np.inf)))
+        errors[nearest] = max(errors[nearest], 2.0 * distance[nearest])
+        result = replace(result, errors=errors)
+    return result
+
+
+def fold_sign(state: BalanceState) -> float:
+    """Sign of det J_0."""
+    return Factor.of(state.jacobian.T).sign
 
 
 def half_sign(state: BalanceState) -> float:
