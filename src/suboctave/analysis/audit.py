@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-
 #: scaled arclength up to which two stretches in doubt are at one place of the branch: a share of a usual step
 PLACE = 0.01
 
