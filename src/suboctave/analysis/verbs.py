@@ -15,6 +15,7 @@ from suboctave.analysis.progress import reporting, timed
 from suboctave.analysis.starts import linear_response, start_point
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.analysis.switching import leave_along
+from suboctave.analysis.trace import Trace
 from suboctave.analysis.ways import both_ways
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.formulation import Formulation
@@ -122,11 +123,11 @@ def frequency_response(
         else:
             point = start_point(curve, first, start, settings.newton)
             trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
-    if len(trace.points) > 1 and not trace.closed and not searched and trace.points[-1].orbit.omega == first:
-        trace.warnings.append(
-            f"the branch folds back and leaves the range where it began, at omega = {first:.6g}: other motions there "
-            "may lead through the range. Begin at the other end, or choose one with start="
-        )
+    if not searched:
+        named = "" if isinstance(harmonics, str) else f", harmonics={harmonics!r}"
+        named += "" if max_step is None else f", max_step={max_step!r}"
+        call = f"so.frequency_response(system, ({last:.10g}, {first:.10g}){named})"
+        _warn_of_return(trace, "omega", first, call)
     options = options_of(settings, harmonics, {"omega": (first, last)})
     return make_branch(system, "omega", trace, settings, options)
 
@@ -251,7 +252,26 @@ def _from_system(
         settings = settings.reporting_to(report, (first, last))
         point = start_point(curve, first, None, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
+    named = "" if isinstance(wanted, str) else f", harmonics={wanted!r}"
+    named += "" if max_step is None else f", max_step={max_step!r}"
+    call = f"so.continue_branch(system, {parameter!r}, ({last:.10g}, {first:.10g}), omega={omega:.10g}{named})"
+    _warn_of_return(trace, parameter, first, call)
     return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
+
+
+def _warn_of_return(trace: Trace, name: str, first: float, call: str) -> None:
+    """Warn where a branch leaves its range at the end where it began: the motions at the other end lie on another one.
+
+    `call` follows that.
+    """
+    if trace.closed or trace.interrupted or len(trace.points) < 2:
+        return
+    orbit = trace.points[-1].orbit
+    if (orbit.omega if name == "omega" else orbit.values[name]) == first:
+        trace.warnings.append(
+            f"the branch folds back and leaves the range where it began, at {name} = {first:.6g}: what the other end "
+            f"leads to lies on another branch, {call}"
+        )
 
 
 __all__ = ["continue_branch", "frequency_response"]
