@@ -60,6 +60,8 @@ class _Follower:
         self._again: tuple[Sample, ResponseCurve, Sample] | None = None
         self._count = CountCheck()
         self._hidden = HiddenDoublings()
+        #: bifurcations that only more harmonics than the step's have shown
+        self._shown: list[Bifurcation] = []
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._turned: Bifurcation | None = None
         self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
@@ -299,9 +301,13 @@ class _Follower:
         if complaint is not None:
             self._guard.doubt(*complaint)
         if found:
-            # with more harmonics a bifurcation that a hidden pair was counted for may lie ahead again
             met = self.trace.bifurcations[-4:]
             fresh = [pair for pair in found if not any(same_event(pair[1], other) for other in met)]
+            for _, item in found:
+                again = next((other for other in met if same_event(item, other)), None)
+                # of a hidden pair that more harmonics have shown one may lie ahead again
+                if again is not None and item.kind not in CONTACT_KINDS and again not in self._shown:
+                    self._guard.doubt(a, b, f"a second {item.kind} may lie beside that which is listed")
             self.trace.bifurcations += behind_their_grazings(fresh)
         if self._watch is not None and not resting:
             for located, p, q in self._watch.passed(a, b):
@@ -325,6 +331,7 @@ class _Follower:
         """Put a bifurcation into its place on the branch unless it is there already."""
         known = any(same_event(item, other) for other in self.trace.bifurcations[-4:])
         if not known:
+            self._shown.append(item)
             insort(self.trace.bifurcations, item, key=lambda other: other.arclength)
         return not known
 

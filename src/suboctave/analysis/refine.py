@@ -32,6 +32,8 @@ from suboctave.harmonic.state import BalanceState
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
+#: halvings of a step in which a bifurcation is looked for with more harmonics
+_HALVED = 16
 #: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
 _MOVED = 0.05
 #: slope of a branch in its parameter at a branch point, both scaled, below which it turns back there
@@ -50,7 +52,9 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     solution = located.solution
     if solution is None:
         guess = guess_at(located.sample.point.u, located.sample.point, _kappa(located))
-        solution = behind_grazing(located.kind, guess) or _with_more_harmonics(located, a, b)
+        solution = behind_grazing(located.kind, guess)
+        if solution is None or not _lies_between(solution, curve, a, b):
+            solution = _with_more_harmonics(located, a, b)
     if solution is None:
         beside = grazing_beside(guess)
         # the bracket of a grazing shows the excursion itself; across a branch point other tests change, too
@@ -146,10 +150,8 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
     the way with fewer.
     """
-    sample = located.sample
-    curve = sample.point.curve
+    curve, state = located.sample.point.curve, located.sample.state
     assert isinstance(curve, ResponseCurve)
-    state, size = sample.state, b.point.arclength - a.point.arclength
     while curve.adaptive is not None:
         basis = next_harmonics(state, curve.adaptive)
         if basis.count <= state.basis.count:
@@ -157,15 +159,8 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         x = state.basis.resized(state.x, basis)
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
         state = balance.at(x, state.omega, state.values)
-        try:
-            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, located.kind.kappa(sample))
-            found = located.kind.solve(guess)
-        except ConvergenceError:
-            continue
-        wide = curve.with_balance(balance)
-        there = wide.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
-        away = sample.point.weights * (sample.point.curve.transfer(there, wide) - sample.point.u)
-        if located.kind.genuine(found, guess) and length(away) <= size:
+        found = _between(located.kind, curve.with_balance(balance), a, b)
+        if found is not None:
             return found
     return None
 
@@ -228,11 +223,22 @@ def _of_its_own(kind: BifurcationKind, found: Singular, curve: ResponseCurve, a:
     """What was solved for with more harmonics, if it still lies between two samples; else what lies between them with
     these harmonics. Beside a young contact Newton's method may run to the next bifurcation of the kind.
     """
-    value = found.state.omega if curve.name == "omega" else found.state.values[curve.name]
-    there = b.point.curve.transfer(curve.join(found.state.x, value), curve)
-    share = position(a.point, b.point, there)
-    if a is b or (share is not None and -_MOVED <= share <= 1.0 + _MOVED):
+    if a is b or _lies_between(found, curve, a, b):
         return found
+    return _between(kind, curve, a, b) or found
+
+
+def _lies_between(found: Singular, curve: ResponseCurve, a: Sample, b: Sample) -> bool:
+    """Whether a solution, one of the motions of `curve`, lies between two samples, but for what harmonics move."""
+    value = found.state.omega if curve.name == "omega" else found.state.values[curve.name]
+    share = position(a.point, b.point, b.point.curve.transfer(curve.join(found.state.x, value), curve))
+    return share is not None and -_MOVED <= share <= 1.0 + _MOVED
+
+
+def _between(kind: BifurcationKind, curve: ResponseCurve, a: Sample, b: Sample) -> Singular | None:
+    """What lies between two samples with the harmonics of `curve`; None if the test does not change there, or nothing
+    is solved for.
+    """
 
     def sample(point: CurvePoint) -> Sample:
         assert isinstance(point.evaluation, ResponseEvaluation)
@@ -242,9 +248,9 @@ def _of_its_own(kind: BifurcationKind, found: Singular, curve: ResponseCurve, a:
     try:
         first, last = (solved_in(curve, s, newton, sample) for s in (a, b))
     except ConvergenceError:
-        return found
-    located = locate(kind, first, last, newton, sample, guess_at) if kind.changed(first, last) else None
-    return found if located is None or located.solution is None else located.solution
+        return None
+    located = locate(kind, first, last, newton, sample, guess_at, _HALVED) if kind.changed(first, last) else None
+    return None if located is None else located.solution
 
 
 def solved_in(
