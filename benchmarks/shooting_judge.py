@@ -278,10 +278,20 @@ def flow(start, omega, periods, wide, minv, damping, stiffness, dirs, codes, par
                 continue
             g0, r0 = switch(e, z, slope, omega, dirs, codes, pars)
             g1, r1 = switch(e, new, k[12], omega, dirs, codes, pars)
-            if r0 * r1 < 0.0 and min(abs(g0), abs(g1)) <= 2.0 * h * max(abs(r0), abs(r1)):
+            near = min(abs(g0), abs(g1)) <= 2.0 * h * max(abs(r0), abs(r1), h * abs(r1 - r0))
+            if r0 * r1 < 0.0 and near:
                 at = until(e, True, tau, h, z, slope, omega, *system, work)
                 if 1e-10 < at < h - 1e-10:
                     taken = min(taken, at)
+            elif near and h > 1e-3:
+                # two turning points in one step: cut where the velocity is least
+                a0 = a1 = 0.0
+                toward = 1.0 if r0 > 0.0 else -1.0
+                for i in range(n):
+                    a0 += toward * pars[e, 2] * dirs[e, i] * slope[n + i, 0]
+                    a1 += toward * pars[e, 2] * dirs[e, i] * k[12, n + i, 0]
+                if a0 < 0.0 < a1:
+                    taken = min(taken, max(0.05, min(0.95, a0 / (a0 - a1))) * h)
         if taken < h:
             advance(tau, taken, z, slope, omega, *system, k, work, stage, new)
         whole = taken
