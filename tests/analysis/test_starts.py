@@ -24,25 +24,78 @@ def test_contact_closed_at_rest(omega):
 
 
 @pytest.fixture
-def attempts(monkeypatch):
-    """Which of the later attempts were made, each still doing its work."""
+def paths(monkeypatch):
+    """The numbers of harmonics with which a path from a damped structure was followed, each still doing its work."""
     made = []
-    for name in ("_homotopy", "_integrated"):
-        original = getattr(starts, name)
-        monkeypatch.setattr(starts, name, lambda *a, f=original, n=name, **k: (made.append(n), f(*a, **k))[1])
+    original = starts._released
+    monkeypatch.setattr(
+        starts, "_released", lambda curve, *a: (made.append(curve.balance.basis.harmonics), original(curve, *a))[1]
+    )
     return made
 
 
-def test_homotopy_takes_over_where_newton_fails(attempts):
+def test_a_path_takes_over_where_newton_fails(paths):
     """Stiff stops, strong load: from the linear response Newton does not arrive at every frequency."""
     used = 0
     for omega in (0.3, 0.6, 1.0, 1.3):
-        attempts.clear()
+        paths.clear()
         system = so.library.reference_oscillator(Kc=50.0, p=1.7)
         orbit = so.frequency_response(system, (omega, omega * 1.001), 63).orbits[0]
-        used += "_homotopy" in attempts
+        used += bool(paths)
         assert orbit.amplitude() == pytest.approx(shoot(system, orbit.start(), omega).amplitude, rel=1e-3)
     assert used >= 1
+
+
+def random_oscillator(seed):
+    """One to three masses in a row, strongly nonlinear: what kind, and a frequency."""
+    rng = np.random.default_rng(seed)
+    n, omega = int(rng.integers(1, 4)), float(rng.uniform(0.4, 2.5))
+    load, damping = 10.0 ** rng.uniform(-0.5, 1.3), 10.0 ** rng.uniform(-1.2, -0.3)
+    row = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    row[-1, -1] = 1.0
+    links = [0, *((i, i - 1) for i in range(1, n))]
+    hard = 10.0 ** rng.uniform(0.0, 2.0)
+    kinds = [
+        ("no linear stiffness", 0.0, lambda d: [so.CubicSpring(d, hard)]),
+        ("softening", 0.2, lambda d: [so.Expression(d, "3*atan(x)")]),
+        ("double well", -1.0, lambda d: [so.CubicSpring(d, 1.0)]),
+        ("contacts closed at rest", 0.5, lambda d: [so.ElasticStop(d, hard, 0.0)]),
+        ("play without stiffness", 0.0, lambda d: [so.ElasticStop(d, hard, gap) for gap in (0.2, -0.2)]),
+    ]
+    kind, stiffness, law = kinds[seed % len(kinds)]
+    system = so.System(
+        np.eye(n),
+        damping * (np.eye(n) + row),
+        stiffness * row,
+        elements=[element for link in links for element in law(link)],
+        loads=[so.HarmonicLoad(n - 1, load)],
+    )
+    return kind, system, omega
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_any_oscillator_starts(seed):
+    """Whatever is nonlinear: a motion is found, and it is one that shooting finds, too."""
+    _, system, omega = random_oscillator(seed)
+    orbit = so.frequency_response(system, (omega, omega * (1.0 + 1e-6))).orbits[0]
+    exact = shoot(system, orbit.start(), omega).state
+    assert np.abs(exact - orbit.start()).max() < 1e-3 * np.abs(exact).max()
+
+
+def test_a_cubic_spring_alone():
+    """`x'' + 0.25 x' + x^3 = 9 cos t`: nothing linear holds it at rest, and it is no body that is free to move."""
+    spring = so.CubicSpring(dof=0, coefficient=1.0)
+    system = so.System(1.0, 0.25, 0.0, elements=[spring], loads=[so.HarmonicLoad(dof=0, amplitude=9.0)])
+    orbit = so.frequency_response(system, (1.0, 1.2)).orbits[0]
+    assert orbit.amplitude() == pytest.approx(shoot(system, orbit.start(), 1.0).amplitude, rel=1e-5)
+
+
+def test_a_body_that_floats_is_named():
+    """Between its stops a small motion touches neither: any mean will do, and the message says of what."""
+    stops = [so.ElasticStop(0, 10.0, gap) for gap in (0.2, -0.2)]
+    system = so.System(1.0, 0.4, 0.0, elements=stops, loads=[so.HarmonicLoad(0, 1.1)])
+    with pytest.raises(so.ConvergenceError, match=r"nothing holds DOF 0, whose mean position is arbitrary"):
+        so.frequency_response(system, (2.9, 3.0))
 
 
 @pytest.fixture(scope="module")

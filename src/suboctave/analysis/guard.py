@@ -122,6 +122,8 @@ class StepGuard:
         self._solve = solve
         self._branch_point = branch_point
         self._behind: list[Sample] = []
+        #: the branch point behind at which the curve has turned back, while tests still reach back to it
+        self._turned: Crossing | None = None
         self._probes = self._refused = 0
         self._finest, self._longest = np.inf, 0.0
         self._unsettled: list[Unsettled] = []
@@ -145,6 +147,11 @@ class StepGuard:
         step = self._examined(old, new)
         self._probes += step.probes
         self._unsettled += step.unsettled
+        self._turned = step.turned
+        if self._turned is not None:
+            # known now, it explains what was in doubt right before it
+            nearest = self._turned.place - _EXAMINED
+            self._unsettled = [u for u in self._unsettled if u.reason != _RETURNS or u.arclength[0] < nearest]
         for interval in step.settled:
             self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
         self._behind = step.samples[-4:]
@@ -172,13 +179,15 @@ class StepGuard:
     def forget(self) -> None:
         """What lies behind says nothing of what comes (a corner of the equations)."""
         self._behind = []
+        self._turned = None
 
     def _examined(self, old: Sample, new: Sample) -> _Step:
         if self._last is None or self._last[0] is not old or self._last[1] is not new:
             # the last one may have been solved again with other harmonics
             behind = [s for s in self._behind if s.place < old.place]
             behind.append(old)
-            self._last = (old, new, _Step(behind, new, self._solve, self._branch_point, self._between))
+            turned = self._turned if self._turned and behind[0].place < self._turned.place else None
+            self._last = (old, new, _Step(behind, new, self._solve, self._branch_point, self._between, turned))
         return self._last[2]
 
 
@@ -192,6 +201,7 @@ class _Step:
         solve: Callable[[Sample, Sample, float, bool], Sample],
         branch_point: Callable[[Sample, Sample], Crossing | None],
         contacts: Callable[[Sample, Sample], int],
+        turned: Crossing | None = None,
     ) -> None:
         self.contacts = contacts
         self.samples = [*behind, new]
@@ -199,6 +209,7 @@ class _Step:
         self.solve = solve
         self.branch_point = branch_point
         self.crossings: list[Crossing] = []
+        self.turned = turned
         self.size = new.place - self.old.place
         self.probes = 0
         self.refused = False
@@ -246,7 +257,7 @@ class _Step:
         fraction = (place - a.arclength) / self.size
         self.probes += 1
         try:
-            sample = self.solve(self.old, self.new, fraction, bool(self.crossings))
+            sample = self.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
         except ConvergenceError:
             self.refused = self.size > _JUMP
             return []
@@ -285,7 +296,7 @@ class _Step:
         if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
         found = first_doubtful([s.place for s in stencil], [self._measures(s) for s in stencil], at)
-        if found is None or (_REASONS[found[0]] == _RETURNS and h <= _EXAMINED and self._turned):
+        if found is None or (_REASONS[found[0]] == _RETURNS and h <= _EXAMINED and self.turned):
             # right beside the branch point the multiplier at +1 is known up to its error only
             return None
         return found[1], _REASONS[found[0]]
@@ -301,12 +312,13 @@ class _Step:
             known = self.branch_point(p, q)
             if known is not None:
                 self.crossings.append(known)
+                self.turned = known if known.turned is not None else self.turned
         self.refused = self.refused or (known is None and self.size > _JUMP)
         return known
 
     def _measures(self, sample: Sample) -> Array:
         """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
-        crossing = self._turned
+        crossing = self.turned
         if crossing is None or crossing.turned is None:
             return sample.measures
         tests = sample.measures.copy()
@@ -317,11 +329,6 @@ class _Step:
         tests[0, 1] = math.copysign(1.0, change)
         tests[1, 1] = (math.log(abs(change)) if change else -math.inf) - 2.0 * math.log(abs(way))
         return tests
-
-    @property
-    def _turned(self) -> Crossing | None:
-        """The branch point of the step at which the curve turns back."""
-        return next((crossing for crossing in self.crossings if crossing.turns), None)
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
         """The samples to interpolate through, up to two on either side, and the position of p among them.

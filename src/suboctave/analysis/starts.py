@@ -1,8 +1,14 @@
 """The first point of a branch.
 
 From a given motion, or, without one: Newton's method from the linear response; where that fails (it can cycle for
-ever on a contact that is closed at rest), a homotopy that switches the element forces on from 0 to 1 by continuation;
-where that fails, a short time integration from rest.
+ever on a contact that is closed at rest, and nothing is linear about a body between stops), a path that leads from a
+linear structure without resonances to the system,
+
+    share (A X + F) + (1 - share) B X = P,        B_k = omega^2 (1 + i k) m,
+
+from share = 0 to 1 by continuation. At 0 there is one motion, so that a path that stays bounded cannot come back
+there: it reaches 1 through whatever folds lie on the way (Allgower & Georg, Numerical Continuation Methods, 1990,
+chapter 11). Damping and restoring forces bound it, linear stiffness or not, contacts closed at rest or not.
 """
 
 from __future__ import annotations
@@ -11,12 +17,14 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from suboctave.analysis.response import ResponseCurve
+from suboctave.analysis.response import ResponseCurve, ResponseEvaluation
+from suboctave.continuation import kernels
+from suboctave.continuation.linear import length
 from suboctave.continuation.march import March
 from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.point import CurvePoint, make_point, solve_at
@@ -25,10 +33,18 @@ from suboctave.continuation.stepping import SteppingOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.state import BalanceState, apply_blocks
+from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.harmonic.state import apply_blocks
+from suboctave.lazy import lazy
 from suboctave.timedomain import integrate
 
-_SETTLING = 200
+_PATH = "path from a heavily damped linear structure"
+#: how the path is followed: contacts that begin or cease turn it within very short ways
+_STEPPING = SteppingOptions(max_step=0.1, initial_step=0.02, min_step=1e-9, max_points=1500)
+#: singular value of R_X, in units of omega^2 and of the masses, below which something moves freely
+_FREE = 1e-9
+#: growth of the motion along the path from which on it is called unbounded
+_UNBOUNDED = 1e4
 
 
 def linear_response(curve: ResponseCurve, value: float) -> Array:
@@ -80,23 +96,53 @@ def start_point(
                     return _settled(curve, guess, newton, largest, _solve_nearest)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
-    ways: list[tuple[str, Callable[[ResponseCurve, float], Array], ResponseCurve]] = []
+    ways: list[tuple[str, Callable[[], tuple[ResponseCurve, Array]]]] = []
     for finer in _with_more_harmonics(curve):
-        ways.append(("linear response", linear_response, finer))
-        if curve.balance.system.elements:
-            ways.append(("homotopy in the element forces", partial(_homotopy, newton=newton), finer))
-    ways.append(("time integration from rest", partial(_integrated, state=None), finer))
-    for name, guess_by, finer in ways:
+        kept = _like(finer, None, finer.reference)
+        ways += [
+            (f"linear response with {finer.balance.basis.harmonics} harmonics", partial(_linear, finer, value)),
+            (f"{_PATH} with {finer.balance.basis.harmonics}", partial(_released, kept, value, newton)),
+        ]
+    if curve.adaptive is not None:
+        ways.append((f"{_PATH} with as many as it needs", partial(_released, curve, value, newton)))
+    loose = None
+    for name, guess_by in ways:
         try:
-            return _settled(finer, guess_by(finer, value), patient, largest)
+            begun, guess = guess_by()
+            begun = curve.with_balance(begun.balance)
+            loose = _unheld(begun, guess)
+            return _settled(begun, guess, patient, largest)
         except ConvergenceError as failure:
             reason = str(failure)
             if reason not in tried:
-                tried += [f"{name} with {finer.balance.basis.harmonics} harmonics", reason]
+                tried += [name, reason]
     raise ConvergenceError(
-        f"no motion found to start from at {curve.where(linear)}. Tried: " + "; ".join(tried) + ". "
+        f"no motion found to start from at {curve.where(linear)}{loose or ''}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
+
+
+def _unheld(curve: ResponseCurve, u: Array) -> str | None:
+    """What may move freely beside a motion, in words; None if nothing may."""
+    x, omega, values = curve.split(u)
+    state = curve.balance.at(x, omega, values)
+    weights = curve.balance.row_weights(curve.balance.dimension)
+    _, sizes, rows = np.linalg.svd(state.jacobian * weights[:, None] * weights)
+    if sizes[-1] > _FREE * omega**2:
+        return None
+    loose = curve.balance.spread(rows[-1])
+    mean = length(loose[0])
+    if mean < 0.9:
+        return ": an undamped resonance lies there. Give the structure some damping, or go beside it"
+    dof = int(np.argmax(np.abs(loose[0])))
+    return (
+        f": nothing holds DOF {dof}, whose mean position is arbitrary there (it floats between its stops, or has no "
+        "stiffness). Give it a small stiffness, or a load that reaches a stop"
+    )
+
+
+def _linear(curve: ResponseCurve, value: float) -> tuple[ResponseCurve, Array]:
+    return curve, linear_response(curve, value)
 
 
 def _with_more_harmonics(curve: ResponseCurve) -> Iterator[ResponseCurve]:
@@ -108,6 +154,11 @@ def _with_more_harmonics(curve: ResponseCurve) -> Iterator[ResponseCurve]:
     for harmonics in (15, 31, 63):
         if curve.balance.basis.harmonics < harmonics * nu and harmonics <= curve.adaptive.maximum:
             yield curve.with_basis(HarmonicBasis(harmonics * nu, nu))
+
+
+def _like(curve: ResponseCurve, adaptive: AdaptiveHarmonics | None, reference: float) -> ResponseCurve:
+    """The same motions with another rule for harmonics and another size of reference."""
+    return ResponseCurve(curve.balance, curve.name, curve.omega, curve.span, adaptive, reference)
 
 
 def _settled(
@@ -165,76 +216,102 @@ def _from_given(curve: ResponseCurve, value: float, given: Any) -> Array:
     )
 
 
-def _integrated(curve: ResponseCurve, value: float, state: Array | None) -> Array:
-    """Harmonics of the motion that time integration settles on: from a state for one period, from rest until it
-    repeats.
-    """
+def _integrated(curve: ResponseCurve, value: float, state: Array) -> Array:
+    """Harmonics of the motion over one period from a state."""
     balance = curve.balance
     if balance.size != balance.system.n:
         raise ConvergenceError("time integration needs the full system, not a condensed one")
     _, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
-    period = 2.0 * math.pi * balance.basis.nu / omega
-    current = np.zeros(2 * balance.system.n) if state is None else state
-    rounds = _SETTLING if state is None else 1
     samples = 8 * balance.basis.harmonics + 8
-    times = np.arange(samples + 1) * period / samples
-    for _ in range(rounds):
-        trajectory = integrate(balance.system, current, times, omega, values, rtol=1e-6)
-        new = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
-        change = np.abs(new - current).max()
-        current = new
-        if change <= 1e-5 * max(np.abs(current).max(), 1e-300):
-            break
+    times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
+    trajectory = integrate(balance.system, state, times, omega, values, rtol=1e-6)
     spectrum = np.fft.rfft(trajectory.x[:-1], axis=0) / samples
     return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
 
 
-@dataclass(frozen=True, eq=False)
-class _HomotopyEvaluation:
-    state: BalanceState
+@dataclass(eq=False)
+class _HeldEvaluation(ResponseEvaluation):
+    """`share (A X + F) + (1 - share) B X - P` and its derivatives by X and by the share; `hold`: B."""
+
     share: float
+    hold: Array
 
-    @cached_property
+    @lazy
+    def _load(self) -> Array:
+        state = self.state
+        load = state.balance.load(state.values, state.omega)
+        if state.compliance is not None:
+            load = apply_blocks(state.compliance, load)
+        return state.balance.packed(load)
+
+    @lazy
+    def _rate(self) -> Array:
+        return self.state.residual + self._load - self.hold @ self.state.unknowns
+
+    @lazy
     def residual(self) -> Array:
-        """`A X + B (share F - P)`."""
-        return self.state.residual - (1.0 - self.share) * self._force
+        """See above, shape (N,)."""
+        return self.state.residual - (1.0 - self.share) * self._rate
 
-    @cached_property
-    def _force(self) -> Array:
-        force = self.state.force
-        if self.state.compliance is not None:
-            force = apply_blocks(self.state.compliance, force)
-        return self.state.balance.packed(force)
-
-    @cached_property
+    @lazy
     def jacobian(self) -> Array:
-        """Derivatives by X and by the share of the element forces."""
-        full, linear = self.state.jacobian, self.state.linear_jacobian
-        return np.column_stack((linear + self.share * (full - linear), self._force))
+        """Derivatives by X and by the share."""
+        return np.column_stack((self.share * self.state.jacobian + (1.0 - self.share) * self.hold, self._rate))
 
-    @cached_property
+    def bordered_transposed(self, row: Array, weights: Array) -> Array:
+        """See `ResponseEvaluation.bordered_transposed`."""
+        bordered: Array = kernels.bordered_transposed(self.jacobian, row, weights)
+        return bordered
+
+    @lazy
     def error(self) -> float:
         """Residual in units of the forces that balance."""
-        state = self.state
-        weight = state.balance.scales()[1]
-        size = float(np.linalg.norm(self.residual.reshape(-1, state.balance.size) * weight))
-        return size / max(state.force_scale(), np.finfo(float).tiny)
+        balance = self.state.balance
+        size = length(self.residual * balance.row_weights(balance.dimension))
+        return size / max(self.state.force_scale(), np.finfo(float).tiny)
 
 
-class _Homotopy:
-    """Motions with a share of the element forces, from none (linear) to all."""
+class _Held:
+    """Motions of a system that a heavily damped linear structure holds, less and less: share 0 to 1 of its own forces.
+
+    B is `omega^2 (1 + i k / nu) m` at the multiple k omega / nu, m the masses that the DOFs show.
+    """
 
     def __init__(self, curve: ResponseCurve, value: float) -> None:
         self.curve = curve
         self.value = value
+        balance = curve.balance
+        x, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
+        self.rest = balance.at(x, omega, values)
+        if self.rest.compliance is None:
+            multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
+            blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
+            blocks[:] = np.diag(omega**2 * balance.scales()[0] ** 2)
+            self.hold = self.rest.block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None])
+        else:
+            # a condensed structure is known by its compliance alone
+            self.hold = self.rest.linear_jacobian
 
     @property
     def parameter(self) -> int:
         return self.curve.parameter
 
+    def first(self) -> Array:
+        """The held motion without a share of its own: linear."""
+        load = -self.evaluate(self.curve.join(self.rest.x, 0.0)).residual
+        try:
+            return np.append(np.linalg.solve(self.hold, load), 0.0)
+        except np.linalg.LinAlgError:
+            raise ConvergenceError("the condensed structure is free to move, or undamped at its resonance") from None
+
+    def motion(self, u: Array) -> Array:
+        """u as one of the response curve."""
+        return np.append(u[:-1], self.value)
+
     def evaluate(self, u: Array) -> Evaluation:
-        x, omega, values = self.curve.split(self.curve.join(u[:-1], self.value))
-        return _HomotopyEvaluation(self.curve.balance.at(x, omega, values), float(u[-1]))
+        x, omega, values = self.curve.split(self.motion(u))
+        state = self.curve.balance.at(x, omega, values)
+        return _HeldEvaluation(state, self.curve.name, self.curve.reference, float(u[-1]), self.hold)
 
     def size(self, u: Array) -> float:
         return self.curve.size(u)
@@ -245,10 +322,15 @@ class _Homotopy:
         return weights
 
     def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
-        return self
+        adapted = self.curve.adapted(self.motion(u), evaluation)
+        if adapted is self.curve:
+            return self
+        assert isinstance(adapted, ResponseCurve)
+        return _Held(adapted, self.value)
 
     def transfer(self, u: Array, origin: Curve) -> Array:
-        return u
+        assert isinstance(origin, _Held)
+        return self.curve.transfer(u, origin.curve)
 
     def images(self, u: Array) -> list[Array]:
         return [u]
@@ -257,19 +339,31 @@ class _Homotopy:
         return u
 
     def where(self, u: Array) -> str:
-        return f"{u[-1]:.1%} of the element forces at {self.curve.name} = {self.value:.6g}"
+        return f"{u[-1]:.1%} of the system's own forces at {self.curve.name} = {self.value:.6g}"
 
 
-def _homotopy(curve: ResponseCurve, value: float, newton: NewtonOptions) -> Array:
-    """u with all element forces, followed from the linear response."""
-    linear = linear_response(curve, value)
-    problem = _Homotopy(curve, value)
-    first = linear.copy()
-    first[-1] = 0.0
-    point = make_point(solve_at(problem, first, curve.size(linear), newton), problem, None, 0.0)
-    stepping = SteppingOptions(max_step=0.2, initial_step=0.02, max_points=2000)
-    march = March(point, 1.0, (0.0, 1.0), newton, stepping)
+def _released(curve: ResponseCurve, value: float, newton: NewtonOptions) -> tuple[ResponseCurve, Array]:
+    """The motion at a value of the parameter, followed from that of the held system, and its curve.
+
+    Raises
+    ------
+    ConvergenceError
+        If the path does not lead to the system itself.
+    """
+    problem = _Held(curve, value)
+    u = problem.first()
+    # the size of this motion, not of a linear response that a free body or a resonance makes large
+    problem = _Held(_like(curve, curve.adaptive, curve.size(u)), value)
+    point = make_point(solve_at(problem, u, 0.0, newton), problem, None, 0.0)
+    # where the orientation changes a step may have gone over to another path
+    march = March(point, 1.0, (0.0, 1.0), newton, _STEPPING, lambda a, b: a.orientation == b.orientation)
     *_, last = march
-    if abs(last.parameter - 1.0) > 1e-12:
-        raise ConvergenceError(march.ended)
-    return curve.join(last.u[:-1], value)
+    assert isinstance(last.curve, _Held)
+    if abs(last.parameter - 1.0) <= 1e-12:
+        return last.curve.curve, last.curve.motion(last.u)
+    if last.curve.size(last.u) > _UNBOUNDED * curve.size(u):
+        raise ConvergenceError(
+            f"the motion grows without bound at {last.curve.where(last.u)}: neither damping nor restoring forces hold "
+            "the load there"
+        )
+    raise ConvergenceError(march.ended)

@@ -262,7 +262,11 @@ class BalanceState:
     @property
     def linear_jacobian(self) -> Array:
         """The part of R_X that stays without elements: A on the block diagonal."""
-        return self._restricted(self._with_linear(np.zeros((self.x.size,) * 2), self.blocks, None, mean=True))
+        return self.block_diagonal(self.blocks)
+
+    def block_diagonal(self, blocks: ComplexArray) -> Array:
+        """A linear operator given by its blocks (H + 1, size, size), one a harmonic, in the unknowns, as R_X is."""
+        return self._restricted(self._with_linear(np.zeros((self.x.size,) * 2), blocks, None, mean=True))
 
     @staticmethod
     def _with_linear(tangent: Array, blocks: ComplexArray, compliance: ComplexArray | None, mean: bool) -> Array:
