@@ -14,6 +14,7 @@ chapter 11). Damping and restoring forces bound it, linear stiffness or not, con
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -357,7 +358,8 @@ def _released(curve: ResponseCurve, value: float, newton: NewtonOptions) -> tupl
     point = make_point(solve_at(problem, u, 0.0, newton), problem, None, 0.0)
     # where the orientation changes a step may have gone over to another path
     march = March(point, 1.0, (0.0, 1.0), newton, _STEPPING, lambda a, b: a.orientation == b.orientation)
-    *_, last = march
+    # of all its points the last alone is kept: with many harmonics the matrices of hundreds would fill the memory
+    (last,) = deque(march, maxlen=1)
     assert isinstance(last.curve, _Held)
     if abs(last.parameter - 1.0) <= 1e-12:
         return last.curve.curve, last.curve.motion(last.u)
