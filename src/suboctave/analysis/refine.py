@@ -32,6 +32,7 @@ from suboctave.harmonic.state import BalanceState
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
+_NEWTON = NewtonOptions()
 #: halvings of a step in which a bifurcation is looked for with more harmonics
 _HALVED = 16
 #: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
@@ -52,9 +53,10 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     solution = located.solution
     if solution is None:
         guess = guess_at(located.sample.point.u, located.sample.point, _kappa(located))
-        solution = behind_grazing(located.kind, guess)
-        if solution is None or not _lies_between(solution, curve, a, b):
-            solution = _with_more_harmonics(located, a, b)
+        behind = behind_grazing(located.kind, guess)
+        own = behind is not None and _lies_between(behind, curve, a, b)
+        # harmonics may move it beyond the ends of a short step, where it may also be another one
+        solution = behind if own else _with_more_harmonics(located, a, b) or behind
     if solution is None:
         beside = grazing_beside(guess)
         # the bracket of a grazing shows the excursion itself; across a branch point other tests change, too
@@ -152,6 +154,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     """
     curve, state = located.sample.point.curve, located.sample.state
     assert isinstance(curve, ResponseCurve)
+    beyond: Singular | None = None
     while curve.adaptive is not None:
         basis = next_harmonics(state, curve.adaptive)
         if basis.count <= state.basis.count:
@@ -159,10 +162,30 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         x = state.basis.resized(state.x, basis)
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
         state = balance.at(x, state.omega, state.values)
-        found = _between(located.kind, curve.with_balance(balance), a, b)
-        if found is not None:
-            return found
-    return None
+        wide, kind, sample = curve.with_balance(balance), located.kind, located.sample
+        try:
+            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, kind.kappa(sample))
+            found = kind.solve(guess)
+            if kind.genuine(found, guess):
+                if _lies_between(found, wide, a, b):
+                    return found
+                beyond = beyond or found
+        except ConvergenceError:
+            pass
+        between = _between(kind, wide, a, b)
+        if between is not None:
+            return between
+    size = b.point.arclength - a.point.arclength
+    return beyond if beyond is not None and _distance(beyond, located.sample) <= size else None
+
+
+def _distance(found: Singular, sample: Sample) -> float:
+    """Scaled distance of a solution from a sample, in the harmonics of the sample."""
+    curve = sample.point.curve
+    assert isinstance(curve, ResponseCurve)
+    wide = curve.with_balance(found.state.balance)
+    there = wide.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
+    return length(sample.point.weights * (curve.transfer(there, wide) - sample.point.u))
 
 
 def _refined(
@@ -230,8 +253,12 @@ def _of_its_own(kind: BifurcationKind, found: Singular, curve: ResponseCurve, a:
 
 def _lies_between(found: Singular, curve: ResponseCurve, a: Sample, b: Sample) -> bool:
     """Whether a solution, one of the motions of `curve`, lies between two samples, but for what harmonics move."""
-    value = found.state.omega if curve.name == "omega" else found.state.values[curve.name]
-    share = position(a.point, b.point, b.point.curve.transfer(curve.join(found.state.x, value), curve))
+    there = curve.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
+    share = position(a.point, b.point, b.point.curve.transfer(there, curve))
+    if share is None or not -_MOVED <= share <= 1.0 + _MOVED:
+        # of a short step, only its ends with the same harmonics tell
+        ends = _ends(curve, a, b)
+        share = None if ends is None else position(ends[0].point, ends[1].point, there)
     return share is not None and -_MOVED <= share <= 1.0 + _MOVED
 
 
@@ -239,18 +266,30 @@ def _between(kind: BifurcationKind, curve: ResponseCurve, a: Sample, b: Sample) 
     """What lies between two samples with the harmonics of `curve`; None if the test does not change there, or nothing
     is solved for.
     """
+    ends = _ends(curve, a, b)
+    if ends is None or not kind.changed(*ends):
+        return None
+    located = locate(kind, *ends, _NEWTON, _sampled(b), guess_at, _HALVED)
+    return None if located is None else located.solution
+
+
+def _ends(curve: ResponseCurve, a: Sample, b: Sample) -> tuple[Sample, Sample] | None:
+    """Two samples with other harmonics; None if they cannot be solved for."""
+    try:
+        first, last = (solved_in(curve, sample, _NEWTON, _sampled(b)) for sample in (a, b))
+    except ConvergenceError:
+        return None
+    return first, last
+
+
+def _sampled(like: Sample) -> Callable[[CurvePoint], Sample]:
+    """What turns a point into a sample with another one's stability method."""
 
     def sample(point: CurvePoint) -> Sample:
         assert isinstance(point.evaluation, ResponseEvaluation)
-        return Sample(point, point.evaluation.state, b.method)
+        return Sample(point, point.evaluation.state, like.method)
 
-    newton = NewtonOptions()
-    try:
-        first, last = (solved_in(curve, s, newton, sample) for s in (a, b))
-    except ConvergenceError:
-        return None
-    located = locate(kind, first, last, newton, sample, guess_at, _HALVED) if kind.changed(first, last) else None
-    return None if located is None else located.solution
+    return sample
 
 
 def solved_in(
