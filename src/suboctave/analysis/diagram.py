@@ -1,7 +1,8 @@
 """The response with all branches that bifurcate from it, each once: `bifurcation_diagram`.
 
-A response curve is followed, then the branches that leave it at its period doublings and branch points, then those that
-leave these, as deep as asked. A branch that meets its parent at another bifurcation is not followed back from there.
+A response curve is followed (and if it folds back and leaves the range where it began, that from the other end, too),
+then the branches that leave it at its period doublings and branch points, then those that leave these, as deep as
+asked. A branch that meets its parent at another bifurcation is not followed back from there.
 """
 
 from __future__ import annotations
@@ -32,13 +33,16 @@ __all__ = ["BifurcationDiagram", "DiagramBranch", "Keeper", "bifurcation_diagram
 
 #: kinds at which other branches leave
 _SWITCHED = ("PD", "BP")
+#: number of the response from the other end for whoever keeps branches
+_OTHER_END = -2
 
 
 class Keeper(Protocol):
     """Somebody who keeps branches as they are found, and knows those of a run that was stopped.
 
     A branch is told by the number of its parent and the index of the bifurcation that it leaves at among
-    `events_met(parent)`; the response by -1 and -1.
+    `events_met(parent)`; the response by -1 and -1. That from the other end is -2 while branches are followed: it is told
+    by -2 and -1.
     """
 
     def known(self, parent: int, event: int) -> Branch | None:
@@ -71,6 +75,9 @@ def bifurcation_diagram(
     keeper: Keeper | None = None,
 ) -> BifurcationDiagram:
     """The response over a range of frequencies with all branches that bifurcate from it, each once.
+
+    Where it folds back and leaves the range at the end at which it began, the response from the other end is followed,
+    too (unless `start` chooses a motion): branch 1, beside branch 0, with no bifurcation as its origin.
 
     Parameters
     ----------
@@ -117,8 +124,16 @@ def bifurcation_diagram(
             if keeper is not None and not first.interrupted:
                 keeper.keep(-1, -1, first)
         root = DiagramBranch(first)
+        missed = ""
+        if start is None and _returned(first, omega):
+            options["progress"] = told.of(0, 1, "T from the other end") if report is not None else None
+            try:
+                other = _from_other_end(system, omega, harmonics, options, keeper)
+                root.children.append(DiagramBranch(other, number=_OTHER_END))
+            except ConvergenceError as failure:
+                missed = f"the response from the other end was not found: {failure}"
         stopped, interruption = _grown(root, depth, max_branches, options, told, keeper)
-    return BifurcationDiagram(root, stopped, interruption)
+    return BifurcationDiagram(root, "; ".join(reason for reason in (stopped, missed) if reason), interruption)
 
 
 def grown_from(branch: Branch, depth: int, options: dict[str, Any]) -> BifurcationDiagram:
@@ -126,6 +141,23 @@ def grown_from(branch: Branch, depth: int, options: dict[str, Any]) -> Bifurcati
     root = DiagramBranch(branch)
     stopped, interruption = _grown(root, depth, sys.maxsize, dict(options), _Told(None), None)
     return BifurcationDiagram(root, stopped, interruption)
+
+
+def _returned(branch: Branch, omega: tuple[float, float]) -> bool:
+    """Whether a response folds back and leaves the range where it began, so that it says nothing of the other end."""
+    return len(branch) > 1 and not branch.closed and not branch.interrupted and float(branch.omega[-1]) == omega[0]
+
+
+def _from_other_end(
+    system: System, omega: tuple[float, float], harmonics: Harmonics, options: dict[str, Any], keeper: Keeper | None
+) -> Branch:
+    """The response that begins at the other end of the range, from the keeper if that knows it."""
+    branch = None if keeper is None else keeper.known(_OTHER_END, -1)
+    if branch is None:
+        branch = frequency_response(system, (omega[1], omega[0]), harmonics, **options)
+        if keeper is not None and not branch.interrupted:
+            keeper.keep(_OTHER_END, -1, branch)
+    return branch
 
 
 def _grown(
@@ -137,9 +169,9 @@ def _grown(
     keeper: Keeper | None,
 ) -> tuple[str, Interruption | None]:
     """Follow what leaves the branches, level by level; why that ended early, in words, and what interrupted it."""
-    waiting = deque([root])
+    waiting = deque(root)
     count, full = 1, False
-    interruption = root.branch.interruption
+    interruption = next((node.branch.interruption for node in root if node.branch.interrupted), None)
     while waiting:
         node = waiting.popleft()
         switched = [b for b in node.branch.bifurcations if b.kind in _SWITCHED]

@@ -121,7 +121,7 @@ class Survey:
                 for item, why in node.failures:
                     self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
             root = diagram.root.branch
-            if len(root) and root.points[-1].orbit.omega == ends[1]:
+            if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
                 return
 
     # ------------------------------------------------------------------------------------------------- limit points

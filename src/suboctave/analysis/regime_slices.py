@@ -131,7 +131,7 @@ def _responses(found: Slice, atlas: Atlas, depth: int) -> Iterator[Branch]:
                 yield node.branch
         root = diagram.root.branch
         known += diagram.branches
-        if len(root) and root.points[-1].orbit.omega == ends[1]:
+        if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
             return
 
 

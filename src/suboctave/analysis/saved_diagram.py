@@ -2,8 +2,9 @@
 
 A head with one entry for each branch on the dimension `branch`, by number: `label`, `period`, `depth`, `parent` (the
 number of the branch that it leaves, -1 for the response) and `origin` (the index of the bifurcation that it leaves at
-on the dimension `event` of its parent); and the branches, each as `suboctave.analysis.saved` writes it. Bifurcations
-that were left out or where nothing could be followed are JSON in `record`, told by branch and index of the event.
+on the dimension `event` of its parent, -1 for a response; that from the other end has the first one for its parent);
+and the branches, each as `suboctave.analysis.saved` writes it. Bifurcations that were left out or where nothing could
+be followed are JSON in `record`, told by branch and index of the event.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _MEANINGS = {
     "period": "load periods in one response period",
     "depth": "how many bifurcations away from the response",
     "parent": "the branch that it leaves, -1 for the response",
-    "origin": "the event of the parent that it leaves at, -1 for the response",
+    "origin": "the event of the parent that it leaves at, -1 for a response",
 }
 
 
@@ -84,9 +85,12 @@ def diagram_from_datasets(
         nodes = [DiagramBranch(branches[0])]
         for number in range(1, count):
             parent = nodes[int(head["parent"].values[number])]
-            origin = met[parent.number][int(head["origin"].values[number])]
-            crossed = parent.branch.bifurcations["BP"]
-            nodes.append(DiagramBranch(branches[number], origin, parent.depth + 1, number, met=crossed))
+            event = int(head["origin"].values[number])
+            if event < 0:
+                nodes.append(DiagramBranch(branches[number], number=number))
+            else:
+                origin, crossed = met[parent.number][event], parent.branch.bifurcations["BP"]
+                nodes.append(DiagramBranch(branches[number], origin, parent.depth + 1, number, met=crossed))
             parent.children.append(nodes[-1])
         record = from_json(str(head["record"].item()), {"Interruption": Interruption})
         for number, (event, why) in zip(record["failures_of"], record["failures"], strict=True):

@@ -34,7 +34,8 @@ class DiagramBranch:
     branch
         The curve.
     origin
-        The bifurcation of the parent that it leaves at; None for the response itself.
+        The bifurcation of the parent that it leaves at; None for the response itself, and for that from the other end
+        of the range.
     depth
         0 for the response, 1 for what leaves it, ...
     number
@@ -98,7 +99,8 @@ class BifurcationDiagram:
     Attributes
     ----------
     root
-        The response, with `children` at every level (`DiagramBranch`).
+        The response, with `children` at every level (`DiagramBranch`). A response from the other end of the range,
+        which one that folds back and leaves the range where it began does not reach, is the first of them.
     stopped
         Why not all branches were followed, in words; empty if they were.
     seconds
@@ -143,6 +145,11 @@ class BifurcationDiagram:
         return [node.branch for node in self]
 
     @property
+    def responses(self) -> list[Branch]:
+        """The curves that begin at an end of the range: the response, and that from the other end if it is another."""
+        return [node.branch for node in self if node.origin is None]
+
+    @property
     def bifurcations(self) -> list[Bifurcation]:
         """All located bifurcations, branch by branch."""
         return [item for branch in self.branches for item in branch.bifurcations]
@@ -166,12 +173,8 @@ class BifurcationDiagram:
         drawn = [node for node in self if len(node.branch)]
         if len({node.branch.nu for node in drawn}) > 1:
             return None
-        return [
-            "response"
-            if node.origin is None
-            else f"from {node.origin.kind} {node.origin.parameter(node.branch.name):.4g}"
-            for node in drawn
-        ]
+        several = len(self.responses) > 1
+        return [_named(node, several) for node in drawn]
 
     @property
     def marks(self) -> list[str]:
@@ -243,6 +246,14 @@ class BifurcationDiagram:
         from suboctave.analysis.tree_text import tree_text
 
         return tree_text(self)
+
+
+def _named(node: DiagramBranch, several: bool) -> str:
+    """A branch by where it comes from; `several`: there are responses from both ends."""
+    name = node.branch.name
+    if node.origin is not None:
+        return f"from {node.origin.kind} {node.origin.parameter(name):.4g}"
+    return f"response from {name} = {float(node.branch.parameter(name)[0]):.4g}" if several else "response"
 
 
 def _listed(labels: list[str]) -> str:

@@ -25,6 +25,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.selection import AdaptiveHarmonics
 from suboctave.model.system import System
 from suboctave.stability import StabilityMethod
 
@@ -124,9 +125,19 @@ def frequency_response(
             point = start_point(curve, first, start, settings.newton)
             trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
     if not searched:
-        named = "" if isinstance(harmonics, str) else f", harmonics={harmonics!r}"
-        named += "" if max_step is None else f", max_step={max_step!r}"
-        call = f"so.frequency_response(system, ({last:.10g}, {first:.10g}){named})"
+        given = _written(
+            harmonics=None if isinstance(harmonics, str) else harmonics,
+            subharmonic=subharmonic,
+            max_step=max_step,
+            observe=observe,
+            events=events or None,
+            newton=newton,
+            stepping=stepping,
+            stability=stability,
+            formulation=formulation,
+            linear=linear,
+        )
+        call = f"so.frequency_response(system, ({last!r}, {first!r}){given})"
         _warn_of_return(trace, "omega", first, call)
     options = options_of(settings, harmonics, {"omega": (first, last)})
     return make_branch(system, "omega", trace, settings, options)
@@ -252,11 +263,32 @@ def _from_system(
         settings = settings.reporting_to(report, (first, last))
         point = start_point(curve, first, None, settings.newton)
         trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
-    named = "" if isinstance(wanted, str) else f", harmonics={wanted!r}"
-    named += "" if max_step is None else f", max_step={max_step!r}"
-    call = f"so.continue_branch(system, {parameter!r}, ({last:.10g}, {first:.10g}), omega={omega:.10g}{named})"
+    given = _written(
+        harmonics=None if isinstance(wanted, str) else wanted,
+        max_step=max_step,
+        observe=observe,
+        events=events or None,
+        newton=newton,
+        stepping=stepping,
+        stability=stability,
+        formulation=formulation,
+    )
+    call = f"so.continue_branch(system, {parameter!r}, ({last!r}, {first!r}), omega={float(omega)!r}{given})"
     _warn_of_return(trace, parameter, first, call)
     return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
+
+
+def _written(**options: Any) -> str:
+    """The options of a call that were given, as it is written."""
+    words = []
+    for name, given in options.items():
+        value = given.item() if isinstance(given, np.generic) else given
+        if isinstance(value, AdaptiveHarmonics | NewtonOptions | SteppingOptions):
+            words.append(f", {name}=so.{value!r}")
+        elif value is not None:
+            # what has no short form is called as its user called it
+            words.append(f", {name}={value!r}" if isinstance(value, int | float | str) else f", {name}={name}")
+    return "".join(words)
 
 
 def _warn_of_return(trace: Trace, name: str, first: float, call: str) -> None:
