@@ -41,8 +41,8 @@ class Keeper(Protocol):
     """Somebody who keeps branches as they are found, and knows those of a run that was stopped.
 
     A branch is told by the number of its parent and the index of the bifurcation that it leaves at among
-    `events_met(parent)`; the response by -1 and -1. That from the other end is -2 while branches are followed: it is told
-    by -2 and -1.
+    `events_met(parent)`; the response by -1 and -1. That from the other end has the number -2 while branches are
+    followed: it is told by -2 and -1.
     """
 
     def known(self, parent: int, event: int) -> Branch | None:
