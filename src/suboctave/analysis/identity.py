@@ -91,13 +91,18 @@ def apart(one: PeriodicOrbit, other: PeriodicOrbit) -> float:
     return float(off.min()) / (_size(a, b) or 1.0)
 
 
-def mirrored(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """-x(t + T / 2), if that is another motion of the system; None where it is none, or the motion itself."""
+def image_of(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """-x(t + T / 2), whether it solves the equations or not."""
     k = np.arange(orbit.basis.harmonics + 1)[:, None]
     c = -orbit.amplitudes * np.exp(1j * np.pi * k / orbit.basis.nu)
     x = np.empty_like(orbit.coefficients)
     x[0], x[1::2], x[2::2] = c[0].real, c[1:].real, -c[1:].imag
-    image = replace(orbit, coefficients=x)
+    return replace(orbit, coefficients=x)
+
+
+def mirrored(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
+    """-x(t + T / 2), if that is another motion of the system; None where it is none, or the motion itself."""
+    image = image_of(orbit)
     if relation(orbit, image).one:
         return None
     state = image.state()

@@ -10,16 +10,23 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from suboctave.analysis.branch import Branch
 from suboctave.analysis.diagram import bifurcation_diagram
-from suboctave.analysis.identity import Relation, lies_on, relation
+from suboctave.analysis.identity import Relation, image_of, lies_on, relation
 from suboctave.analysis.isola import carrier_of, closed_branch
 from suboctave.analysis.limit_curves import Leg, legs_of
-from suboctave.analysis.making import Harmonics
+from suboctave.analysis.making import Harmonics, make_curve
+from suboctave.analysis.refine import orbit_of
+from suboctave.analysis.response import ResponseEvaluation
+from suboctave.analysis.starts import start_point
 from suboctave.analysis.track import track
 from suboctave.analysis.tracked_branch import TrackedBranch
-from suboctave.bifurcation import Bifurcation
+from suboctave.analysis.verbs import continue_branch
+from suboctave.bifurcation import Bifurcation, Sample
 from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation import NewtonOptions
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import pass_on
 from suboctave.model.system import System
@@ -32,6 +39,8 @@ SAME_OMEGA = 1e-6
 _TOGETHER = 1e-7
 #: a limit point lies at most this many distances between neighbours away from the curve's chord
 _BESIDE = 3.0
+#: motions of a branch whose mirror images lead to another one, if there is any
+_IMAGES = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +130,36 @@ class Survey:
                 for item, why in node.failures:
                     self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
             root = diagram.root.branch
+            yield from ((branch, 0) for branch in self._partners(diagram.branches, system))
             if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
                 return
+
+    def _partners(self, branches: list[Branch], system: System) -> Iterator[Branch]:
+        """Branches through motions beside the mirror images of others.
+
+        What would be two halves of a loop between pitchforks, were the system symmetric, is taken apart by a small load
+        that is not: the response runs over one half, and the other is found from its image.
+        """
+        low, high = self.omega
+        known = list(branches)
+        for branch in branches:
+            for place in np.linspace(0, len(branch) - 1, min(_IMAGES, len(branch))).round().astype(int):
+                orbit = branch.orbits[place]
+                image = image_of(orbit)
+                if not low <= orbit.omega <= high or relation(orbit, image).one:
+                    continue
+                curve = make_curve(system, "omega", orbit.omega, high - low, self.harmonics, branch.nu, None)
+                try:
+                    point = start_point(curve, orbit.omega, image.coefficients, NewtonOptions())
+                    assert isinstance(point.evaluation, ResponseEvaluation)
+                    found = orbit_of(Sample(point, point.evaluation.state))
+                    if any(lies_on(found, other.points, images=True) for other in known):
+                        continue
+                    known.append(continue_branch(found, "omega", self.omega, **self.options))
+                except ConvergenceError:
+                    continue
+                pass_on(known[-1].interruption)
+                yield known[-1]
 
     # ------------------------------------------------------------------------------------------------- limit points
     def leg_of(self, item: Bifurcation, value: float) -> Leg | None:
