@@ -34,7 +34,7 @@ class CountCheck:
             return None
         odd = sum(kind in ("LP", "PD", "BP") for kind in kinds)
         pairs = kinds.count("NS")
-        before, now = last.floquet.unstable, sample.floquet.unstable
+        before, now = last.unstable, sample.unstable
         change = abs(now - before)
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
         branching = "BP" in kinds

@@ -278,7 +278,7 @@ class _Step:
         eventful = p.unstable != q.unstable or bool(changes(p, q))
         if eventful and not _explained(p, q):
             return 0.5, (
-                f"the number of unstable multipliers changes from {p.floquet.unstable} to {q.floquet.unstable}, which "
+                f"the number of unstable multipliers changes from {p.unstable} to {q.unstable}, which "
                 "no bifurcation there explains"
             )
         if eventful and _mixed(p, q):
@@ -428,7 +428,7 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
-    change = abs(p.floquet.unstable - q.floquet.unstable)
+    change = abs(p.unstable - q.unstable)
     found = changes(p, q)
     if change == 0 and not found:
         return True

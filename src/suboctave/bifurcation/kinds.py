@@ -67,8 +67,14 @@ class Sample:
 
     @lazy
     def unstable(self) -> int:
-        """Number of multipliers outside the unit circle."""
-        return self.floquet.unstable
+        """Number of multipliers outside the unit circle, real ones on the side on which det J_0 and det J_half have
+        them: the count and the tests of LP, BP and PD then change together.
+        """
+        count = self.floquet.unstable
+        if not self.at_rest:
+            for which, _ in measures.contradicted(self.floquet, self.point.orientation * self.slope, self.half_sign):
+                count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
+        return count
 
     @lazy
     def signs(self) -> tuple[bool, bool, bool]:

@@ -60,24 +60,35 @@ def fold(mu: ComplexArray) -> float:
     return float(sign * math.exp(log))
 
 
-def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResult:
-    """Multipliers whose errors cover what the signs of det J_0 (`integer`) and det J_half say of them.
+def contradicted(result: FloquetResult, integer: float, half: float) -> list[tuple[int, float]]:
+    """Multipliers that the signs of det J_0 (`integer`) and det J_half put on the other side of +1 or -1, with their
+    distances from there.
 
-    The signs are the parities of the real multipliers beyond +1 and beyond -1. Where one differs from that of the
-    multipliers, which belong to the motion completed by what it lacks, the one nearest to there lies on either side.
+    The signs are the parities of the real multipliers beyond +1 and beyond -1. They belong to the harmonics solved for,
+    the multipliers to the motion completed by what it lacks: where the parities differ, the nearest one is between.
     """
     if not result.applicable:
-        return result
-    sign = measured(_ONE, _ONE, 0, result.multipliers)[0]
+        return []
+    mu, found = result.multipliers, []
+    sign = measured(_ONE, _ONE, 0, mu)[0]
     for target, solved, completed in ((1.0, integer, sign[1]), (-1.0, half, sign[2])):
-        if solved * completed >= 0.0:
-            continue
-        distance = np.abs(result.multipliers - target)
-        errors = result.errors.copy()
-        nearest = int(np.argmin(np.where(np.abs(result.multipliers.imag) <= 1e-9, distance, np.inf)))
-        errors[nearest] = max(errors[nearest], 2.0 * distance[nearest])
-        result = replace(result, errors=errors)
-    return result
+        if solved * completed < 0.0:
+            real = np.abs(mu.imag) <= 1e-12 * np.abs(mu)
+            distance = np.where(real | ~real.any(), np.abs(mu - target), np.inf)
+            nearest = int(np.argmin(distance))
+            found.append((nearest, float(distance[nearest])))
+    return found
+
+
+def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResult:
+    """Multipliers whose errors cover what the signs of det J_0 (`integer`) and det J_half say of them."""
+    found = contradicted(result, integer, half)
+    if not found:
+        return result
+    errors = result.errors.copy()
+    for which, distance in found:
+        errors[which] = max(errors[which], 2.0 * distance)
+    return replace(result, errors=errors)
 
 
 def fold_sign(state: BalanceState) -> float:
