@@ -232,6 +232,13 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     for i, j in pairs:
         row.worst = max(row.worst, abs(theirs[i]["omega"] - mine[j].omega) / theirs[i]["omega"])
     paired, own = {i for i, _ in pairs}, {j for _, j in pairs}
+    # events closer together than harmonics resolve may stand in another order, if the branch says that it is in doubt
+    for i, item in enumerate(theirs):
+        for j in range(len(mine)):
+            doubtful = i not in paired and j not in own and stated(item["omega"], branch, width)
+            if doubtful and same(item, mine[j], width):
+                paired.add(i)
+                own.add(j)
     for i, item in enumerate(theirs):
         if i not in paired:
             text = f"{item['kind']} {item['omega']:.9f} (multiplier {complex(*item['multiplier']):.4f})"
