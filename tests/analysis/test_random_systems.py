@@ -56,6 +56,21 @@ def test_no_event_is_missed_and_none_added(systems: ModuleType, seed: int, reaso
     assert row.worst < 2e-6
 
 
+def test_a_pair_beside_a_limit_point_whose_multipliers_err(systems: ModuleType) -> None:
+    # right before the limit point the multipliers put one beyond +1 that det J_0 has inside: with the count by
+    # multipliers alone, the pair that leaves the circle there was lost without a word
+    answer = judged(systems, 211)
+    omega, first_points = tuple(answer["system"]["omega"]), so.SteppingOptions(max_points=70)
+    branch = so.frequency_response(systems.system_of(answer["system"]), omega, stepping=first_points)
+    found = [item for item in branch.bifurcations if item.kind != "grazing"]
+    expected = answer["events"][: len(found)]
+    assert [item.kind for item in found] == [item["kind"] for item in expected]
+    np.testing.assert_allclose([item.omega for item in found], [item["omega"] for item in expected], rtol=1e-7)
+    i = [item.kind for item in found].index("NS")
+    assert [item.kind for item in found[i : i + 2]] == ["NS", "LP"]
+    assert found[i].omega == pytest.approx(0.21832894, rel=1e-7)
+
+
 def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
     def stretch(first: float, last: float, reason: str) -> Unsettled:
         return Unsettled("omega", 1.0 + first, 1.0 + last, (first, last), reason)
