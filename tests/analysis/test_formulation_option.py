@@ -161,3 +161,4 @@ def test_the_count_takes_what_is_accounted_for_elsewhere(two):
 class _Sample:
     def __init__(self, floquet):
         self.floquet = floquet
+        self.unstable = floquet.unstable
