@@ -554,17 +554,16 @@ class Judge:
         try:
             while True:
                 new, h, nxt = self.step(here, h)
-                out = new.omega < self.low or new.omega > self.high
-                if out:
+                if self.nu == 2 and float(new.half @ here.half) < 0.0:
+                    points, omega = self.towards_parent(here, new)
+                    curve.points += [p for p in points if self.low <= p.omega <= self.high]
+                    curve.ended = f"parent at omega = {omega:.6g}"
+                    break
+                if new.omega < self.low or new.omega > self.high:
                     bound = self.low if new.omega < self.low else self.high
                     new = self.at_bound(here, new, bound)
                     curve.points.append(new)
                     curve.ended = f"omega = {bound:.9g}"
-                    break
-                if self.nu == 2 and float(new.half @ here.half) < 0.0:
-                    points, omega = self.towards_parent(here, new)
-                    curve.points += points
-                    curve.ended = f"parent at omega = {omega:.6g}"
                     break
                 curve.points.append(new)
                 if len(curve.points) > 4 and self.closes(curve.points[0], here, new):
@@ -623,24 +622,20 @@ class Judge:
         largest size is the parent's.
         """
         unit = a.half / np.linalg.norm(a.half)
-        low, high, f_low, f_high = 0.0, 1.0, float(unit @ a.half), float(unit @ b.half)
-        points: list[Point] = []
-        omega = 0.5 * (a.omega + b.omega)
-        for _ in range(12):
-            share = low + 0.9 * (high - low) * f_low / (f_low - f_high)
+        rate = float(unit @ (a.half - b.half)) / (b.s - a.s)
+        points, here = [a], a
+        while True:
+            f = float(unit @ here.half)
+            if f < PARENT * self.odd or len(points) > 30:
+                break
             try:
-                point = self.between(a, b, share)
-            except ArithmeticError:
+                here = self.step(here, 0.5 * f / rate)[0]
+            except Failure:
                 break
-            f = float(unit @ point.half)
-            if f <= 0.0:
-                high, f_high = share, f
-                continue
-            if f < PARENT * self.odd:
+            if not 0.0 < float(unit @ here.half) < f:
                 break
-            low, f_low, omega = share, f, point.omega
-            points.append(point)
-        return points, omega
+            points.append(here)
+        return points[1:], points[-1].omega
 
     def closes(self, first: Point, a: Point, b: Point) -> bool:
         """Whether the curve has come back to its first point, or to it a load period later."""
