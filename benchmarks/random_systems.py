@@ -187,7 +187,7 @@ class Answers:
         self.known: dict[str, dict[str, Any]] = json.loads(path.read_text()) if path.exists() else {}
 
     def of(self, seed: int, description: Description, branch: so.Branch) -> dict[str, Any]:
-        """What the judge says of the curve that a branch lies on; from its first motion (T), or a middle one (2T)."""
+        """What the judge says of the curve that a branch lies on; from its first motion, of 2T that farthest from T."""
         key, question = f"{seed}:{branch.nu}T", digest(description, branch.nu)
         known = self.known.get(key)
         if (
@@ -198,7 +198,7 @@ class Answers:
             return known
         import shooting_judge
 
-        place = 0 if branch.nu == 1 else len(branch) // 2
+        place = 0 if branch.nu == 1 else int(np.argmax([odd_part(orbit) for orbit in branch.orbits]))
         orbit = branch.orbits[place]
         first, last = description["omega"]
         direction = float(np.sign(last - first)) if branch.nu == 1 else 1.0
@@ -227,7 +227,6 @@ class Row:
         self.wrong: list[str] = []
         self.found = self.events = self.unsettled = self.warnings = 0
         self.worst = 0.0
-        self.note = ""
 
 
 def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
@@ -237,12 +236,8 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     theirs, counts = answer["events"], answer["unstable"]
     if branch.nu == 2:
         theirs, counts = in_order_of(branch, answer)
-        # beside its parent a curve is the parent's, for the judge
-        largest = max(map(odd_part, branch.orbits))
-        mine = [item for item in mine if odd_part(item.orbit) > JUDGED * largest]
     row.events, row.found = len(theirs), len(mine)
     row.unsettled, row.warnings = len(branch.audit.unsettled), len(branch.warnings)
-    row.note = answer["failure"]
     pairs = aligned(theirs, mine, width)
     for i, j in pairs:
         row.worst = max(row.worst, abs(theirs[i]["omega"] - mine[j].omega) / theirs[i]["omega"])
@@ -258,7 +253,10 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
         if i not in paired:
             text = f"{item['kind']} {item['omega']:.9f} (multiplier {complex(*item['multiplier']):.4f})"
             (row.said if stated(item["omega"], branch, width) else row.missed).append(text)
-    row.added = [f"{mine[j].kind} {mine[j].omega:.9f}" for j in range(len(mine)) if j not in own]
+    # beside its parent the judge leaves a curve to the parent
+    least = JUDGED * max(map(odd_part, branch.orbits)) if branch.nu == 2 else -1.0
+    more = [item for j, item in enumerate(mine) if j not in own and odd_part(item.orbit) > least]
+    row.added = [f"{item.kind} {item.omega:.9f}" for item in more]
     row.wrong = verdicts(counts, pairs, len(theirs), mine, branch)
     return row
 
@@ -387,12 +385,16 @@ def main(arguments: list[str] | None = None) -> int:
         seconds = time.perf_counter() - start
         for branch in branches:
             answer = answers.of(seed, description, branch)
-            row = compare(answer, branch, width)
             label = name if branch.nu == 1 else f"   {branch.nu}T branch"
+            if answer["failure"]:
+                unjudged.append(f"{seed} ({branch.nu}T): {answer['failure']}")
+                print(f"{seed:>5}  {label:<44}  not judged: {answer['failure']}")
+                continue
+            row = compare(answer, branch, width)
             print(
                 f"{seed:>5}  {label:<44}{row.events:>7}{row.found:>7}{len(row.missed):>7}{len(row.said):>6}"
                 f"{len(row.added):>6}{len(row.wrong):>6}{row.unsettled:>10}{row.warnings:>6}{row.worst:>10.1e}"
-                f"{seconds:>7.1f}" + (f"  NOT JUDGED: {row.note}" if row.note else "")
+                f"{seconds:>7.1f}"
             )
             for what in ("missed", "said", "added", "wrong"):
                 lines = getattr(row, what)
@@ -401,9 +403,6 @@ def main(arguments: list[str] | None = None) -> int:
             if options.verbose and (row.missed or row.said or row.added or row.wrong or row.unsettled):
                 for warning in branch.warnings:
                     print(f"         note: {warning}")
-            if row.note:
-                unjudged.append(f"{seed} ({branch.nu}T): {row.note}")
-                continue
             counted = {"curves": 1, "events": row.events, "found": row.found, "unsettled": row.unsettled}
             counted |= {what: len(getattr(row, what)) for what in ("missed", "said", "added", "wrong")}
             total = {what: total[what] + counted[what] for what in total}

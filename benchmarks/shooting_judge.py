@@ -796,6 +796,8 @@ class Judge:
         middle, points, shares = 0.5 * (low + high), [], []
         for way in (-0.02, -0.006, 0.006, 0.02):
             share = min(1.0, max(0.0, middle + way))
+            if share in shares:
+                continue
             try:
                 points.append(a if share == 0.0 else b if share == 1.0 else self.between(a, b, share))
                 shares.append(share)
@@ -926,6 +928,8 @@ def judged(
     failure = ""
     try:
         first = judge.started(np.array(start, float), omega)
+        if nu == 2 and np.linalg.norm(first.half) < 1e-3 * np.linalg.norm(first.y[:-1]):
+            raise Failure("the start leads to the parent")
         for way in (direction,) if nu == 1 else (-direction, direction):
             curve = judge.follow(first, way)
             judge.judge(curve)
