@@ -205,7 +205,8 @@ class Answers:
         answer = shooting_judge.judged(description, orbit.start(), orbit.omega, direction, branch.nu, PATIENCE)
         answer = {"question": question, "system": description, **answer}
         self.known[key] = answer
-        lines = ",\n".join(f'"{k}": {json.dumps(v)}' for k, v in sorted(self.known.items()))
+        keys = sorted(self.known, key=lambda key: (int(key.split(":")[0]), key))
+        lines = ",\n".join(f'"{key}": {json.dumps(self.known[key])}' for key in keys)
         self.path.write_text("{\n" + lines + "\n}\n")
         return answer
 
