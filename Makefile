@@ -59,6 +59,7 @@ $(STAMP): pyproject.toml
 	echo "Installing into $(VENV) with $$($$found --version) ..."; \
 	$$found -m venv --clear $(VENV) \
 	  && $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' \
+	  && echo "Compiling, once ..." && $(BIN)/suboctave compile \
 	  && touch $(STAMP)
 
 clean:

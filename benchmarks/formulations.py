@@ -22,10 +22,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.bifurcation.alcorta import PublishedDoubling, equations, jacobian, locate_published
 from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.extended import locate_extended
-from suboctave.bifurcation.solve import Guess, locate_singular
+from suboctave.curves.events.alcorta import PublishedDoubling, equations, jacobian, locate_published
+from suboctave.curves.events.extended import locate_extended
+from suboctave.curves.events.locate import Guess, locate_singular
 from suboctave.harmonic.perturbation import Kind
 
 REPEATS, STEPS, AWAY = 20, 50, 5e-3

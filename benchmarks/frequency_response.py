@@ -24,7 +24,6 @@ from scipy.linalg import lapack
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.compiled import compile_at_once
 
 REPEATS = 9
 CHAIN = Path(__file__).resolve().parents[1] / "tests" / "data" / "chain.json"
@@ -88,7 +87,6 @@ def summary(values: list[float]) -> tuple[float, float]:
 
 
 def main(repeats: int) -> None:
-    compile_at_once()
     work, sticks = cases(), yardsticks()
     branches = {name: run() for name, run in work.items()}
     times: dict[str, list[float]] = {name: [] for name in (*work, *sticks)}

@@ -14,7 +14,7 @@ import numpy as np
 
 import suboctave as so
 from suboctave.timedomain import integrate
-from suboctave.timedomain.batch import Flow
+from suboctave.timedomain.flow import Flow
 
 OMEGA, STEPS, PERIODS, TRAJECTORIES = 2.3, 1000, 40, 320
 

@@ -17,7 +17,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.compiled import compile_at_once
 
 REPEATS = 5
 
@@ -39,7 +38,6 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def main(repeats: int) -> None:
-    compile_at_once()
     matrix = np.random.default_rng(0).standard_normal((62, 62))
     works = cases()
     found = {name: work() for name, work in works.items()}

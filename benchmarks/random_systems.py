@@ -20,6 +20,7 @@ import hashlib
 import json
 import sys
 import time
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -44,8 +45,12 @@ Description = dict[str, Any]
 
 
 # -------------------------------------------------------------------------------------------------------- the systems
-def describe(seed: int) -> Description:
-    """A system as plain numbers: matrices, laws, loads, and the range of frequencies."""
+def describe(seed: int, strong: bool | None = None) -> Description:
+    """A system as plain numbers: matrices, laws, loads, and the range of frequencies.
+
+    `strong`: strong loads and a wide range; by default from the seed `STRONG` on.
+    """
+    strong = seed >= STRONG if strong is None else strong
     rng = np.random.default_rng([19, seed])
     n = int(rng.choice([1, 2, 3, 4], p=[0.35, 0.35, 0.2, 0.1]))
     symmetric = rng.uniform() < 0.2
@@ -82,8 +87,6 @@ def describe(seed: int) -> Description:
         hardening = [0.0, 0.0, 0.1 * depth, 0.0, 0.0]
         laws.append({"kind": "polynomial", "direction": np.eye(n)[0].tolist(), "coefficients": hardening})
     dof = int(rng.integers(n))
-    # from here on the loads are strong and the range is wide
-    strong = seed >= STRONG
     amplitude = rng.uniform(0.8, 3.0) if strong else rng.uniform(0.1, 0.8)
     loads = [{"dof": dof, "amplitude": amplitude, "harmonic": 1, "phase": 0.0}]
     if rng.uniform() < 0.25:
@@ -128,8 +131,8 @@ def _law(rng: np.random.Generator, kind: str, direction: list[float]) -> list[di
     return [{"kind": "polynomial", "direction": direction, "coefficients": factors}]
 
 
-def system_of(description: Description) -> so.System:
-    """The same system as the package reads it."""
+def system_of(description: Description, parameters: Mapping[str, float] | None = None) -> so.System:
+    """The same system as the package reads it; `parameters` that its texts name."""
     n = len(description["mass"])
     elements: list[so.Element] = []
     for law in description["laws"]:
@@ -154,7 +157,8 @@ def system_of(description: Description) -> so.System:
         else:
             loads.append(so.HarmonicLoad(load["dof"], load["amplitude"], load["harmonic"], load["phase"]))
     assert n == len(description["damping"])
-    return so.System(description["mass"], description["damping"], description["stiffness"], elements, loads)
+    matrices = (description[name] for name in ("mass", "damping", "stiffness"))
+    return so.System(*matrices, elements, loads, dict(parameters or {}))
 
 
 def short(description: Description) -> str:

@@ -20,7 +20,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.compiled import compile_at_once
 
 REPEATS = 5
 METHODS = {
@@ -62,7 +61,6 @@ def timed(work: Callable[[], object], least: float = 0.0) -> float:
 
 
 def main(repeats: int) -> None:
-    compile_at_once()
     motions = orbits()
     results = {(m, o): so.stability(orbit, METHODS[m]) for o, orbit in motions.items() for m in METHODS}
     matrix = np.random.default_rng(0).standard_normal((62, 62))

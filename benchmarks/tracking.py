@@ -28,11 +28,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.analysis import track_follow, tracked_events, tracked_hidden, tracked_newton
-from suboctave.analysis.tracked_branch import TrackedBranch
-from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
-from suboctave.analysis.tracked_iteration import FACTORISED, LOOKS
-from suboctave.compiled import compile_at_once
+from suboctave.continuation import newton
+from suboctave.curves import track_follow, tracked_events, tracked_hidden
+from suboctave.curves.motion import MotionProblem
+from suboctave.results.tracked_branch import TrackedBranch
 
 REPEATS = 7
 
@@ -95,18 +94,10 @@ def counted(work: Callable[[], object]) -> Counter[str]:
 
         return called
 
-    def run(self: Any, *args: Any, function: Callable[..., Any] = tracked_newton._Solve.run) -> Any:
-        try:
-            return function(self, *args)
-        finally:
-            counts["evaluations"] += int(self.memo[LOOKS])
-            counts["jacobians"] += int(self.memo[FACTORISED])
-
     with ExitStack() as stack:
-        stack.enter_context(patch.object(tracked_newton._Solve, "run", run))
         for kind, owner, name in (
-            ("evaluations", TrackedCurve, "evaluate"),
-            ("jacobians", TrackedEvaluation, "bordered_transposed"),
+            ("evaluations", MotionProblem, "evaluate"),
+            ("jacobians", newton, "bordered"),
         ):
             stack.enter_context(patch.object(owner, name, counting(kind, getattr(owner, name))))
         work()
@@ -114,7 +105,6 @@ def counted(work: Callable[[], object]) -> Counter[str]:
 
 
 def main(repeats: int) -> None:
-    compile_at_once()
     matrix = np.random.default_rng(0).standard_normal((62, 62))
     work = cases()
     curves = {name: run() for name, run in work.items()}

@@ -21,8 +21,9 @@ from collections.abc import Iterator
 import numpy as np
 
 import suboctave as so
-from suboctave.analysis.basin_attractors import Catalogue
-from suboctave.timedomain.batch import Flow
+from suboctave.experiments.basins.attractors import Catalogue
+from suboctave.experiments.common import checked_integration
+from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.trapping import Trap
 
 PERIODS, TOLERANCE = 600, 1e-8
@@ -87,7 +88,7 @@ def measure(system: so.System, omega: float, half: float, count: int) -> None:
     found = so.basins(
         system, omega=omega, box=((-half, half), (-half * omega, half * omega)), grid=(40, 40), tolerance=TOLERANCE
     )
-    catalogue = Catalogue(system, omega, {}, 0, TOLERANCE, None)
+    catalogue = Catalogue(system, omega, {}, checked_integration(system, {"tolerance": TOLERANCE, "observe": 0}))
     for one in found.attractors:
         catalogue.enter(one.name, one.points, one.amplitude, one.multipliers, False)
     flow = Flow(system, "accurate", tolerance=TOLERANCE)

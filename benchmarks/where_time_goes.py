@@ -24,11 +24,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
-from suboctave.compiled import compile_at_once
 
 #: what a look is booked on: the first line whose file is anywhere on the stack
 PLACES = (
-    ("located bifurcations", ("bifurcation/finder", "bifurcation/solve", "bifurcation/bordered")),
+    ("located bifurcations", ("curves/events/finder", "curves/events/locate", "bifurcation/bordered")),
     ("Floquet multipliers", ("stability/",)),
     ("audit of steps", ("analysis/guard", "analysis/audit", "analysis/crossings", "bifurcation/measures")),
     ("element forces", ("harmonic/group_force", "harmonic/local_force")),
@@ -99,7 +98,6 @@ def case(title: str, system: so.System, seconds: float) -> None:
 
 
 def main(seconds: float) -> None:
-    compile_at_once()
     for title, law in (("exact law", {}), ("arctan law, s = 3000", {"regularization": 3000.0})):
         case(title, so.library.reference_oscillator(p=0.55, j=0.0, **law), seconds)
 

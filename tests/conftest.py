@@ -1,7 +1,28 @@
-"""What holds for all tests: kernels are compiled when they are first called, so that none runs interpreted for long."""
+"""Curves that several tests look at are computed once."""
 
 from __future__ import annotations
 
-from suboctave.compiled import compile_at_once
+import json
+from pathlib import Path
 
-compile_at_once()
+import pytest
+
+import suboctave as so
+
+
+@pytest.fixture(scope="session")
+def reference():
+    """Numbers found by shooting, not by harmonic balance (the file says of which system)."""
+    return json.loads((Path(__file__).parent / "data" / "reference.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def duffing_curve():
+    """A hardening Duffing oscillator swept down over its fold, from 3 to 0.5: LP, LP."""
+    return so.frequency_response(so.library.duffing(c=0.1, F=0.3), (3.0, 0.5))
+
+
+@pytest.fixture(scope="session")
+def rattling_curve():
+    """The reference oscillator with the exact law: PD, PD, LP, LP."""
+    return so.frequency_response(so.library.reference_oscillator(), (4.5, 1.3))

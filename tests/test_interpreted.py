@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 from numpy.testing import assert_allclose
 
 import suboctave as so
@@ -55,15 +54,3 @@ def test_without_the_compiler_results_are_the_same():
     assert interpreted.pop("kinds") == compiled.pop("kinds") == ["PD", "LP", "NS"]
     for name, values in compiled.items():
         assert_allclose(interpreted[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
-
-
-def test_lu_factors_of_interpreted_code_are_lapacks():
-    from suboctave.continuation.lapack import _factorise_interpreted, solve_factorised
-
-    generator = np.random.default_rng(0)
-    matrix, right = generator.standard_normal((6, 6)), generator.standard_normal(6)
-    factors, pivots, solution = matrix.T.copy(), np.empty(6, dtype=np.int32), right.copy()
-    assert not _factorise_interpreted(factors, pivots)
-    solve_factorised(factors, pivots, solution)
-    assert_allclose(matrix @ solution, right, atol=1e-13)
-    assert _factorise_interpreted(np.ones((2, 2)), np.empty(2, dtype=np.int32))

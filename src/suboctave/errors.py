@@ -10,14 +10,17 @@ import math
 import numbers
 import os
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 __all__ = [
-    "ConvergenceError", "InputError", "SuboctaveError", "TimeLimitError", "check_numbers", "is_number", "path_of",
-    "shortened", "suggest",
+    "ConvergenceError", "InputError", "Refusals", "SuboctaveError", "TimeLimitError", "check_numbers", "is_number",
+    "located", "path_of", "shortened", "suggest",
 ]  # fmt: skip
+
+Key = tuple[str | int, ...]
 
 
 class SuboctaveError(Exception):
@@ -25,7 +28,56 @@ class SuboctaveError(Exception):
 
 
 class InputError(SuboctaveError, ValueError):
-    """Wrong input, refused before any work was done."""
+    """Wrong input, refused before any work was done.
+
+    key
+        The part of the input that is wrong, from the outside in: ("elements", 2, "dof"); empty where that is all of it.
+    parts
+        The single mistakes of which it tells.
+    """
+
+    def __init__(self, message: str = "", key: Key = (), parts: Iterable[InputError] = ()) -> None:
+        super().__init__(message)
+        self.key = key
+        self._parts = tuple(parts)
+
+    @property
+    def parts(self) -> tuple[InputError, ...]:
+        """See the class."""
+        return self._parts or (self,)
+
+
+class Refusals:
+    """Collects the mistakes of an input, so that all of them are told at once."""
+
+    def __init__(self) -> None:
+        self.mistakes: list[InputError] = []
+
+    @contextmanager
+    def at(self, *key: str | int) -> Iterator[None]:
+        """Keep an InputError of the block, which is about the part `key` of the input."""
+        try:
+            with located(*key):
+                yield
+        except InputError as error:
+            self.mistakes += error.parts
+
+    def refuse(self) -> None:
+        """Raises InputError if there is any mistake."""
+        if self.mistakes:
+            text = "; ".join(dict.fromkeys(map(str, self.mistakes)))
+            raise InputError(text, self.mistakes[0].key, self.mistakes)
+
+
+@contextmanager
+def located(*key: str | int) -> Iterator[None]:
+    """An InputError of the block is about the part `key` of the input."""
+    try:
+        yield
+    except InputError as error:
+        for part in error.parts:
+            part.key = (*key, *part.key)
+        raise
 
 
 class NegativeDampingWarning(UserWarning):

@@ -11,8 +11,8 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import suboctave as so
-from suboctave.analysis.audit import Audit, Unsettled
-from suboctave.analysis.crossings import doubtful
+from suboctave.curves.audit import Audit, Unsettled
+from suboctave.curves.crossings import doubtful
 from suboctave.timedomain import locate_by_shooting, shoot
 
 #: beside the default, largest steps that hold whole pairs of events
@@ -321,7 +321,7 @@ def test_audits_of_two_directions_are_joined():
 
 def test_what_is_unsettled_is_said_in_words():
     """A test that never settles: every step is stated, once, with its range."""
-    from suboctave.analysis import guard
+    from suboctave.curves import guard
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(guard, "MOST_PROBES", 0)

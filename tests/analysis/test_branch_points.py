@@ -7,7 +7,7 @@ import pytest
 
 import suboctave as so
 from suboctave.bifurcation.bordered import null_vectors, transversality
-from suboctave.bifurcation.kinds import LimitPoint
+from suboctave.curves.events.monitors import LimitPoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.perturbation import Kind
 from suboctave.timedomain import locate_by_shooting

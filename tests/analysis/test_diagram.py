@@ -11,9 +11,8 @@ import xarray as xr
 import suboctave as so
 from suboctave import interruption
 from suboctave.analysis import diagram as diagram_module
-from suboctave.analysis.tree import DiagramBranch
-from suboctave.analysis.tree_text import tree_text
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.results.diagram import DiagramBranch, tree_text
 
 RANGE = (4.5, 2.2)
 COARSE = {"max_step": 0.3}

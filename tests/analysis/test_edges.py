@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+import importlib
+from time import process_time
 
 import numpy as np
 import pytest
@@ -119,14 +120,14 @@ MISTAKES = {
 @pytest.mark.parametrize("case", MISTAKES)
 def test_what_cannot_be_done_is_refused_in_one_line(case):
     call, words = MISTAKES[case]
-    begin = perf_counter()
+    begin = process_time()
     with pytest.raises(InputError) as refused:
         call()
     message = str(refused.value)
     assert words in message
     assert "\n" not in message
     assert len(message) < 400
-    assert perf_counter() - begin < 2.0  # far below what any of them would take
+    assert process_time() - begin < 2.0  # far below what any of them would take
 
 
 @pytest.mark.parametrize("verb", [so.frequency_response, so.bifurcation_diagram])
@@ -150,7 +151,8 @@ def test_a_mistake_in_the_program_is_not_taken_for_one_of_units(monkeypatch):
     def divides(*arguments):
         return 1 // 0
 
-    monkeypatch.setattr("suboctave.analysis.verbs.check_system", divides)
+    verbs = importlib.import_module("suboctave.analysis.frequency_response")
+    monkeypatch.setattr(verbs, "check_system", divides)
     with pytest.raises(ZeroDivisionError):
         so.frequency_response(DUFFING, (0.5, 0.6))
 

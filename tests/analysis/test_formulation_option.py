@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.count import CountCheck
+from suboctave.curves.count import CountCheck
 from suboctave.errors import InputError
 from suboctave.study.options import as_formulation
 

@@ -10,10 +10,10 @@ import pytest
 
 import suboctave as so
 from suboctave import interruption
-from suboctave.analysis import follow as follow_module
-from suboctave.analysis.saved import branch_from_dataset, branch_to_dataset
 from suboctave.continuation.ending import Ending, EndReason, interruption_of, read_endings, sentence
+from suboctave.curves import follow as follow_module
 from suboctave.interruption import Interruption
+from suboctave.results.files.branch import branch_from_dataset, branch_to_dataset
 
 #: everything public that may take long
 VERBS = (
@@ -129,14 +129,14 @@ def test_a_sentence_of_an_older_file_is_printed_as_it_was(text):
 
 def test_a_search_ends_where_a_tracked_curve_is_interrupted(monkeypatch):
     """A truncated curve is no border: it must not become one of the search."""
-    from suboctave.analysis import isola_survey
+    from suboctave.maps import catalogue
 
-    tracked = isola_survey.track
+    tracked = catalogue.track
 
     def impatient(*given, **options):
         return tracked(*given, **options, progress=Stop(12))
 
-    monkeypatch.setattr(isola_survey, "track", impatient)
+    monkeypatch.setattr(catalogue, "track", impatient)
     isolas = so.find_isolas(so.library.reference_oscillator(p=0.55, j=0.0, regularization=300), (1.3, 4.5), "j", (0, 1))
     assert isolas.interrupted
     assert not isolas.limit_points

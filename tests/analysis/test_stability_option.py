@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.stability import FloquetResult, StabilityMethod, floquet_multipliers
+from suboctave.floquet import FloquetResult, StabilityMethod, floquet_multipliers
 from suboctave.timedomain import shoot
 
 OMEGA = (4.5, 1.3)
@@ -210,14 +210,14 @@ def test_another_multiplier_on_the_circle_beside_a_bifurcation():
 
 
 def test_a_clear_curve_asks_nobody(rattling, monkeypatch):
-    from suboctave.stability import arbitration, methods
+    from suboctave.floquet import methods
 
     for name in ("hill_multipliers", "koopman_hill_multipliers"):
         monkeypatch.setattr(methods, name, lambda *a: pytest.fail("asked without need"))
     settled = []
-    honest = arbitration.Arbitration.settled
+    honest = methods.Arbitration.settled
     monkeypatch.setattr(
-        arbitration.Arbitration, "settled", lambda self, state, found: settled.append(1) or honest(self, state, found)
+        methods.Arbitration, "settled", lambda self, state, found: settled.append(1) or honest(self, state, found)
     )
     curve = so.frequency_response(rattling, OMEGA)
     assert len(curve.bifurcations) == 4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis import starts
+from suboctave.curves import starts
 from suboctave.timedomain import integrate, shoot
 
 

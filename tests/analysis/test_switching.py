@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.identity import relation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation, doubled_direction
+from suboctave.curves.identity import relation
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.perturbation import Kind

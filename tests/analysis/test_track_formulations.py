@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.bifurcation.augmented_extended import ExtendedOperator, PublishedDoubling
+from suboctave.curves.kinds.extended import ExtendedOperator, PublishedDoubling
 from suboctave.errors import InputError
 from suboctave.harmonic.perturbation import Kind
 

@@ -11,12 +11,12 @@ import pytest
 from scipy.optimize import fsolve
 
 import suboctave as so
-from suboctave.analysis.checks import make_settings
-from suboctave.analysis.track_start import Box, solved_start
+from suboctave.analysis.options import settings_of
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.continuation.march import March
 from suboctave.continuation.place import Place
-from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.curves.track_start import Box, solved_start
+from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.timedomain import locate_by_shooting, state_transition
 
 
@@ -152,7 +152,7 @@ def test_an_instant_is_compared_on_the_circle(turns):
     touch = so.switch_branch(response.bifurcations["PD"][0]).grazings[0]
     system, newton = touch.orbit.system, NewtonOptions()
     box = Box(None, (0.3, 0.8), None)
-    settings = make_settings(system, None, 0, (), None, None, None, None)
+    settings = settings_of(system, {"observe": 0})
     balance = HarmonicBalance(system, touch.orbit.basis)
     start = solved_start(touch, balance, None, ("omega", "p"), box, settings)
     before, here, behind = islice(March(start, 1.0, box.second, newton, SteppingOptions()), 2, 5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.tracked_hidden import falling
+from suboctave.curves.tracked_hidden import falling
 from suboctave.timedomain import shoot
 
 VAN_DER_POL = "mu*x**2*v"
@@ -192,3 +192,18 @@ def test_where_a_function_falls(shift):
     assert falling(x, np.exp(-x), 1) is None
     assert falling(x, 1.0 + 0.3 * (x - shift) ** 2, 1) is None
     assert falling(x, x - 0.1, 1) is None
+
+
+def test_coefficients_that_are_not_linear_in_the_parameter():
+    """The same curve whether the gap is a parameter or its square root is."""
+    found = []
+    for gap, bounds in (("g", (0.01, 0.04)), ("r**2", (0.1, 0.2))):
+        stop = so.ElasticStop(0, stiffness=4.0, gap=gap, side="right", regularization=300.0)
+        loads, values = [so.HarmonicLoad(0, "p")], {"g": 0.0225, "r": 0.15, "p": 0.5}
+        system = so.System(1.0, 0.06, 1.0, [stop], loads, {gap[0]: values[gap[0]], "p": values["p"]})
+        item = so.frequency_response(system, (4.5, 1.3), 15).bifurcations["PD"][0]
+        curve = so.track(item, gap[0], bounds)
+        found.append(curve)
+    for end in (0, -1):
+        assert found[0].parameter("g")[end] == pytest.approx(found[1].parameter("r")[end] ** 2, rel=1e-12)
+        assert found[0].omega[end] == pytest.approx(found[1].omega[end], rel=1e-9)

@@ -8,13 +8,13 @@ from functools import cache
 import pytest
 
 import suboctave as so
-from suboctave.analysis.track_start import curve_through
-from suboctave.analysis.tracked_events import events_between
-from suboctave.analysis.tracked_sample import TrackedSample, nearest_point, same_discretisation, zero_along
-from suboctave.analysis.tracked_tests import Extremum, GeneralisedDoubling
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import make_point
+from suboctave.curves.track_start import curve_through
+from suboctave.curves.tracked_events import events_between
+from suboctave.curves.tracked_sample import TrackedSample, nearest_point, same_discretisation, zero_along
+from suboctave.curves.tracked_tests import Extremum, GeneralisedDoubling
 from suboctave.harmonic.basis import HarmonicBasis
 
 OPTIONS = NewtonOptions()

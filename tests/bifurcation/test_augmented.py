@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.tracked_curve import TrackedCurve
-from suboctave.bifurcation.augmented import BranchPointUnfolded, GrazingContactEquations, SingularOperator
 from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.cubic import cubic_coefficient
-from suboctave.bifurcation.normal_form_real import Expansion
+from suboctave.bifurcation.normal_form.cubic import cubic_coefficient
+from suboctave.bifurcation.normal_form.real import Expansion
 from suboctave.continuation.linear import Factor, LeadingBlock
+from suboctave.curves.kinds.branch_point import BranchPointUnfolded
+from suboctave.curves.kinds.grazing import GrazingContactEquations
+from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.motion import MotionProblem
 from suboctave.harmonic.perturbation import Kind
 
 SMOOTH = so.System(
@@ -82,8 +84,8 @@ def curve_at(system, names, kind, nu=1):
         extra = np.array([0.31 * state.rate]) if kind == "NS" else extra
         augmentation = SingularOperator.of(state, operator, float(extra.sum()))
     values = np.array([omega if name == "omega" else system.parameters[name] for name in names])
-    curve = TrackedCurve(balance, augmentation, names, (1.0, 1.0), omega, None, 0.0, 1.0, 0.0, {})
-    return curve, curve.join(x, extra, values)
+    curve = MotionProblem(balance, names, (1.0, 1.0), omega, augmentation=augmentation)
+    return curve, curve.join(x, values, extra)
 
 
 @pytest.mark.parametrize(

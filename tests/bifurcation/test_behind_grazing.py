@@ -8,14 +8,16 @@ the stiffer the stop, the closer the fold lies to the grazing.
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.bifurcation.kinds import LimitPoint
-from suboctave.bifurcation.layer import behind_grazing
-from suboctave.bifurcation.solve import Extra, Guess, newton
+from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.events.layer import behind_grazing
+from suboctave.curves.events.locate import Guess, solve
+from suboctave.curves.events.monitors import LimitPoint
 from suboctave.errors import ConvergenceError
 from suboctave.timedomain import locate_by_shooting, shoot
 
@@ -151,14 +153,17 @@ def test_newton_does_not_take_any_standstill_for_convergence():
     orbit = curve.orbits[0]
     low = np.abs(orbit.coefficients).max()
 
-    def out_of_reach(state, extra):
-        value = float(state.x[1, 0] ** 2 + low**2)
-        gradient = np.zeros(state.x.size)
-        gradient[1] = 2.0 * state.x[1, 0]
-        return [Extra.of(value, gradient, 0.0, (), low**2)], None, []
+    class OutOfReach(Augmentation):
+        name = "out of reach"
+
+        def at(self, state, extra, names):
+            values = np.array([(state.x[1, 0] / low) ** 2 + 1.0])
+            rows = np.zeros((1, state.x.size + 1))
+            rows[0, 1] = 2.0 * state.x[1, 0] / low**2
+            return SimpleNamespace(values=values, rows=rows, addition=None, column=None, takes_over=lambda _: False)
 
     with pytest.raises(ConvergenceError):
-        newton(guess_at(orbit), np.zeros(0), np.zeros(0), out_of_reach)
+        solve(guess_at(orbit), orbit.state(), OutOfReach(), np.zeros(0))
 
 
 def test_what_cannot_be_solved_is_bracketed_and_says_so(monkeypatch):

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.bifurcation.alcorta import (
+from suboctave.bifurcation.bordered import null_vectors
+from suboctave.curves.events.alcorta import (
     equations,
     jacobian,
     locate_doubling,
@@ -20,11 +21,11 @@ from suboctave.bifurcation.alcorta import (
     log_determinant,
     published_operator,
 )
-from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.extended import locate_extended
-from suboctave.bifurcation.solve import Guess, locate_singular
+from suboctave.curves.events.extended import locate_extended
+from suboctave.curves.events.locate import Guess, locate_singular
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+from suboctave.harmonic.galerkin import toeplitz
 from suboctave.harmonic.perturbation import Kind
 
 #: period doublings of the reference oscillator at p = 0.55 by shooting: exact law, arctan law of sharpness 3000
@@ -146,8 +147,8 @@ def test_the_operator_is_that_of_the_paper(moving):
     derivative = balance.basis.derivative(np.eye(size))
     friction = np.zeros((26, 26))
     unit = np.eye(size)
-    for nodal in state.nodal:
-        friction += np.kron(state.toeplitz(nodal.damping(0)), np.outer(nodal.own.out, nodal.own.ins[0]))
+    for channel in state.own_channels:
+        friction += np.kron(toeplitz(channel.damping(0), state.basis.harmonics), np.outer(channel.out, channel.ins[0]))
     assert friction.any()
     first = 2.0 * omega * np.kron(derivative, mass) + np.kron(unit, damping) + friction
     shift = 0.5j * omega / balance.basis.nu

@@ -7,8 +7,8 @@ import pytest
 
 import suboctave as so
 from suboctave.bifurcation.normal_form import NormalForm, normal_form
-from suboctave.bifurcation.normal_form_real import doubling_predictor
-from suboctave.bifurcation.normal_form_terms import with_criticality
+from suboctave.bifurcation.normal_form.real import doubling_predictor
+from suboctave.bifurcation.normal_form.terms import with_criticality
 from suboctave.errors import InputError
 from suboctave.timedomain import integrate, shoot
 

@@ -5,15 +5,15 @@ import pytest
 
 import suboctave as so
 from suboctave import CubicSpring, ElasticStop, HarmonicLoad, System
-from suboctave.bifurcation import cubic
-from suboctave.bifurcation.augmented import SingularOperator
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.bifurcation.normal_form_real import Expansion
+from suboctave.bifurcation.normal_form import cubic
+from suboctave.bifurcation.normal_form.real import Expansion
 from suboctave.continuation import march
 from suboctave.continuation.linear import Factor, LeadingBlock
+from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+from suboctave.harmonic.derivatives import Multilinear
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.third import Multilinear
 
 
 @pytest.fixture(params=["exact", "rounded", "fifth powers"])
@@ -38,10 +38,7 @@ def state(request):
     return balance.settle(x, 0.9).at(x, 0.9)
 
 
-@pytest.mark.parametrize("at_once", [True, False])
-def test_the_short_ways_are_the_general_one(monkeypatch, state, at_once):
-    monkeypatch.setattr(cubic, "at_hand", lambda *_: at_once)
-    monkeypatch.setattr(cubic, "ready", lambda _: at_once)
+def test_the_short_ways_are_the_general_one(state):
     b = bordered(state, Kind.HALF, null_vectors(state, Kind.HALF))
     by_motion = -b.gradient(())[0].reshape(state.x.shape)
     solve = Factor.of(state.jacobian).solve

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from suboctave.harmonic.arctangent import arctangent
+from suboctave.harmonic.aft.steps import arctangent
 
 
 def test_it_is_the_librarys_to_rounding():

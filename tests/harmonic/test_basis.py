@@ -41,40 +41,6 @@ def test_sizes_and_frequencies():
     assert hash(basis) == hash(HarmonicBasis(4, 2))
 
 
-@pytest.mark.parametrize("kept", [(), (1, 4), (0, 2), (0, 4, 5), (-1, 0, 4), (0, 1.5, 4), "04", 3])
-def test_multiples_that_cannot_be_kept_are_refused(kept):
-    with pytest.raises(InputError, match="kept must"):
-        HarmonicBasis(4, 2, kept)
-
-
-def test_a_basis_that_leaves_harmonics_out():
-    basis = HarmonicBasis(6, 2, [6, 0, 1, 4, 1])
-    assert basis.kept == (0, 1, 4, 6)
-    assert hash(basis) == hash(HarmonicBasis(6, 2, (0, 1, 4, 6)))
-    assert (basis.size, basis.count, basis.filled) == (13, 7, HarmonicBasis(6, 2))
-    np.testing.assert_array_equal(basis.left_out, [2, 3, 5])
-    np.testing.assert_array_equal(basis.rows, [0, 1, 2, 7, 8, 11, 12])
-    assert "3 kept" in repr(basis)
-    # nothing left out is the same as none named
-    assert HarmonicBasis(3, 2, (0, 1, 2, 3)) == HarmonicBasis(3, 2)
-    assert HarmonicBasis(3, 2).count == HarmonicBasis(3, 2).size == 7
-
-
-@pytest.mark.parametrize(("harmonics", "nu", "kept"), [(6, 2, (0, 2, 6)), (12, 4, (0, 1, 4, 5, 12)), (3, 2, (0, 2, 3))])
-def test_only_what_a_basis_keeps_arrives_in_it(harmonics, nu, kept):
-    old, new = HarmonicBasis(6, 2, (0, 1, 2, 4, 6)), HarmonicBasis(harmonics, nu, kept)
-    x = np.random.default_rng(3).normal(size=(old.size, 2))
-    for k in old.left_out:
-        x[2 * k - 1 : 2 * k + 1] = 0.0
-    both = x.copy()
-    for k in range(1, old.harmonics + 1):
-        if k * nu // 2 not in new.kept:
-            both[2 * k - 1 : 2 * k + 1] = 0.0
-    y = old.resized(x, new)
-    np.testing.assert_allclose(motion(new, y), motion(old, both), atol=1e-12)
-    assert all(not y[2 * k - 1 : 2 * k + 1].any() for k in new.left_out)
-
-
 @pytest.mark.parametrize("nu", [1, 3])
 def test_derivative_of_the_coefficients_is_that_of_the_motion(nu):
     basis = HarmonicBasis(7, nu)

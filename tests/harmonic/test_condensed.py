@@ -10,8 +10,8 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.floquet import floquet_multipliers
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
-from suboctave.stability import floquet_multipliers
 
 N = 6
 

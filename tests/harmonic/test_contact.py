@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from channels import by_coefficients, channel_of
+from hypothesis import given, settings, strategies as st
 
-from suboctave.harmonic import instants
-from suboctave.harmonic.local_force import LocalMotion, coefficient_force, curvature, local_force
+from suboctave.harmonic.quadrature import search_grid
+from suboctave.harmonic.trigonometric import crossings, peak
 from suboctave.model import ElasticStop
 
 TOP = 25
@@ -39,12 +39,12 @@ def extrema(c):
 
 
 def local(stop, c, top=TOP):
-    return LocalMotion(stop, np.ascontiguousarray(c), 1.0, stop.coefficient_values({}), top)
+    return channel_of(stop, c, top)
 
 
 def kernel_crossings(c, level):
-    (contact,) = local(ElasticStop(0, 1.0, level, side="right"), c).contacts()
-    return contact.instants
+    grid = search_grid(len(c) - 1)
+    return crossings(np.ascontiguousarray(c, dtype=complex), level, grid.zr, grid.zi)[0]
 
 
 def quadrature(c, level, side, q, stiffness):
@@ -106,18 +106,18 @@ def test_force_and_tangent_against_quadrature(seed, side):
     level = c[0].real + 0.4 * rng.normal() * np.abs(c[1:]).sum()
     stop = ElasticStop(0, 3.7, level, side="right" if side > 0 else "left")
     force, tangent = quadrature(c, level, side, np.arange(TOP + 1), 3.7)
-    result = local_force(local(stop, c))
-    np.testing.assert_allclose(result.force, force, atol=1e-12 * (1 + np.abs(c).sum()))
-    np.testing.assert_allclose(result.stiffness, tangent, atol=1e-11)
+    result = local(stop, c)
+    np.testing.assert_allclose(result.spectra[0], force, atol=1e-12 * (1 + np.abs(c).sum()))
+    np.testing.assert_allclose(result.stiffness(0), tangent, atol=1e-11)
 
 
 @pytest.mark.parametrize(("gap", "share"), [(-10.0, 1.0), (10.0, 0.0)])
 def test_a_stop_always_or_never_touched(gap, share):
     c = np.array([0.3, 1.0 - 0.2j, 0.1j])
-    result = local_force(local(ElasticStop(0, 2.0, gap, side="right"), c, 5))
-    np.testing.assert_allclose(result.stiffness, share * 2.0 * np.eye(6)[0], atol=1e-15)
+    result = local(ElasticStop(0, 2.0, gap, side="right"), c, 5)
+    np.testing.assert_allclose(result.stiffness(0), share * 2.0 * np.eye(6)[0], atol=1e-15)
     expected = np.array([c[0].real - gap, c[1] / 2, c[2] / 2, 0, 0, 0]) * 2.0 * share
-    np.testing.assert_allclose(result.force, expected, atol=1e-14)
+    np.testing.assert_allclose(result.spectra[0], expected, atol=1e-14)
 
 
 @given(seed=st.integers(0, 10**6), harmonics=st.integers(1, 15), shift=st.floats(-1.2, 1.2))
@@ -129,17 +129,18 @@ def test_two_opposite_stops_are_a_spring(seed, harmonics, shift):
     c = random_motion(np.random.default_rng(seed), harmonics, 1.0)
     gap = c[0].real + shift * np.abs(c[1:]).max()
     pair = [local(ElasticStop(0, 2.5, gap, side=side), c) for side in ("left", "right")]
-    force = sum(local_force(one).force for one in pair)
+    force = sum(one.spectra[0] for one in pair)
     spring = np.zeros(TOP + 1, complex)
     spring[: harmonics + 1] = 1.25 * c
     spring[0] = 2.5 * (c[0].real - gap)
     np.testing.assert_allclose(force, spring, atol=1e-12 * (1 + np.abs(c).sum()))
-    tangent = sum(local_force(one).stiffness for one in pair)
+    tangent = sum(one.stiffness(0) for one in pair)
     np.testing.assert_allclose(tangent, 2.5 * np.eye(TOP + 1)[0], atol=1e-12)
-    by = [coefficient_force(one) for one in pair]
+    by = [by_coefficients(one) for one in pair]
     np.testing.assert_allclose(sum(b.force[1] for b in by), -2.5 * np.eye(TOP + 1)[0], atol=1e-12)
-    assert np.abs(sum(b.stiffness[1] for b in by)).max() <= 1e-12 * (1 + np.abs(by[0].stiffness[1]).max())
-    np.testing.assert_allclose(np.sort(curvature(pair[0]).uu), np.sort(-curvature(pair[1]).uu), rtol=1e-12)
+    assert np.abs(sum(b.tangent[1, 0] for b in by)).max() <= 1e-12 * (1 + np.abs(by[0].tangent[1, 0]).max())
+    bent = [np.concatenate([part.weights[0, 0] for part in one.second] or [np.zeros(0)]) for one in pair]
+    np.testing.assert_allclose(np.sort(bent[0]), np.sort(-bent[1]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("harmonics", [1, 5, 15])
@@ -153,17 +154,17 @@ def test_grazing_stiffness_follows_the_square_root(harmonics, eps):
     top = at[np.argmax(value(c, at))]
     stop = ElasticStop(0, 1.0, float(value(c, top)) - eps, side="right")
     expected = np.sqrt(2 * eps / abs(value(c, top, 2))) / np.pi
-    mean = local_force(local(stop, c)).stiffness[0].real
+    mean = local(stop, c).stiffness(0)[0].real
     assert mean == pytest.approx(expected, rel=max(30 * harmonics**2 * eps, 2e-15 / eps, 1e-9))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_amplitude_is_the_extremum_largest_in_modulus(seed):
-    """instants.peak against all extrema, from the companion matrix of the derivative."""
+    """peak against all extrema, from the companion matrix of the derivative."""
     rng = np.random.default_rng(seed)
     for harmonics in (1, 2, 5, 15, 40):
         c = random_motion(rng, harmonics, rng.uniform(0.0, 2.0))
-        size, tau, x = instants.peak(c, 8 * harmonics + 8)
+        size, tau, x = peak(c, 8 * harmonics + 8)
         assert size == pytest.approx(np.abs(value(c, extrema(c))).max(), rel=1e-9)
         assert value(c, tau) == pytest.approx(x, rel=1e-11)
         assert abs(x) == size
@@ -171,9 +172,9 @@ def test_amplitude_is_the_extremum_largest_in_modulus(seed):
 
 def test_amplitude_in_closed_form():
     """max |a0 + cos tau + b cos 2 tau| with the extremum inside: at cos tau = -1/(4 b), of value a0 - b - 1/(8 b)."""
-    size, tau, x = instants.peak(np.array([-1.0, 1.0, 0.7 + 0j]), 24)
+    size, tau, x = peak(np.array([-1.0, 1.0, 0.7 + 0j]), 24)
     assert x == pytest.approx(-1.0 - 0.7 - 1 / 5.6, rel=1e-14)
     assert size == -x
     assert np.cos(tau) == pytest.approx(-1 / 2.8, abs=1e-8)
-    assert instants.peak(np.array([0.25 + 0j, 0.0]), 16)[0] == 0.25
-    assert instants.peak(np.zeros(4, complex), 32)[0] == 0.0
+    assert peak(np.array([0.25 + 0j, 0.0]), 16)[0] == 0.25
+    assert peak(np.zeros(4, complex), 32)[0] == 0.0

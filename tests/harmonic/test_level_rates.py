@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.harmonic.rates import level_rates
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-4, 1e6])
@@ -16,11 +15,11 @@ def test_levels_of_texts_move_as_their_derivatives_say(unit):
     )  # fmt: skip
     (element,) = system.elements
     order = [str(name) for name in element.coefficient_names]
-    rates = dict(zip(order, level_rates(element, element.coefficient_values(system.parameters))[0], strict=True))
+    rates = dict(zip(order, element.level_rates(element.coefficient_values(system.parameters))[0], strict=True))
     assert rates["F"] == pytest.approx(1.0 / (3.0 * unit), rel=1e-10)
     assert rates["k"] == pytest.approx(-2.0 / (9.0 * unit), rel=1e-10)
 
 
 def test_levels_that_are_coefficients_move_with_them():
     stop = so.ElasticStop(0, 2.0, 0.3, regularization=1000.0)
-    assert level_rates(stop, np.array([2.0, 0.3, 1000.0]))[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
+    assert stop.level_rates(np.array([2.0, 0.3, 1000.0]))[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)

@@ -71,8 +71,8 @@ def test_friction_is_integrated_whatever_its_sharpness(velocity):
     """Against a fine rule on a grid that is graded towards the reversals; a hundred times sharper, few nodes more."""
     x = wave(5, c1=0.7, s1=-0.2, c3=0.15, s5=0.05)
     state = state_of(so.TanhFriction(0, 0.8, velocity), x)
-    nodal = state.nodal[0]
-    assert len(nodal.nodes.weights) < 900
+    (law,) = state.own_channels[0].laws
+    assert len(law.nodes.weights) < 900
 
     def v(tau):
         k = np.arange(1, 6)

@@ -4,22 +4,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from channels import by_coefficients, channel_of
 from scipy.integrate import quad
 
 import suboctave as so
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis, instants
-from suboctave.harmonic.local_force import LocalMotion, coefficient_force, local_force
-from suboctave.harmonic.quadrature import samples_for
-from suboctave.model import (
-    AdaptiveSampling,
-    CubicSpring,
-    ElasticStop,
-    HarmonicLoad,
-    PolynomialSpring,
-    System,
-    library,
-)
+from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis
+from suboctave.harmonic.aft.sampled import settled_samples
+from suboctave.harmonic.trigonometric import crossings
+from suboctave.model import AdaptiveSampling, CubicSpring, ElasticStop, HarmonicLoad, PolynomialSpring, System, library
 
 MOTIONS = {
     "one harmonic": [0.1, 1.0 - 0.3j],
@@ -54,11 +47,9 @@ def test_sharp_stop_against_adaptive_quadrature(motion, where, sharpness):
     gap = gaps(c)[where]
     stop = ElasticStop(0, 1.0, gap, side="right", regularization=sharpness)
     numbers = stop.coefficient_values({})
-    local = LocalMotion(stop, c, 1.0, numbers, top)
-    spectra, by = local_force(local), coefficient_force(local)
-    near = instants.crossings(
-        c, gap, *np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 257)[:-1]]).T
-    )
+    spectra = channel_of(stop, c, top)
+    by = by_coefficients(spectra)
+    near = crossings(c, gap, *np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 257)[:-1]]).T)
     ends = [0.0, *near[0], 2 * np.pi]
     if where != "passed" and motion != "rest":
         tau = np.linspace(0, 2 * np.pi, 20001)
@@ -83,8 +74,10 @@ def test_sharp_stop_against_adaptive_quadrature(motion, where, sharpness):
 
     zero = np.zeros(1)
     for q in (0, top):
-        assert spectra.force[q] == pytest.approx(integral(lambda u: stop.tangent(u, zero, numbers)[0], q), abs=1e-11)
-        assert spectra.stiffness[q] == pytest.approx(
+        assert spectra.spectra[0, q] == pytest.approx(
+            integral(lambda u: stop.tangent(u, zero, numbers)[0], q), abs=1e-11
+        )
+        assert spectra.stiffness(0)[q] == pytest.approx(
             integral(lambda u: stop.tangent(u, zero, numbers)[1], q), abs=1e-10
         )
         assert by.force[1, q] == pytest.approx(
@@ -108,19 +101,19 @@ def test_polynomial_laws_are_integrated_exactly(powers):
         return padded[: top + 1]
 
     spring = PolynomialSpring(0, powers)
-    spectra = local_force(LocalMotion(spring, c, 1.0, spring.coefficient_values({}), top))
+    spectra = channel_of(spring, c, top)
     force = sum(a * power(n) for n, a in powers.items())
     slope = sum(a * n * power(n - 1) for n, a in powers.items())
-    np.testing.assert_allclose(spectra.force, force, atol=1e-13 * np.abs(force).max())
-    np.testing.assert_allclose(spectra.stiffness, slope, atol=1e-13 * np.abs(slope).max())
+    np.testing.assert_allclose(spectra.spectra[0], force, atol=1e-13 * np.abs(force).max())
+    np.testing.assert_allclose(spectra.stiffness(0), slope, atol=1e-13 * np.abs(slope).max())
 
 
 def test_weights_add_up_to_the_period():
     for element in (CubicSpring(0, 1.0), ElasticStop(0, 1.0, 0.4, regularization=1e4)):
-        nodes = LocalMotion(element, motion_of("rough"), 1.0, element.coefficient_values({}), 15).nodes()
-        assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
-        assert np.abs(nodes.zr**2 + nodes.zi**2 - 1.0).max() < 1e-13
-        assert len(nodes.tau) == len(np.unique(nodes.tau))
+        zr, zi, weights, *_ = channel_of(element, motion_of("rough"), 15).laws[0].path
+        assert weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
+        assert np.abs(zr**2 + zi**2 - 1.0).max() < 1e-13
+        assert len(zr) == len(np.unique(np.arctan2(zi, zr)))
 
 
 @pytest.mark.parametrize("harmonics", [1, 2, 3, 4, 6, 8])
@@ -131,13 +124,13 @@ def test_motions_of_few_harmonics_are_integrated_as_well(harmonics, gap):
     """
     c = np.array([0.1] + [0.7 / k**2 * np.exp(1j * k) for k in range(1, harmonics + 1)])
     stop, top = ElasticStop(0, 1.0, gap, side="right", regularization=40.0), 2 * harmonics + 1
-    local = LocalMotion(stop, c, 1.0, stop.coefficient_values({}), top)
-    nodes, spectra = local.nodes(), local_force(local)
-    assert np.abs(nodes.zr**2 + nodes.zi**2 - 1.0).max() < 1e-14
+    spectra = channel_of(stop, c, top)
+    zr, zi, *_ = spectra.laws[0].path
+    assert np.abs(zr**2 + zi**2 - 1.0).max() < 1e-14
     tau = 2 * np.pi * np.arange(8192) / 8192
     f, f_u, _ = stop.tangent(value(c, tau), np.zeros_like(tau), stop.coefficient_values({}))
     waves = np.exp(-1j * np.outer(np.arange(top + 1), tau)) / len(tau)
-    for found, law in ((spectra.force, f), (spectra.stiffness, f_u)):
+    for found, law in ((spectra.spectra[0], f), (spectra.stiffness(0), f_u)):
         exact = waves @ law
         np.testing.assert_allclose(found, exact, atol=2e-12 * np.abs(exact).max())
 
@@ -147,6 +140,12 @@ class Silent(ElasticStop):
 
     def sampling(self, c):
         return AdaptiveSampling()
+
+
+def samples_for(element, c):
+    channel = channel_of(element, c, 17)
+    ((member, _),) = channel.members()
+    return settled_samples(channel.along, member)
 
 
 class Broken(CubicSpring):
@@ -163,15 +162,14 @@ class Broken(CubicSpring):
 def test_blind_sampling_settles_on_a_smooth_law_and_agrees_with_the_told_one():
     told = ElasticStop(0, 1.0, 0.3, side="right", regularization=20.0)
     blind = Silent(0, 1.0, 0.3, side="right", regularization=20.0)
-    c, numbers = motion_of("rough"), told.coefficient_values({})
-    samples = samples_for(blind, c, 1.0, numbers, 17)
-    a, b = (local_force(LocalMotion(e, c, 1.0, numbers, 17, samples)) for e in (told, blind))
-    np.testing.assert_allclose(a.force, b.force, atol=1e-10)
-    np.testing.assert_allclose(a.stiffness, b.stiffness, atol=1e-10)
-    assert samples_for(told, c, 1.0, numbers, 17) is None
+    c = motion_of("rough")
+    samples = samples_for(blind, c)
+    a, b = (channel_of(e, c, 17, samples) for e in (told, blind))
+    np.testing.assert_allclose(a.spectra, b.spectra, atol=1e-10)
+    assert samples_for(told, c) is None
     # harmonics of a smooth law fall off: fewer samples than for the sharp one
     spring = Silent(0, 1.0, 0.3, side="right", regularization=2.0)
-    assert samples_for(spring, c, 1.0, spring.coefficient_values({}), 17) < samples
+    assert samples_for(spring, c) < samples
 
 
 @pytest.mark.parametrize("element", [Broken(0, 1.0), Silent(0, 1.0, 0.3, regularization=1e6)], ids=["broken", "sharp"])
@@ -189,7 +187,7 @@ def test_samples_stay_frozen_until_settled_again(damper):
     small, large = np.zeros((11, 1)), np.zeros((11, 1))
     small[1], large[1:6] = 0.1, 2.0
     balance = HarmonicBalance(system, HarmonicBasis(5)).settle(small, 1.0)
-    assert balance.at(large, 1.0).local_motions[0].samples == balance.samples[0]
+    assert balance.at(large, 1.0).laws.members[0].samples == balance.samples[0]
     assert balance.settle(large, 1.0).samples[0] >= balance.samples[0]
     # a system whose laws are all known is not touched
     known = HarmonicBalance(library.duffing(0.1, 1.0, 1.0, 1.0), HarmonicBasis(5))

@@ -5,7 +5,7 @@ import pytest
 
 import suboctave as so
 from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis
-from suboctave.harmonic.selection import choose_harmonics, truncation
+from suboctave.harmonic.truncation import choose_harmonics, truncation
 
 CASES = {
     # the motion's harmonics decay geometrically, like a power of k, and like that power up to the sharpness

@@ -11,10 +11,10 @@ import pytest
 import scipy.sparse
 
 import suboctave as so
-from suboctave.model.description import build, build_part, describe
-from suboctave.model.element import BaseElement
+from suboctave.model.description import build_part, known_kinds
+from suboctave.model.elements.base import BaseElement
 from suboctave.model.loads import Load
-from suboctave.model.recorded import known_kinds
+from suboctave.model.system import build, describe
 
 
 class OwnSpring(so.CubicSpring):

@@ -11,7 +11,7 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.model import coefficient
-from suboctave.model.expression import FUNCTIONS
+from suboctave.model.expressions.reader import FUNCTIONS
 
 VALUES = {"a": 0.37, "b": 1.9, "k": 2.5, "m": 0.8, "omega": 3.1}
 

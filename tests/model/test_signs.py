@@ -9,7 +9,7 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import InputError, NegativeDampingWarning
-from suboctave.model.stops import check_stiffness
+from suboctave.model.elements.stops import check_stiffness
 
 LOADS = [so.HarmonicLoad(0, 0.3)]
 

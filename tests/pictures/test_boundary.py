@@ -10,10 +10,11 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.pictures import plot, plot_boundaries, plot_space, style
-from suboctave.pictures.interactive import SYMBOLS
-from suboctave.pictures.interactive_boundary import plane_data, space_data
+from suboctave.pictures.boundary import boundary_drawing
+from suboctave.pictures.browser import SYMBOLS, figure_data
 from suboctave.pictures.periods import period_colour
 from suboctave.pictures.report import write_report
+from suboctave.pictures.space import space_drawing
 from suboctave.store.layout import EventRow, curve_dataset
 
 TOP = 0.5
@@ -276,7 +277,7 @@ def test_every_marker_has_a_symbol_in_the_browser():
 
 
 def test_the_browser_is_told_the_same_places():
-    told = plane_data({"border": boundary()}, "omega", "j", "figure")
+    told = figure_data(boundary_drawing([boundary()]), "figure")
     line, *_ = told["data"]
     x, y = (np.array(line[axis], dtype=float) for axis in "xy")
     known = np.isfinite(x)
@@ -285,8 +286,8 @@ def test_the_browser_is_told_the_same_places():
     assert np.all(np.abs(np.array(hollow["x"]) - 2.0) <= 0.26)
     (extremum,) = (trace for trace in told["data"] if trace["name"] == "extremum")
     assert (extremum["x"], extremum["y"]) == ([2.0], [TOP])
-    assert "j = 0.5" in extremum["hovertext"][0]
-    space = space_data({"a": response(0.1), "border": boundary()}, "omega", "j", "figure")
+    assert "j = 0.5" in extremum["text"][0]
+    space = figure_data(space_drawing([response(0.1), boundary()]), "figure")
     assert space["space"]
     assert {trace["type"] for trace in space["data"]} == {"scatter3d"}
 

@@ -10,10 +10,13 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.pictures import plot, plot_boundaries, plot_space
-from suboctave.pictures.interactive_boundary import plane_data, space_data
-from suboctave.pictures.periods import period_colour, tinted
+from suboctave.pictures.boundary import boundary_drawing
+from suboctave.pictures.browser import figure_data
+from suboctave.pictures.isolas import surface
+from suboctave.pictures.periods import period_colour
 from suboctave.pictures.report import write_report
-from suboctave.pictures.surfaces import surface
+from suboctave.pictures.space import space_drawing
+from suboctave.pictures.style import tinted
 from suboctave.store.isolas import isolas_dataset
 from suboctave.store.layout import EventRow, curve_dataset
 
@@ -155,13 +158,12 @@ def test_in_space(tmp_path):
 
 
 def test_for_the_browser():
-    curves = {"isolas": isola(), "folds": folds(), "at 0.2": closed(0.2), "at 0.4": closed(0.4)}
-    plane = plane_data({name: curves[name] for name in ("isolas", "folds")}, "omega", "j", "name")
+    plane = figure_data(boundary_drawing([isola(), folds()]), "name")
     region = plane["data"][0]
     assert region["fill"] == "toself"
     assert region["fillcolor"] == tinted(period_colour(2), 0.82)
     assert "isola is born" in [trace["name"] for trace in plane["data"]]
-    space = space_data(curves, "omega", "j", "name")
+    space = figure_data(space_drawing([isola(), folds(), closed(0.2), closed(0.4)]), "name")
     (grid,) = [trace for trace in space["data"] if trace["type"] == "surface"]
     assert np.shape(grid["x"]) == np.shape(grid["z"])
     assert np.max(grid["y"]) == pytest.approx(TOP)

@@ -9,9 +9,10 @@ import pytest
 from matplotlib.colors import to_hex, to_rgb
 
 from suboctave.pictures import plot_response
-from suboctave.pictures.interactive import figure_data
-from suboctave.pictures.periods import period_colour, period_name, tinted
-from suboctave.pictures.style import INK, KINDS
+from suboctave.pictures.browser import figure_data
+from suboctave.pictures.periods import period_colour, period_name
+from suboctave.pictures.response import response_drawing
+from suboctave.pictures.style import INK, KINDS, tinted
 from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.linspace(1.0, 2.0, 21)
@@ -110,13 +111,13 @@ def test_subcritical_is_hollow_where_it_is_known():
     }
     drawn = {tuple(line.get_xdata()): to_hex(line.get_markerfacecolor()) for line in lines(figure, "PD")}
     assert drawn == {(X[3], X[5]): filled, (X[4],): "#ffffff"}
-    data = json.loads(json.dumps(figure_data({"a": curve(1, events=events)}, "omega", "a")))["data"]
+    data = json.loads(json.dumps(figure_data(response_drawing([[curve(1, events=events)]]), "a")))["data"]
     fills = {trace["name"]: trace["marker"]["color"].lower() for trace in data if trace["mode"] == "markers"}
     assert fills == faces
 
 
 def test_the_page_has_the_same_colours():
-    data = figure_data({"main": curve(1), "other": curve(2)}, "omega", "a")["data"]
+    data = figure_data(response_drawing([[curve(1), curve(2)]]), "a")["data"]
     assert [trace["line"]["color"] for trace in data] == [INK, period_colour(2)]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from suboctave.errors import InputError
-from suboctave.pictures.strokes import bent, line, repeated, strokes, without_repeats
+from suboctave.pictures.strokes import bent, strokes, without_repeats
 from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.arange(5.0)
@@ -95,10 +95,6 @@ def test_a_curve_that_comes_back_on_itself_is_dashed_once():
     assert stroke.x[0] == 0.0
     assert stroke.x.max() == 1.0
     assert stroke.x[-1] > 0.9  # the way back is left out, but for the turn
-    again = repeated(line(unstable, "omega"))
-    assert not again[:20].any()
-    assert again[24:].all()
-    assert not repeated(line(curve_dataset(x, y, stable=x < 2.0), "omega")).any()
     # a line beside it, two hundredths of the frame away, is another one
     beside = curve_dataset(x, np.concatenate([np.sin(3.0 * there), np.sin(3.0 * back) + 0.02]), stable=x > 0.7)
     kept = without_repeats(strokes(beside, "omega"), [], spread)

@@ -10,7 +10,8 @@ import pytest
 import xarray as xr
 
 import suboctave as so
-from suboctave.analysis.results import Results, Table
+from suboctave.store.table import Table
+from suboctave.study.results import Results
 
 
 @pytest.fixture(scope="module")

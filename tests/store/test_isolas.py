@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import suboctave as so
-from suboctave.analysis.results import Results
+from suboctave.study.results import Results
 
 
 def duffing():

@@ -9,8 +9,10 @@ import pytest
 import xarray as xr
 
 import suboctave as so
-from suboctave.analysis.results import Results, Table, from_datasets, to_datasets
 from suboctave.store.blocks import pack, unpack
+from suboctave.store.registry import from_datasets, to_datasets
+from suboctave.store.table import Table
+from suboctave.study.results import Results
 
 SYSTEM = so.library.reference_oscillator(p=0.55, j=0.5)
 

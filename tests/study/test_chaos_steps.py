@@ -9,8 +9,7 @@ import xarray as xr
 import suboctave as so
 from suboctave.store.journal import Journal
 from suboctave.study.file import read_study
-from suboctave.study.keeping import finished, keep, recovered
-from suboctave.study.runner import run_study
+from suboctave.study.runner import finished, keep, recovered, run_study
 
 STUDY = """
 title = "basins"
@@ -72,7 +71,7 @@ def test_files_and_journals_hold_all_of_it(study_file, tmp_path):
         again, _ = finished(journal.records, step.name, False)
         for other in (table, again):
             xr.testing.assert_identical(first.result.to_xarray(), other.result.to_xarray())
-    assert [item.branches for item in recovered(tmp_path / "a.journal")[0]] == [None] * 4
+    assert [item.branches for item in recovered(tmp_path / "a.journal")] == [None] * 4
     assert isinstance(results["shares"].result, so.Basins)
     assert isinstance(results["rates"].result, so.LyapunovExponents)
     assert results["states"].result.plot()

@@ -74,7 +74,7 @@ def test_a_folder_that_cannot_be_made_is_known_before_the_work(tmp_path):
 
 
 def test_the_demo_prints_tables_of_80_columns_and_writes_figures(computed, tmp_path, capsys):
-    cli.run_demo(tmp_path / "new")
+    demo.run_demo(tmp_path / "new")
     printed = capsys.readouterr()
     assert not printed.err  # nobody watches: no bar
     told = [line for line in printed.out.splitlines() if not line.startswith(("figure:", "up to j"))]
@@ -98,7 +98,7 @@ def test_ctrl_c_keeps_what_was_computed(monkeypatch, tmp_path, capsys):
 
     monkeypatch.setattr(demo, "compute", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        cli.run_demo(tmp_path)
+        demo.run_demo(tmp_path)
     assert capsys.readouterr().out.count("interrupted at omega = 2") == 1  # the other cases are not begun
     assert [path.name for path in tmp_path.iterdir()] == ["weak_forcing.png"]
 
@@ -107,7 +107,7 @@ def test_an_error_of_ours_is_one_sentence(monkeypatch, capsys):
     def refuse():
         raise suboctave.ConvergenceError("no motion found at omega = 4.5; give a start")
 
-    monkeypatch.setattr(cli, "application", lambda: refuse)
+    monkeypatch.setattr(cli, "application", refuse)
     with pytest.raises(SystemExit) as stop:
         cli.main()
     assert stop.value.code == 1
@@ -118,7 +118,7 @@ def test_ctrl_c_has_the_status_a_shell_expects(monkeypatch, capsys):
     def stop():
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "application", lambda: stop)
+    monkeypatch.setattr(cli, "application", stop)
     with pytest.raises(SystemExit) as stopped:
         cli.main()
     assert stopped.value.code == 130

@@ -253,7 +253,7 @@ def test_ctrl_c_keeps_the_branches_that_are_there_and_resume_repeats_none(
     assert kept.interrupted
     same(kept[1].branch, by_script[0][1].branch)
     journal = path.parent / "study_results" / JOURNAL
-    assert [r.kind for r in read_journal(journal)[0]].count("branch") == 2
+    assert [r.kind for r in read_journal(journal)].count("branch") == 2
     status, out, _ = suboctave("show", journal)
     assert status == 0
     assert "begun" in out

@@ -10,12 +10,16 @@ from pathlib import Path
 import pytest
 
 import suboctave as so
-from suboctave.model.expression import coefficient
+from suboctave.model.expressions.coefficients import coefficient
 from suboctave.study.file import read_study
 
 hypothesis = pytest.importorskip("hypothesis")
-from hypothesis import HealthCheck, given, settings  # noqa: E402
-from hypothesis import strategies as st  # noqa: E402
+from hypothesis import (  # noqa: E402
+    HealthCheck,
+    given,
+    settings,
+    strategies as st,
+)
 
 DUFFING = (Path(__file__).parent / "duffing.toml").read_text(encoding="utf-8")
 WORDS = sorted({word for line in DUFFING.splitlines() for word in line.replace(",", " ").split()})

@@ -11,9 +11,8 @@ import pytest
 import suboctave as so
 from suboctave.store.journal import Journal, read_journal
 from suboctave.study.file import read_study
-from suboctave.study.keeping import finished, keep, recovered
-from suboctave.study.runner import JOURNAL, run_study
-from suboctave.study.steps.find_isolas import FindIsolas
+from suboctave.study.runner import JOURNAL, finished, keep, recovered, run_study
+from suboctave.study.steps.maps import FindIsolas
 
 SYSTEM = """
 title = "a third of the frequency"
@@ -146,12 +145,12 @@ def test_a_finished_search_is_kept_by_the_journal(ran, tmp_path):
     with_journal = Journal.create(tmp_path / "journal")
     keep(with_journal, "isolas", "key", result, 1.0)
     with_journal.close()
-    records, _, _ = read_journal(tmp_path / "journal")
+    records = read_journal(tmp_path / "journal")
     again, said = finished(records, "key", False)
     assert repr(again) == repr(result)
     assert said["seconds"] == 1.0
     assert np.array_equal(again[0].known[4.0].omega, result[0].known[4.0].omega)
-    (item,), _ = recovered(tmp_path / "journal")
+    (item,) = recovered(tmp_path / "journal")
     assert (item.state, item.branches) == ("finished", 1 + len(result[0].known))
 
 
@@ -162,7 +161,7 @@ def test_resume_does_not_search_again(study_file, monkeypatch):
     journal = folder / JOURNAL
     # as if it had been killed before the results were written
     held = Journal.create(journal)
-    keep(held, "isolas", study.key_of(study.steps[0]), first.finished[0].result, 1.0)
+    keep(held, "isolas", study.keys[study.steps[0].name], first.finished[0].result, 1.0)
     held.close()
     (folder / "results.nc").unlink()
     monkeypatch.setattr(FindIsolas, "run", None)

@@ -48,6 +48,7 @@ def test_as_by_a_script(study_file, suboctave):
     for name in ("period", "F", "from omega", "to omega"):
         np.testing.assert_allclose(table[name], expected[name], rtol=1e-9)
     assert set(table["to kind"]) == {"LP", "range"}
+    assert table.result.label(1.0, 0.1).count == 1  # the map itself is kept with it
 
 
 @pytest.mark.slow

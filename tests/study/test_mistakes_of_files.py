@@ -180,7 +180,7 @@ class Brittle(so.CubicSpring):
         return np.where(np.abs(u) > 0.8, np.nan, f), f_u, f_v
 
     def sampling(self, c):
-        from suboctave.model.sampling import AdaptiveSampling
+        from suboctave.model.elements.smoothness import AdaptiveSampling
         return AdaptiveSampling()
 """
 

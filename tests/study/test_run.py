@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.results import from_datasets
 from suboctave.store.journal import Journal, read_journal
+from suboctave.store.registry import from_datasets
 from suboctave.study.file import read_study
 from suboctave.study.runner import JOURNAL, run_study
 
@@ -232,16 +232,14 @@ def test_a_kill_in_the_middle_loses_no_finished_analysis(study_file, by_script, 
     journal = folder / JOURNAL
     deadline = time.monotonic() + 400  # with kernels to compile; seconds without
     while time.monotonic() < deadline and process.poll() is None:
-        kinds = [r.kind for r in read_journal(journal)[0]] if journal.exists() else []
+        kinds = [r.kind for r in read_journal(journal)] if journal.exists() else []
         if "analysis" in kinds:  # the first is finished; the second takes much longer than this loop
             break
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     assert not (folder / "results.nc").exists()
-    with open(journal, "ab") as file:
-        file.write(b"half a reco")  # as if the power had failed in the middle of a record
-    first = next(r for r in read_journal(journal)[0] if r.kind == "analysis")
+    first = next(r for r in read_journal(journal) if r.kind == "analysis")
 
     path.write_text(DUFFING)  # the analysis that had not finished may be changed
     outcome = run_study(read_study(path), resume=True)
@@ -283,38 +281,6 @@ def test_ctrl_c_keeps_what_is_there_and_can_go_on(study_file, by_script, equal):
     again = run_study(study, resume=True)
     assert [item.reused for item in again.finished] == [True, False]
     equal(so.load(again.files[0])["up"], by_script[1])
-
-
-def test_two_runs_do_not_write_the_same_journal(tmp_path):
-    first = Journal.create(tmp_path / "j.journal")
-    with pytest.raises(so.InputError, match="another run"):
-        Journal.reopen(tmp_path / "j.journal")
-    first.close()
-
-
-def test_any_torn_end_of_a_journal_is_dropped(tmp_path):
-    import xarray as xr
-
-    path = tmp_path / "a.journal"
-    journal = Journal.create(path)
-    for i in range(3):
-        journal.append("analysis", {"name": f"n{i}"}, xr.Dataset({"a": ("x", np.arange(3.0) + i)}))
-    journal.close()
-    whole = path.read_bytes()
-    ends = [read_journal(path)[1]]
-    for cut in range(0, len(whole), 7):
-        path.write_bytes(whole[:cut])
-        records, end, torn = read_journal(path)
-        assert end <= cut
-        assert torn == (end < cut)
-        assert [r.said["name"] for r in records] == [f"n{i}" for i in range(len(records))]
-        if records:
-            np.testing.assert_array_equal(records[-1].dataset["a"], np.arange(3.0) + len(records) - 1)
-    flipped = bytearray(whole)
-    flipped[len(whole) // 2] ^= 4
-    path.write_bytes(flipped)
-    assert len(read_journal(path)[0]) < 3
-    assert ends == [len(whole)]
 
 
 def test_a_failed_analysis_does_not_take_the_others_with_it(study_file, suboctave):

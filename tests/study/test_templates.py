@@ -95,7 +95,7 @@ def test_matrices_come_from_files(tmp_path, suboctave):
     import scipy.io
     import scipy.sparse
 
-    from suboctave.study.matrices import read_matrix
+    from suboctave.study.system import read_matrix
 
     matrix = np.array([[2.0, -1.0], [-1.0, 1.0 / 3.0]])
     np.save(tmp_path / "a.npy", matrix)

@@ -96,11 +96,11 @@ def test_an_analysis_that_ran_into_its_limit_is_done_again_and_so_is_what_starts
 @pytest.mark.parametrize("given", ["key", "option"])
 def test_a_study_that_ran_into_its_limit_ends_there_and_goes_on(study_file, suboctave, ticks, given):
     text = SYSTEM + UP + DOWN + ALONG
-    path = study_file(text.replace('title = "limits"', 'title = "limits"\nseconds = 60') if given == "key" else text)
-    options = ("--seconds", "60") if given == "option" else ()
+    path = study_file(text.replace('title = "limits"', 'title = "limits"\nseconds = 150') if given == "key" else text)
+    options = ("--seconds", "150") if given == "option" else ()
     status, out, err = suboctave("run", path, *options)
     assert status == 1, err
-    assert "the time limit of 60 s was reached" in " ".join(out.split())
+    assert "the time limit of 150 s was reached" in " ".join(out.split())
     assert "--resume" in out
     results = so.load(path.parent / "study_results" / "results.nc")
     assert list(results) == ["up", "down"]

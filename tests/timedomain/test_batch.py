@@ -8,8 +8,7 @@ import pytest
 import suboctave as so
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.timedomain import integrate
-from suboctave.timedomain.batch import Flow
-from suboctave.timedomain.motions import check_motions
+from suboctave.timedomain.flow import Flow, check_motions
 
 LOADS = [
     so.HarmonicLoad(0, amplitude=["p", "0.3*omega"], harmonic=[1, 3], phase=[0.0, "shift"]),
@@ -24,7 +23,7 @@ class Logarithmic(so.Element):
     coefficient_names = ("c",)
 
     def sampling(self, c):
-        from suboctave.model.sampling import AdaptiveSampling
+        from suboctave.model.elements.smoothness import AdaptiveSampling
 
         return AdaptiveSampling()
 
@@ -267,3 +266,12 @@ def test_wrong_options_are_refused():
     ):
         with pytest.raises(InputError, match=words):
             Flow(SYSTEMS["stops"], **options)
+
+
+def test_beside_a_law_that_is_called_back_every_trajectory_feels_its_own_state():
+    """Newmark's steps against the accurate method: an error of second order, 1e-4 with 1000 steps."""
+    laws = [so.CubicSpring(0, 0.3), so.Callable(0, lambda x, v: x**3)]
+    system = so.System(1.0, 0.1, 1.0, laws, [so.HarmonicLoad(0, 1.0)])
+    states = np.random.default_rng(0).normal(size=(4, 2))
+    accurate, newmark = (Flow(system, method, lanes=8).over(states, 1.0, 1).end for method in ("accurate", "newmark"))
+    assert np.abs(accurate - newmark).max() < 5e-4

@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 import suboctave as so
 from suboctave.timedomain import shoot
-from suboctave.timedomain.batch import Flow
+from suboctave.timedomain.flow import Flow
 
 ZETA, KC, J, P, OMEGA = 0.03, 4.7, 0.2, 0.55, 2.3
 

@@ -8,8 +8,8 @@ import pytest
 import suboctave as so
 from suboctave.errors import InputError
 from suboctave.timedomain import shoot, state_transition
-from suboctave.timedomain.batch import Flow
-from suboctave.timedomain.multiple import PIECES, MultipleShooting
+from suboctave.timedomain.flow import Flow
+from suboctave.timedomain.multiple_shooting import PIECES, MultipleShooting
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_a_linear_oscillator_is_exact():
     found = MultipleShooting(system, 1).solve(
         along(system, [0.4, 0.1], omega), np.array([omega]), {}, np.array([[0.5, 0.6]])
     )
-    assert found.found[0]
+    assert found.converged[0]
     w = found.omega[0]  # that of the nearest motion
     gain = 0.5 / (2.0 - w**2 + 0.3j * w)
     np.testing.assert_allclose(found.states[0, 0], [gain.real, (1j * w * gain).real], rtol=1e-9)
@@ -63,7 +63,7 @@ def test_as_single_shooting_finds_it(system):
     true = shoot(system, so.integrate(system, omega=omega, periods=5, transient=100).end, omega)
     sizes = np.array([[true.amplitude, true.amplitude * omega]])
     found = MultipleShooting(system, 1).solve(along(system, 1.03 * true.state, omega), np.array([omega]), {}, sizes)
-    assert found.found[0]
+    assert found.converged[0]
     assert found.residual[0] < 1e-11
     again = shoot(system, found.states[0, 0], found.omega[0])
     np.testing.assert_allclose(found.states[0, 0], again.state, rtol=1e-9)
@@ -89,5 +89,5 @@ def test_where_there_is_no_motion():
     found = MultipleShooting(away, 1).solve(
         np.full((1, PIECES, 2), 50.0), np.array([0.1]), {}, np.array([[50.0, 50.0]])
     )
-    assert not found.found[0]
+    assert not found.converged[0]
     assert np.isnan(found.multipliers()[0]).all()

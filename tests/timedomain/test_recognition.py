@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from suboctave.timedomain.recognition import period_of
+from suboctave.timedomain.period_recognition import period_of
 
 SIZES = np.ones(2)
 

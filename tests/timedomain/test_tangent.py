@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.timedomain.batch import Flow
+from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.shooting import shoot
 from suboctave.timedomain.trajectory import state_transition
 from suboctave.timedomain.trapping import traps_about

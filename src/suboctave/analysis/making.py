@@ -1,111 +1,22 @@
-"""What the verbs that follow curves share: the curve from their arguments, the branch from what was followed."""
+"""A branch from what was followed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from suboctave.analysis.branch import Branch
-from suboctave.analysis.junction import Junction
-from suboctave.analysis.response import ResponseCurve
-from suboctave.analysis.trace import Settings, Trace
-from suboctave.analysis.verdicts import with_verdicts
-from suboctave.bifurcation.formulation import written
 from suboctave.continuation.linear import one_thread
-from suboctave.errors import InputError
-from suboctave.harmonic.balance import HarmonicBalance
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import AdaptiveHarmonics
+from suboctave.curves.junction import Junction
+from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.verdicts import with_verdicts
 from suboctave.model.system import System
-from suboctave.stability import StabilityMethod
-from suboctave.stability.arbitration import METHODS
+from suboctave.results.branch import Branch
 
-__all__ = [
-    "Harmonics",
-    "check_unknowns",
-    "make_branch",
-    "make_curve",
-    "options_of",
-    "own_linear_part",
-    "rule_of",
-]
-
-#: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
-_DENSE_UNKNOWNS = 8000
-
-Harmonics = int | str | AdaptiveHarmonics
-
-
-def make_curve(
-    system: System, name: str, omega: float, span: float, harmonics: Harmonics, nu: int, linear: LinearPart | None
-) -> ResponseCurve:
-    """The curve of a system's motions of `nu` load periods along a free parameter; InputError where it cannot be."""
-    loaded = max([1] + [c.harmonic for c in system.load_components()])
-    rule = rule_of(harmonics)
-    adaptive = rule if isinstance(rule, AdaptiveHarmonics) else None
-    high = rule if isinstance(rule, int) else max(rule.minimum, loaded)
-    if linear is not None and not isinstance(linear, LinearPart):
-        raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
-    size = system.n if linear is None else linear.size
-    basis = HarmonicBasis(high * nu, nu)
-    check_unknowns(size, basis)
-    return ResponseCurve(HarmonicBalance(system, basis, linear=linear), name, omega, span, adaptive)
-
-
-def rule_of(harmonics: Any) -> AdaptiveHarmonics | int:
-    """How harmonics are chosen, or how many of omega are kept: the argument `harmonics` of the verbs, checked."""
-    rule = AdaptiveHarmonics() if isinstance(harmonics, str) and harmonics == "adaptive" else harmonics
-    if isinstance(rule, AdaptiveHarmonics):
-        return rule
-    if isinstance(rule, (int, np.integer)) and not isinstance(rule, bool) and rule >= 1:
-        return int(rule)
-    raise InputError(
-        f'harmonics must be a whole number of at least 1, "adaptive" or AdaptiveHarmonics(...), not {harmonics!r}'
-    )
-
-
-def check_unknowns(size: int, basis: HarmonicBasis) -> None:
-    """Refuse bases whose dense matrices would not fit; `size`: unknown DOFs."""
-    unknowns = size * basis.size
-    if unknowns > _DENSE_UNKNOWNS:
-        raise InputError(
-            f"{size} DOFs with {basis.harmonics // basis.nu} harmonics are {unknowns} unknowns with dense matrices, "
-            f"more than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model before it becomes a System, for "
-            "example to its lowest modes P (n, m): System(P.T @ M @ P, P.T @ C @ P, P.T @ K @ P, ...), elements and "
-            "loads with direction=P[dof] in place of dof="
-        )
-
-
-def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
-    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
-    linear = orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
-
-
-def options_of(settings: Settings, harmonics: Harmonics, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """What a branch says of how it was computed."""
-    return {
-        "bounds": dict(bounds),
-        "harmonics": asdict(harmonics) if isinstance(harmonics, AdaptiveHarmonics) else harmonics,
-        "newton": asdict(settings.newton),
-        "stepping": asdict(settings.stepping),
-        "stability": _written(settings.stability),
-        "formulation": written(settings.formulation),
-        "observe": settings.observe,
-    }
-
-
-def _written(method: StabilityMethod) -> str:
-    """A stability method by the name that gives it again, or in full."""
-    return method.name if METHODS.get(method.name) == method else repr(method)
+__all__ = ["make_branch"]
 
 
 def make_branch(system: System, name: str, trace: Trace, settings: Settings, options: dict[str, Any]) -> Branch:
+    """A branch along a parameter; `options` say how it was computed (`analysis.options.options_of`)."""
     with one_thread():
         trace = with_verdicts(trace, settings.stability, name)
     context = {"system": system, "parameter": name, **options}

@@ -15,36 +15,36 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import gcd
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.branch import Branch
-from suboctave.analysis.checks import check_range, check_system, is_number, make_settings
-from suboctave.analysis.identity import lies_on, relation
-from suboctave.analysis.junction import period_name
-from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of
-from suboctave.analysis.progress import Report, reporting
-from suboctave.analysis.response import ResponseCurve
-from suboctave.analysis.starts import linear_response, start_point
-from suboctave.analysis.trace import Settings, Trace
-from suboctave.analysis.ways import both_ways
-from suboctave.bifurcation.formulation import Formulation
-from suboctave.compiled import computation_begins
-from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
+from suboctave.analysis.making import make_branch
+from suboctave.analysis.options import CurveOptions, SearchOptions, options_of, settings_of
+from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import Solved
 from suboctave.continuation.point import solve_at
 from suboctave.continuation.problem import Array
-from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.curves.discretisation import Harmonics, make_curve
+from suboctave.curves.identity import lies_on, relation
+from suboctave.curves.junction import period_name
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.starts import linear_response, start_point
+from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.ways import both_ways
+from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import truncation
+from suboctave.harmonic.truncation import truncation
 from suboctave.interruption import Interruption, limited, pass_on
+from suboctave.model.inputs import check_range, check_system
 from suboctave.model.system import System
-from suboctave.stability import StabilityMethod
+from suboctave.options import with_options
+from suboctave.progress import Report, reporting
+from suboctave.results.branch import Branch
 from suboctave.timedomain import integrate
 
 __all__ = ["Seeds", "find_subharmonics", "isolated_branches", "periodic_orbit", "subharmonic_start"]
@@ -84,6 +84,7 @@ def check_order(order: Any) -> int:
     return int(order)
 
 
+@with_options(CurveOptions)
 @limited
 def find_subharmonics(
     system: System,
@@ -92,16 +93,8 @@ def find_subharmonics(
     harmonics: Harmonics = "adaptive",
     *,
     seeds: Seeds | None = None,
-    max_step: float | None = None,
-    observe: int | None = None,
-    events: Sequence[Event] = (),
-    progress: Any = None,
-    seconds: float | None = None,
-    newton: NewtonOptions | None = None,
-    stepping: SteppingOptions | None = None,
-    stability: StabilityMethod | str | None = None,
-    formulation: Formulation | str | None = None,
     linear: LinearPart | None = None,
+    **options: Unpack[CurveOptions],
 ) -> list[Branch]:
     """Branches of motions of `subharmonic` load periods in a range of frequencies, each once; empty if none is found.
 
@@ -114,24 +107,21 @@ def find_subharmonics(
         Period of the motions in periods of the load, at least 2.
     seeds
         How finely it is looked for, a `Seeds`.
-    seconds
-        Time limit. What was found by then is given, as after Ctrl-C: the list's `interruption` says so.
 
-    Other parameters, and errors, as `frequency_response`.
+    After Ctrl-C, or a time limit, the list's `interruption` says so. Errors as of `frequency_response`.
     """
     order = check_order(subharmonic)
     first, last = check_range("omega", omega, positive=True)
     check_system(system, (first, last))
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
-    settings = make_settings(system, max_step, observe, events, newton, stepping, stability, formulation)
+    settings = settings_of(system, options)
     curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, linear)
     curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
-    options = options_of(settings, harmonics, {"omega": (first, last)})
-    computation_begins()
-    with one_thread(), reporting(progress, f"{period_name(order)} motions") as report:
+    kept = options_of(settings, harmonics, {"omega": (first, last)})
+    with one_thread(), reporting(options.get("progress"), f"{period_name(order)} motions") as report:
         search = None if report is None else _Search(report)
-        return Branches.of(_branches(curve, (first, last), seeds or Seeds(), settings, options, search=search))
+        return Branches.of(_branches(curve, (first, last), seeds or Seeds(), settings, kept, search=search))
 
 
 class Branches(list[Branch]):
@@ -142,16 +132,16 @@ class Branches(list[Branch]):
     @classmethod
     def of(cls, search: Iterator[Branch]) -> Branches:
         """What a search finds until it ends or is interrupted. One that is interrupted empty-handed is no answer."""
-        found = cls()
+        branches = cls()
         try:
             for branch in search:
-                found.append(branch)
-                found.interruption = branch.interruption
+                branches.append(branch)
+                branches.interruption = branch.interruption
         except KeyboardInterrupt as cause:
-            if not found:
+            if not branches:
                 raise
-            found.interruption = Interruption.of(cause)
-        return found
+            branches.interruption = Interruption.of(cause)
+        return branches
 
 
 def isolated_branches(
@@ -162,27 +152,23 @@ def isolated_branches(
     harmonics: Harmonics = "adaptive",
     *,
     seeds: Seeds | None = None,
-    max_step: float | None = None,
-    observe: int | None = None,
-    newton: NewtonOptions | None = None,
-    stepping: SteppingOptions | None = None,
-    stability: StabilityMethod | str | None = None,
+    **options: Unpack[SearchOptions],
 ) -> list[Branch]:
     """As `find_subharmonics`, without the branches that are known."""
     first, last = omega
-    settings = make_settings(system, max_step, observe, (), newton, stepping, stability, None)
+    settings = settings_of(system, options)
     curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, None)
     curve.reference = max(curve.size(linear_response(curve, v)) for v in omega)
-    options = options_of(settings, harmonics, {"omega": omega})
+    kept = options_of(settings, harmonics, {"omega": omega})
     with one_thread():
-        found = list(_branches(curve, omega, seeds or Seeds(), settings, options, known))
-    for branch in found:
+        branches = list(_branches(curve, omega, seeds or Seeds(), settings, kept, known))
+    for branch in branches:
         pass_on(branch.interruption)
-    return found
+    return branches
 
 
 def _branches(
-    curve: ResponseCurve,
+    curve: MotionProblem,
     bounds: tuple[float, float],
     seeds: Seeds,
     settings: Settings,
@@ -192,22 +178,22 @@ def _branches(
 ) -> Iterator[Branch]:
     """The branches of the motions that a search meets, each once, without those that are known."""
     first, last = bounds
-    found = list(known)
+    branches = list(known)
     for point in _motions(curve, bounds, seeds, settings, None if search is None else search.at):
         if search is not None:
             settings = settings.reporting_to(search.along, bounds)
-        if any(lies_on(_orbit(point), branch.points) for branch in found):
+        if any(lies_on(_orbit(point), branch.points) for branch in branches):
             continue
         trace = both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
         if trace.points:
-            found.append(make_branch(curve.balance.system, "omega", trace, settings, options))
-            yield found[-1]
+            branches.append(make_branch(curve.balance.system, "omega", trace, settings, options))
+            yield branches[-1]
         if trace.interrupted:
             return
 
 
 def subharmonic_start(
-    curve: ResponseCurve, bounds: tuple[float, float], settings: Settings, seeds: Seeds | None = None
+    curve: MotionProblem, bounds: tuple[float, float], settings: Settings, seeds: Seeds | None = None
 ) -> Trace:
     """The first branch of a curve's sub-harmonic motions that a search over the range finds, followed both ways.
 
@@ -272,7 +258,6 @@ def periodic_orbit(
     if given.shape != (2 * system.n,) or not np.isfinite(given).all():
         raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
     curve = make_curve(system, "omega", float(omega), float(omega), harmonics, order, None)
-    computation_begins()
     with one_thread():
         if settle:
             end = settle * order * 2.0 * np.pi / omega
@@ -285,7 +270,7 @@ def periodic_orbit(
 
 def _orbit(point: CurvePoint) -> PeriodicOrbit:
     curve, evaluation = point.curve, point.evaluation
-    assert isinstance(curve, ResponseCurve)
+    assert isinstance(curve, MotionProblem)
     x, omega, values = curve.split(point.u)
     state = curve.balance.at(x, omega, values)
     error = float(evaluation.error)
@@ -311,7 +296,7 @@ class _Search:
 
 
 def _motions(
-    curve: ResponseCurve, bounds: tuple[float, float], seeds: Seeds, settings: Settings, report: Report | None
+    curve: MotionProblem, bounds: tuple[float, float], seeds: Seeds, settings: Settings, report: Report | None
 ) -> Iterator[CurvePoint]:
     """Solved sub-harmonic motions over the range, as the search meets them."""
     nu = curve.balance.basis.nu
@@ -338,12 +323,12 @@ def _motions(
             except ConvergenceError:
                 continue
             own = point.curve
-            assert isinstance(own, ResponseCurve)
+            assert isinstance(own, MotionProblem)
             if _lasts(own, point.u) and own.balance.basis.nu == nu:
                 yield point
 
 
-def _guesses(curve: ResponseCurve, value: float, seeds: Seeds) -> Iterator[Array]:
+def _guesses(curve: MotionProblem, value: float, seeds: Seeds) -> Iterator[Array]:
     """Free vibrations at a fraction of omega on top of the linear response."""
     balance = curve.balance
     nu = balance.basis.nu
@@ -371,7 +356,7 @@ def _modes(balance: HarmonicBalance) -> list[Array]:
     return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
 
 
-def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array) -> list[Array]:
+def _resonant(curve: MotionProblem, omega: float, frequency: float, shape: Array) -> list[Array]:
     """Free vibrations at a frequency by their first harmonic, cosines of each DOF: those that continue a linear mode.
 
     Where there are none some guesses in the shape of the mode.
@@ -394,10 +379,10 @@ def _resonant(curve: ResponseCurve, omega: float, frequency: float, shape: Array
     sizes = unit * np.geomspace(1e-3, 1e4, 71)
     values = np.array([float(shape @ pull(size * shape)[0]) / size for size in sizes])
     crossed = np.flatnonzero(np.isfinite(values[1:]) & (values[:-1] * values[1:] < 0.0))
-    found = [float(sizes[i] + (sizes[i + 1] - sizes[i]) * values[i] / (values[i] - values[i + 1])) for i in crossed]
-    if not found:
+    crossings = [float(sizes[i] + (sizes[i + 1] - sizes[i]) * values[i] / (values[i] - values[i + 1])) for i in crossed]
+    if not crossings:
         return [float(size) * shape for size in unit * np.array([0.3, 1.0, 3.0, 10.0])]
-    return [_free(pull, size * shape) for size in found]
+    return [_free(pull, size * shape) for size in crossings]
 
 
 def _free(pull: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
@@ -414,7 +399,7 @@ def _free(pull: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
     return start
 
 
-def _lasts(curve: ResponseCurve, u: Array) -> bool:
+def _lasts(curve: MotionProblem, u: Array) -> bool:
     """Whether a motion has the period of its basis: for every prime factor something that a shorter one lacks."""
     basis = curve.balance.basis
     x = curve.split(u)[0] * curve.balance.scales()[0]

@@ -8,35 +8,34 @@ of the algebraic branching equation (`bifurcation.branching`).
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
-from suboctave.analysis.branch import Branch
-from suboctave.analysis.checks import check_bounds, make_settings
-from suboctave.analysis.follow import follow, same_event
-from suboctave.analysis.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
-from suboctave.analysis.making import Harmonics, make_branch, make_curve, options_of, own_linear_part
-from suboctave.analysis.progress import reporting, timed
-from suboctave.analysis.response import ResponseCurve
-from suboctave.analysis.trace import Settings, Trace
+from suboctave.analysis.making import make_branch
+from suboctave.analysis.options import CurveOptions, Inherited, options_of, settings_of
 from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation
-from suboctave.bifurcation.formulation import FORMULATIONS, Formulation
-from suboctave.bifurcation.solve import Singular
-from suboctave.compiled import computation_begins
-from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
+from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.problem import Array
+from suboctave.curves.discretisation import Harmonics, make_curve, own_linear_part
+from suboctave.curves.events.locate import Singular
+from suboctave.curves.follow import follow, same_event
+from suboctave.curves.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.trace import Settings, Trace
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.perturbation import Kind
-from suboctave.stability import StabilityMethod
-from suboctave.stability.arbitration import METHODS
+from suboctave.model.inputs import check_bounds
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import reporting
+from suboctave.results.branch import Branch
 
-__all__ = ["Inherited", "check_left", "leave_along", "switch_branch"]
+__all__ = ["check_left", "leave_along", "switch_branch"]
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
@@ -48,6 +47,7 @@ _NO_OTHER = {
 }
 
 
+@with_options(CurveOptions)
 @timed
 def switch_branch(
     bifurcation: Bifurcation,
@@ -55,15 +55,7 @@ def switch_branch(
     *,
     bounds: tuple[float, float] | None = None,
     harmonics: Harmonics | None = None,
-    max_step: float | None = None,
-    observe: int | None = None,
-    events: Sequence[Event] = (),
-    progress: Any = None,
-    seconds: float | None = None,
-    newton: NewtonOptions | None = None,
-    stepping: SteppingOptions | None = None,
-    stability: StabilityMethod | str | None = None,
-    formulation: Formulation | str | None = None,
+    **options: Unpack[CurveOptions],
 ) -> Branch:
     """The branch that leaves another one at a period doubling or a branch point, with stability and bifurcations.
 
@@ -82,8 +74,6 @@ def switch_branch(
         does. At a PD it only chooses which of the two copies of each motion is reported.
     bounds
         Range of the free parameter, default that of the branch that it was found on.
-
-    Other parameters as `frequency_response`.
 
     Raises
     ------
@@ -112,23 +102,13 @@ def switch_branch(
     low, high = min(first, last), max(first, last)
     if not low <= value <= high:
         raise InputError(f"the {KINDS[kind]} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
-    settings = make_settings(
-        orbit.system,
-        max_step,
-        known.options.get("observe") if observe is None else observe,
-        events,
-        known.newton if newton is None else newton,
-        known.stepping if stepping is None else stepping,
-        known.stability if stability is None else stability,
-        known.formulation if formulation is None else formulation,
-    )
+    settings = settings_of(orbit.system, known.under(options))
     settings = replace(settings, half=kind == "BP" and side is not None)
     nu = orbit.basis.nu * (2 if kind == "PD" else 1)
     wanted = known.harmonics if harmonics is None else harmonics
     curve = make_curve(orbit.system, name, orbit.omega, high - low, wanted, nu, own_linear_part(orbit))
-    computation_begins()
     title = f"{period_name(nu)} branch along {name}"
-    with one_thread(), reporting(progress, title) as report:
+    with one_thread(), reporting(options.get("progress"), title) as report:
         settings = settings.reporting_to(report, (low, high))
         if kind == "PD":
             trace = _doubled(bifurcation, curve, 1.0 if side is None else float(side), (low, high), settings)
@@ -143,59 +123,9 @@ def check_left(kind: str) -> None:
         raise InputError(f"{_NO_OTHER.get(kind, 'nothing leaves a user event')}. switch_branch takes a PD or a BP")
 
 
-# ------------------------------------------------------------------------------------------------ what is inherited
-class Inherited:
-    """What a bifurcation was found with: range, harmonics and options, as far as they are known."""
-
-    def __init__(self, item: Bifurcation) -> None:
-        self.item = item
-        self.options: Mapping[str, Any] = item.context or {}
-
-    def bounds(self, name: str) -> tuple[float, float]:
-        """The range of the free parameter."""
-        known = self.options.get("bounds", {}).get(name)
-        if known is None:
-            raise InputError(f"this {self.item.kind} does not know its range: give bounds=(from, to) of {name}")
-        return known[0], known[1]
-
-    @property
-    def harmonics(self) -> Harmonics:
-        """Rule or number, as the motion was computed."""
-        orbit = self.item.orbit
-        return orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
-
-    @property
-    def newton(self) -> NewtonOptions | None:
-        """Newton's method."""
-        known = self.options.get("newton")
-        return None if known is None else NewtonOptions(**known)
-
-    @property
-    def stepping(self) -> SteppingOptions | None:
-        """Step lengths."""
-        known = self.options.get("stepping")
-        return None if known is None else SteppingOptions(**known)
-
-    @property
-    def stability(self) -> str | None:
-        """The name of the stability method."""
-        return self._by_name("stability", METHODS)
-
-    @property
-    def formulation(self) -> str | None:
-        """The name of the formulation."""
-        return self._by_name("formulation", FORMULATIONS)
-
-    def _by_name(self, option: str, names: Container[str]) -> str | None:
-        known = self.options.get(option)
-        if known is None or known in names:
-            return known
-        raise InputError(f"this {self.item.kind} was found with {option}={known}, which has options: give it again")
-
-
 # ------------------------------------------------------------------------------------------------------- departures
 def _doubled(
-    item: Bifurcation, curve: ResponseCurve, sign: float, bounds: tuple[float, float], settings: Settings
+    item: Bifurcation, curve: MotionProblem, sign: float, bounds: tuple[float, float], settings: Settings
 ) -> Trace:
     """The branch of twice the period."""
     parent = item.orbit
@@ -203,8 +133,8 @@ def _doubled(
         curve = curve.with_basis(parent.basis.doubled)
     vectors = item.null_vectors or null_vectors(parent.state(), Kind.HALF)
     u = curve.join(parent.basis.resized(parent.coefficients, curve.balance.basis), item.parameter(item.parameter_name))
-    found = Singular(parent.state(), vectors, 0.0, item.residual, 0)
-    direction = emanating(found, curve, curve.weights(u, 0.0))
+    doubling = Singular(parent.state(), vectors, 0.0, item.residual, 0)
+    direction = emanating(doubling, curve, curve.weights(u, 0.0))
     _scale_from_rest(curve, u, direction)
     weights = curve.weights(u, 0.0)
     direction *= sign / length(weights * direction)
@@ -217,7 +147,7 @@ def _doubled(
 
 def _other(
     item: Bifurcation,
-    curve: ResponseCurve,
+    curve: MotionProblem,
     side: int | None,
     ahead: float,
     bounds: tuple[float, float],
@@ -246,7 +176,7 @@ def _other(
 
 def leave_along(
     item: Bifurcation,
-    curve: ResponseCurve,
+    curve: MotionProblem,
     direction: Array,
     ahead: float,
     bounds: tuple[float, float],
@@ -278,14 +208,14 @@ def leave_along(
     return trace
 
 
-def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
+def _scale_from_rest(curve: MotionProblem, u: Array, direction: Array) -> None:
     """Where a branch leaves rest nothing says how large a motion is: one whose forces deviate from linear ones."""
     x, omega, values = curve.split(u)
     if curve.balance.load(values, omega).any():
         return
     balance = curve.balance.settle(x, omega, values)
     rest, phi = balance.at(x, omega, values), direction[:-1]
-    change = balance.spread(phi)
+    change = balance.shaped(phi)
     slope = rest.force_jacobian @ change.ravel()
     linear = length(rest.linear_jacobian @ phi) + length(slope)
     unit = curve.size(curve.join(change, 0.0))
@@ -296,12 +226,12 @@ def _scale_from_rest(curve: ResponseCurve, u: Array, direction: Array) -> None:
     curve.reference = 100.0 * float(size) * unit
 
 
-def _distance(point: CurvePoint, u: Array, curve: ResponseCurve) -> float:
+def _distance(point: CurvePoint, u: Array, curve: MotionProblem) -> float:
     """How far a point lies from a point u of a curve, in scaled arclength."""
     return length(point.weights * (point.u - point.curve.transfer(u, curve)))
 
 
-def _at(item: Bifurcation, curve: ResponseCurve) -> tuple[ResponseCurve, Array, Array]:
+def _at(item: Bifurcation, curve: MotionProblem) -> tuple[MotionProblem, Array, Array]:
     """The curve in the harmonics of a bifurcation, that point on it, and the weights there."""
     orbit = item.orbit
     curve = curve.with_basis(orbit.basis)
@@ -318,7 +248,7 @@ def _oriented(direction: Array, weights: Array) -> Array:
 
 def _away(
     item: Bifurcation,
-    curve: ResponseCurve,
+    curve: MotionProblem,
     u: Array,
     direction: Array,
     weights: Array,
@@ -339,7 +269,7 @@ def _away(
     point = close.point
     adapted = curve.adapted(point.u, point.evaluation)
     if adapted is not curve:
-        assert isinstance(adapted, ResponseCurve)
+        assert isinstance(adapted, MotionProblem)
         u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
         weights = adapted.weights(u, 0.0)
         direction = direction / length(weights * direction)

@@ -5,29 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
-from suboctave.analysis.checks import check_bounds, check_parameter, check_range, is_number, make_settings
-from suboctave.analysis.making import check_unknowns, options_of, own_linear_part
-from suboctave.analysis.progress import reporting, timed
-from suboctave.analysis.subharmonic_part import repeats_earlier
-from suboctave.analysis.trace import Settings
-from suboctave.analysis.track_follow import TrackedTrace, follow_tracked
+from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
 from suboctave.analysis.track_onto import aside, curve_onto, start_onto
-from suboctave.analysis.track_start import Box, discretisation, is_extremum, kind_of, solved_start
-from suboctave.analysis.tracked_branch import TrackedBranch
-from suboctave.analysis.tracked_curve import TrackedCurve
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.formulation import BorderedSystem, Formulation
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TRACKED_KINDS, TrackedEvent
-from suboctave.compiled import computation_begins
-from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
+from suboctave.continuation import CurvePoint, SteppingOptions
 from suboctave.continuation.linear import one_thread
-from suboctave.errors import InputError
-from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.curves.discretisation import check_unknowns, own_linear_part
+from suboctave.curves.events.formulation import BorderedSystem
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.subharmonic_part import repeats_earlier
+from suboctave.curves.trace import Settings
+from suboctave.curves.track_follow import TrackedTrace, follow_tracked
+from suboctave.curves.track_start import Box, discretisation, is_extremum, kind_of, solved_start
+from suboctave.errors import InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.selection import AdaptiveHarmonics
-from suboctave.stability import StabilityMethod
+from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.model.inputs import check_bounds, check_parameter, check_range
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import reporting
+from suboctave.results.tracked_branch import TrackedBranch
 
 Range = tuple[float, float]
 
@@ -35,6 +36,7 @@ Range = tuple[float, float]
 _STEPPING = SteppingOptions(angle=0.15, growth=4.0)
 
 
+@with_options(TrackOptions)
 @timed
 def track(
     bifurcation: Bifurcation,
@@ -44,14 +46,7 @@ def track(
     omega: Range | None = None,
     onto: str | None = None,
     harmonics: int | str | AdaptiveHarmonics | None = None,
-    max_step: float | None = None,
-    observe: int | None = None,
-    progress: Any = None,
-    seconds: float | None = None,
-    newton: NewtonOptions | None = None,
-    stepping: SteppingOptions | None = None,
-    stability: StabilityMethod | str | None = None,
-    formulation: Formulation | str | None = None,
+    **options: Unpack[TrackOptions],
 ) -> TrackedBranch:
     """The curve of a bifurcation in two parameters, in both directions, from end to end or closed.
 
@@ -75,17 +70,10 @@ def track(
         Neimark-Sacker points that begin in an R1 or R2 of a curve of LP or PD, the LP or PD through that of an NS.
     harmonics
         As in `frequency_response`; default: as the bifurcation was computed.
-    max_step
-        Largest distance between neighbours in scaled arclength: each parameter in units of its range (omega without a
-        range in units of its value at the start), the motion in units of its own size.
 
-    stepping
-        As in `frequency_response`; default: `SteppingOptions(angle=0.15, growth=4)`.
-    formulation
-        As in `frequency_response`: with "extended" the null vector is among the unknowns, with "alcorta2019" period
-        doublings are those of the published system.
-
-    Other parameters as `frequency_response`.
+    Scaled arclength has each parameter in units of its range (omega without one in units of its value at the start).
+    Default of `stepping`: `SteppingOptions(angle=0.15, growth=4)`. The formulation "extended" has the null vector among
+    the unknowns, "alcorta2019" is the published system of period doublings.
 
     Returns
     -------
@@ -103,61 +91,66 @@ def track(
 
     Notes
     -----
-    Minimally augmented systems (`bifurcation.augmented`) and pseudo-arclength. A branch point can be followed only
-    where a symmetry forces it; the curve ends where that is broken.
+    Minimally augmented systems and pseudo-arclength. A branch point can be followed only where a symmetry forces it.
     """
     turning = bifurcation.parameter_name if is_extremum(bifurcation) else ""
     if is_extremum(bifurcation):
-        names, ranges, between = _third(bifurcation, parameter, bounds, omega)
+        names, (first, second), between = _third(bifurcation, parameter, bounds, omega)
     else:
-        (names, ranges), between = _free(bifurcation, parameter, bounds, omega), None
+        (names, (first, second)), between = _free(bifurcation, parameter, bounds, omega), None
     kind = curve_onto(bifurcation, onto)
-    if bifurcation.kind == "LP" and repeats_earlier(bifurcation.orbit):
-        raise InputError(
-            f"this limit point is written with {bifurcation.orbit.basis.nu} load periods but repeats earlier: thus "
-            "every period doubling is one, and its curve is that of the doublings; track the PD, or a limit point "
-            "of the branch that switch_branch gives"
-        )
-    settings = make_settings(
-        bifurcation.orbit.system,
-        max_step,
-        _observed(bifurcation, observe),
-        (),
-        newton,
-        stepping or _STEPPING,
-        stability,
-        formulation,
-    )
-    if turning and not isinstance(settings.formulation, BorderedSystem):
-        raise InputError(
-            f"curves of extrema are followed by the bordered system, not {settings.formulation.name!r}: leave "
-            "formulation= out; locate_extremum solves for a single one by the published system"
-        )
+    settings = _settings(bifurcation, turning, options)
     wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
-    second = ranges[1]
     assert second is not None
-    box = Box(None if ranges[0] is None else (min(ranges[0]), max(ranges[0])), (min(second), max(second)), between)
-    computation_begins()
-    with one_thread(), reporting(progress, f"{kind} over {names[-1]}") as report:
+    box = Box(None if first is None else (min(first), max(first)), (min(second), max(second)), between)
+    with one_thread(), reporting(options.get("progress"), f"{kind} over {names[-1]}") as report:
         settings = settings.reporting_to(report, box.second, "event")
         if bifurcation.kind in CURVES_THROUGH:
             assert isinstance(bifurcation, TrackedEvent)
             bifurcation = start_onto(bifurcation, kind, names, box, settings.newton)
             wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
-        orbit = bifurcation.orbit
-        system = orbit.system
-        balance = HarmonicBalance(system, basis, linear=own_linear_part(orbit))
+        balance = HarmonicBalance(bifurcation.orbit.system, basis, linear=own_linear_part(bifurcation.orbit))
         start = solved_start(bifurcation, balance, adaptive, names, box, settings)
         if bifurcation.kind in CURVES_THROUGH:
             start = aside(start, box, settings.newton)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
-    bounded = {
-        name: r for name, r in ((names[0], ranges[0]), (names[1], between), (names[-1], second)) if r is not None
-    }
-    options = options_of(settings, wanted, bounded)
+    ranges_by_name = ((names[0], first), (names[1], between), (names[-1], second))
+    kept = options_of(settings, wanted, {name: given for name, given in ranges_by_name if given is not None})
+    return _branch(bifurcation, names, turning, trace, settings, kept)
+
+
+def _settings(item: Bifurcation, turning: str, options: TrackOptions) -> Settings:
+    """The options, checked, with those of curves of bifurcations as defaults."""
+    if item.kind == "LP" and repeats_earlier(item.orbit):
+        raise InputError(
+            f"this limit point is written with {item.orbit.basis.nu} load periods but repeats earlier: thus "
+            "every period doubling is one, and its curve is that of the doublings; track the PD, or a limit point "
+            "of the branch that switch_branch gives"
+        )
+    given = {name: value for name, value in options.items() if value is not None}
+    default = {"stepping": _STEPPING, "observe": Inherited(item).observe}
+    settings = settings_of(item.orbit.system, {**default, **given})
+    if turning and not isinstance(settings.formulation, BorderedSystem):
+        raise InputError(
+            f"curves of extrema are followed by the bordered system, not {settings.formulation.name!r}: leave "
+            "formulation= out; locate_extremum solves for a single one by the published system"
+        )
+    return settings
+
+
+def _branch(
+    item: Bifurcation,
+    names: tuple[str, ...],
+    turning: str,
+    trace: TrackedTrace,
+    settings: Settings,
+    options: dict[str, Any],
+) -> TrackedBranch:
+    """The curve that begins at a bifurcation, with how it was computed."""
+    system = item.orbit.system
     context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
-        kind_of(bifurcation),
+        kind_of(item),
         names,
         system,
         names[-1],
@@ -205,7 +198,7 @@ def _kept(item: TrackedEvent, name: str) -> Range | None:
 
     None for omega, whose range is often no more than where bifurcations were looked for.
     """
-    given = dict((item.context or {}).get("bounds", {})).get(name)
+    given = Inherited(item).range(name)
     if given is None or name == "omega":
         return None
     low, high = sorted(given)
@@ -272,10 +265,6 @@ def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | 
     return wanted, adaptive, basis
 
 
-def _observed(item: Bifurcation, observe: int | None) -> int | None:
-    return item.context.get("observe") if observe is None and item.context else observe
-
-
 def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> TrackedTrace:
     """Follow a curve from a start to both sides; from a bound inwards only."""
     if start.tangent[-1] * ahead < 0.0:
@@ -294,7 +283,7 @@ def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) ->
 
 def _leads_inside(point: CurvePoint, box: Box) -> bool:
     """Whether a curve that begins at a point stays within its ranges there."""
-    assert isinstance(point.curve, TrackedCurve)
+    assert isinstance(point.curve, MotionProblem)
     names = point.curve.names
     for name, (low, high) in box.ranges(names).items():
         index = point.curve.index(name)

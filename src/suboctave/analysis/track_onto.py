@@ -16,10 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from suboctave.analysis.making import own_linear_part
-from suboctave.analysis.track_start import Box, curve_through, spans_of
 from suboctave.analysis.track_switch import limit_point_beside
-from suboctave.analysis.tracked_curve import TrackedCurve, TrackedEvaluation
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
@@ -27,8 +24,11 @@ from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
+from suboctave.curves.discretisation import own_linear_part
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.track_start import Box, curve_through, spans_of
 from suboctave.errors import ConvergenceError, InputError, suggest
-from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.perturbation import Kind
 
 __all__ = ["aside", "curve_onto", "start_onto"]
@@ -128,7 +128,7 @@ def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:
         except ConvergenceError:
             continue
         point = make_point(solved, start.curve, start.tangent, 0.0)
-        assert isinstance(point.curve, TrackedCurve)
+        assert isinstance(point.curve, MotionProblem)
         if box.around(point.curve.names, point.curve.named(point.u)):
             return point
     return start
@@ -146,7 +146,9 @@ def _frequency(item: TrackedEvent) -> float:
         return item.kappa
     mu = item.multipliers
     if item.curve == "NS":
-        mu = np.delete(mu, np.argmin(np.abs(mu - item.critical_multiplier())))
+        critical = item.critical_multiplier()
+        apart = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        mu = np.delete(mu, np.argsort(apart)[:2])  # both of the pair that the curve follows
     pairs = mu[mu.imag > 1e-9 * np.abs(mu)]
     if not pairs.size:
         raise ConvergenceError(f"this {item.kind} has no complex pair of multipliers")
@@ -159,7 +161,7 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
     orbit = item.orbit
     rate = orbit.omega / orbit.basis.nu
     balance = HarmonicBalance(orbit.system, orbit.basis, linear=own_linear_part(orbit))
-    outside, said = False, "they lie elsewhere, or more harmonics are needed"
+    outside, reason = False, "they lie elsewhere, or more harmonics are needed"
     for share in _SHARES:
         kappa = (share if item.kind == "R1" else 0.5 - share) * rate
         beside = replace(item, curve="NS", kappa=kappa)
@@ -170,22 +172,22 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
             held[curve.balance.dimension] = 1.0
             solved = correct(curve, u, held, weights, newton)
         except ConvergenceError as failure:
-            said = str(failure)
+            reason = str(failure)
             continue
         evaluation = solved.evaluation
-        assert isinstance(evaluation, TrackedEvaluation)
+        assert isinstance(evaluation, MotionEvaluation)
         if length(weights * (solved.u - u)) > _NEAR or evaluation.doubt > _CRITICAL:
             continue
         state = evaluation.state
         values = dict(state.values)
         there = replace(orbit, balance=state.balance, coefficients=state.x.copy(), omega=state.omega, values=values)
-        found = replace(beside, orbit=there)
-        if box.around(names, {name: found.parameter(name) for name in names}):
-            return found
+        start = replace(beside, orbit=there)
+        if box.around(names, {name: start.parameter(name) for name in names}):
+            return start
         outside = True
     at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in item.names)
     if outside:
         raise InputError(
             f"the Neimark-Sacker points that begin in the {item.kind} at {at} lie outside the ranges: widen them"
         )
-    raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {said}")
+    raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {reason}")

@@ -13,17 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.analysis.making import own_linear_part
-from suboctave.analysis.refine import solved_bifurcation
-from suboctave.analysis.response import ResponseCurve
+from suboctave.analysis.options import Inherited
 from suboctave.analysis.switching import switch_branch
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.kinds import PERIOD_DOUBLING
-from suboctave.bifurcation.solve import Guess, Singular
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import SteppingOptions
+from suboctave.curves.discretisation import own_linear_part
+from suboctave.curves.events.locate import Guess, Singular
+from suboctave.curves.events.monitors import PERIOD_DOUBLING
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.refine import solved_bifurcation
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.balance import HarmonicBalance
+from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.interruption import pass_on
 
 __all__ = ["limit_point_beside"]
@@ -57,11 +58,11 @@ def limit_point_beside(event: TrackedEvent, span: float) -> Bifurcation:
     for share in _SHARES:
         for sign in (1.0, -1.0):
             try:
-                found = _limit_point(event, sign * share * span)
+                candidate = _limit_point(event, sign * share * span)
             except ConvergenceError:
                 continue
-            if found is not None and (best is None or found[0] > best[0]):
-                best = found
+            if candidate is not None and (best is None or candidate[0] > best[0]):
+                best = candidate
         if best is not None and best[0] > _CLEAR:
             break
     if best is not None:
@@ -89,12 +90,12 @@ def _doubling_at(event: TrackedEvent, way: float) -> Singular:
         else:
             values[free] = first + step
         guess = Guess(orbit.balance, x + step_x, omega, values, free, span, vectors=vectors)
-        found = PERIOD_DOUBLING.solve(guess)
-        state = found.state
+        doubling = PERIOD_DOUBLING.solve(guess)
+        state = doubling.state
         value = state.omega if free == "omega" else state.values[free]
         step_x, step = state.x - x, value - first
-        x, first, vectors = state.x, value, found.vectors
-    return found
+        x, first, vectors = state.x, value, doubling.vectors
+    return doubling
 
 
 def _limit_point(event: TrackedEvent, way: float) -> tuple[float, Bifurcation] | None:
@@ -109,8 +110,8 @@ def _limit_point(event: TrackedEvent, way: float) -> tuple[float, Bifurcation] |
         linear = linear.rebuilt(dict(system.parameters))
     balance = HarmonicBalance(system, orbit.basis, linear=linear).settle(start.state.x, start.state.omega)
     width = _AROUND * (abs(value) or 1.0)
-    curve = ResponseCurve(balance, free, orbit.omega, 2.0 * width, orbit.adaptive)
-    observe = int((event.context or {}).get("observe", 0))
+    curve = MotionProblem.response(balance, free, orbit.omega, 2.0 * width, orbit.adaptive)
+    observe = Inherited(event).observe or 0
     own = replace(start, state=balance.at(start.state.x, start.state.omega, start.state.values))
     doubling = solved_bifurcation(PERIOD_DOUBLING, own, curve, observe, [])
     there = doubling.parameter(free)

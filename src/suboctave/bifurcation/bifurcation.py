@@ -12,10 +12,10 @@ import numpy as np
 from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.normal_form import FORMS, NormalForm, normal_form
 from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.floquet import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
-from suboctave.stability import FloquetResult
 
 #: what the kinds mean
 KINDS = {

@@ -23,15 +23,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.bifurcation.bordered_kernels import border_at
-from suboctave.compiled import at_hand, ready
 from suboctave.continuation import kernels
 from suboctave.continuation.linear import Factor, length
 from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.evaluation import jacobian
-from suboctave.harmonic.linear_part import StructuralMatrices
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
-from suboctave.harmonic.state import BalanceState
 
 
 @dataclass(frozen=True)
@@ -89,12 +85,12 @@ class Bordered:
     def gradient(self, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
         """Derivatives of g by the unknown coefficients (dimension,), by names, by kappa."""
         slope = bilinear_gradient(self.state, self.kind, self.left, self.right, names, self.kappa)
-        return -self.state.balance.packed(slope.x), {k: -r for k, r in slope.rates.items()}, -slope.kappa
+        return -slope.x.ravel(), {k: -r for k, r in slope.rates.items()}, -slope.kappa
 
     @property
     def vectors(self) -> NullVectors:
         """Bordering vectors for the next iteration: the present null vectors, weighted and of unit length."""
-        return _complete(self.state, self.kind, _unit(self.right / self.scale), _unit(self.left / self.scale))
+        return NullVectors(_unit(self.right / self.scale), _unit(self.left / self.scale))
 
     @property
     def relative(self) -> float:
@@ -118,7 +114,7 @@ def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations
     matrix, _ = weighted_operator(state, kind, kappa)
     factor = Factor.of(matrix)
     if factor.singular:
-        return _complete(state, kind, *_by_svd(matrix))
+        return NullVectors(*_by_svd(matrix))
     # a start with a component along everything, the same in every run
     n = matrix.shape[0]
     left = (np.cos(np.arange(n) * 1.7 + 0.3) / (1.0 + np.arange(n) / 8.0)).astype(matrix.dtype)
@@ -127,27 +123,13 @@ def null_vectors(state: BalanceState, kind: Kind, kappa: float = 0.0, iterations
         right = factor.solve(_unit(left))
         left = factor.solve(_unit(right), adjoint=True)
     if not (np.isfinite(left).all() and np.isfinite(right).all()):
-        return _complete(state, kind, *_by_svd(matrix))
-    return _complete(state, kind, _unit(right), _unit(left))
+        return NullVectors(*_by_svd(matrix))
+    return NullVectors(_unit(right), _unit(left))
 
 
 def _by_svd(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u, _, vh = np.linalg.svd(matrix)
     return vh[-1].conj(), u[:, -1]
-
-
-def _complete(state: BalanceState, kind: Kind, right: np.ndarray, left: np.ndarray) -> NullVectors:
-    """Vectors of the operator's size with all harmonics up to the highest."""
-    if kind is Kind.INTEGER and state.basis.kept is not None:
-        right, left = (state.balance.spread(v).ravel() for v in (right, left))
-    return NullVectors(right, left)
-
-
-def of_equations(state: BalanceState, kind: Kind, vector: np.ndarray) -> np.ndarray:
-    """A null vector with all harmonics as one of the operator's size."""
-    if kind is Kind.INTEGER and state.basis.kept is not None:
-        return state.balance.packed(vector.reshape(state.x.shape))
-    return vector
 
 
 def transversality(state: BalanceState, vectors: NullVectors, name: str) -> float:
@@ -156,7 +138,7 @@ def transversality(state: BalanceState, vectors: NullVectors, name: str) -> floa
 
     Zero at branch points; a branch turns back in p, simply, where it is not.
     """
-    left = of_equations(state, Kind.INTEGER, vectors.left)
+    left = vectors.left
     slope = state.residual_by(name) * state.balance.row_weights(len(left))
     size = length(left) * length(slope)
     return abs(float(left @ slope)) / size if size > 0.0 else 0.0
@@ -164,10 +146,7 @@ def transversality(state: BalanceState, vectors: NullVectors, name: str) -> floa
 
 def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:
     """Evaluate g and the vectors of its gradient, bordered by `borders` (b = left, c = right)."""
-    found = _compiled(state, kind, borders)
-    if found is not None:
-        return found
-    n = len(of_equations(state, kind, borders.right))
+    n = len(borders.right)
     scale = state.balance.row_weights(n)
     factor = _factorised(state, kind, kappa, borders, scale)
     # the operator's own size balances the bordering rows
@@ -184,41 +163,8 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
 def _factorised(state: BalanceState, kind: Kind, kappa: float, borders: NullVectors, scale: Array) -> Factor:
     """The bordered matrix with weights, borders in units of omega^2."""
     matrix = operator(state, kind, kappa)
-    left, right = of_equations(state, kind, borders.left), of_equations(state, kind, borders.right)
+    left, right = borders.left, borders.right
     return Factor.of(kernels.bordered_and_scaled(matrix, scale, left, right, state.omega**2).T, overwrite=True)
-
-
-def _compiled(state: BalanceState, kind: Kind, borders: NullVectors) -> Bordered | None:
-    """`bordered` in one compiled call, for real operators of a structure's own matrices; None where that does not go.
-
-    The operator is left with the state.
-    """
-    balance, basis, linear = state.balance, state.basis, state.linear
-    plain = kind is not Kind.FREE and basis.kept is None and not balance.own
-    if not plain or not isinstance(linear, StructuralMatrices):
-        return None
-    mean = kind is Kind.INTEGER
-    n = borders.right.shape[0]
-    matrix, lu, pivots = np.zeros((n, n)), np.empty((n + 1, n + 1)), np.empty(n + 1, dtype=np.int32)
-    v, u, scale, size = np.empty(n + 1), np.empty(n + 1), balance.row_weights(n), state.omega**2
-    multiples = basis.multiples if mean else basis.half_multiples
-    structure = (
-        balance.moving,
-        state.rate,
-        mean,
-        *balance.directions,
-        linear.matrices,
-        multiples,
-        state.omega,
-        state.x,
-    )
-    given = (state.spectra_table, *structure, scale, borders.left, borders.right, size, matrix, lu, pivots, v, u)
-    # what it calls is compiled one by one, not all at one go
-    if not (at_hand(border_at, *given) or ready(jacobian)) or border_at(*given):
-        return None
-    state.__dict__["jacobian" if mean else "half_jacobian"] = matrix
-    factor = Factor(lu.T, pivots, False)
-    return Bordered(state, kind, 0.0, complex(v[n]) * size, v[:n] * scale, u[:n] * scale, scale, borders, factor)
 
 
 def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:

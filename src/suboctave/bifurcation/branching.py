@@ -23,10 +23,10 @@ from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
 from suboctave.continuation.linear import length
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.derivatives import Direction, second_derivative
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.second import Direction, second_derivative
-from suboctave.harmonic.selection import motion_size
-from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.truncation import motion_size
 
 __all__ = ["BranchingEquation", "branching_equation", "doubled_direction"]
 
@@ -80,12 +80,12 @@ def branching_equation(
     """
     borders = null_vectors(state, Kind.INTEGER) if vectors is None else vectors
     border = bordered(state, Kind.INTEGER, borders)
-    scale, spread = border.scale, state.balance.spread
+    scale, shaped = border.scale, state.balance.shaped
     phi = border.right / length(border.right / scale) * (motion_size(state) or 1.0)
     psi = border.left
     slope = state.residual_by(name)
     v = -border.factor.solve(np.append(slope * scale, 0.0))[:-1] * scale * span
-    along, across = Direction(spread(v), {name: span}), Direction(spread(phi))
+    along, across = Direction(shaped(v), {name: span}), Direction(shaped(phi))
     a, b, c = (
         float(psi @ second_derivative(state, *pair)) for pair in ((along, along), (along, across), (across, across))
     )

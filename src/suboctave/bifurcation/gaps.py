@@ -10,14 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.grazing_instants import extrema
-from suboctave.harmonic.local_force import LocalMotion
-from suboctave.harmonic.rates import coefficient_rates, level_rates
-from suboctave.harmonic.state import BalanceState
-from suboctave.model.coupled import CoupledElement, as_coupled, reads
-from suboctave.model.element import BaseElement
-from suboctave.model.sampling import CornerSampling, PiecewiseLinear, told_levels
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.trigonometric import extrema
+from suboctave.model.elements.base import BaseElement, Element
+from suboctave.model.elements.coupled import CoupledElement, as_coupled, reads
+from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, levels as levels_of
 
 
 @dataclass(eq=False, slots=True)
@@ -40,15 +39,16 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     """Every gap of every element on a motion."""
     grid = state.balance.grid
     found = []
-    for law, motion in zip(state.balance.coefficients(state.values)[2], state.motions, strict=True):
+    for law, motion in zip(state.laws.groups, state.motions, strict=True):
         if law.levels:
             turns = _rows(extrema(motion, grid[0], grid[1]))
             found += [GapExtrema(element, place, level, *turns) for element, place, level in law.levels]
-    for nodal in state.nodal:
-        places = told_levels(nodal.kind, nodal.c)
-        if places:
-            turns = _rows(extrema(nodal.motions[0], grid[0], grid[1]))
-            found += [GapExtrema(nodal.own.index, place, level, *turns) for place, level in enumerate(places)]
+    for channel in state.own_channels:
+        for member, _ in channel.members():
+            places = levels_of(member.kind, member.coefficients)
+            if places:
+                turns = _rows(extrema(channel.along.motion, grid[0], grid[1]))
+                found += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
     return tuple(found)
 
 
@@ -58,7 +58,7 @@ def _rows(turns: Array) -> tuple[Array, Array, Array]:
 
 def levels(local: LocalMotion) -> tuple[float, ...]:
     """Displacements at which an element's law has a corner, or is sharp."""
-    return told_levels(local.kind, local.coefficients)
+    return levels_of(local.kind, local.coefficients)
 
 
 def level_rate(state: BalanceState, element: int, index: int, name: str) -> float:
@@ -66,13 +66,13 @@ def level_rate(state: BalanceState, element: int, index: int, name: str) -> floa
     if name == "omega":
         return 0.0
     local = state.local(element)
-    rates = coefficient_rates(local.element, state.values, {name: 1.0})
+    rates = local.element.parameter_rates(state.values, {name: 1.0})
     if not rates.any():
         return 0.0
     kind = local.kind
     if isinstance(kind, PiecewiseLinear):
         return float(rates[kind.pieces[index].gap])
-    by_coefficient = level_rates(local.element, local.coefficients)
+    by_coefficient = local.element.level_rates(local.coefficients)
     return float(by_coefficient[index] @ rates) if index < len(by_coefficient) else 0.0
 
 
@@ -84,6 +84,7 @@ def contact_side(local: LocalMotion, index: int) -> int:
         return piece.side if local.coefficients[piece.stiffness] >= 0.0 else -piece.side
     if isinstance(kind, CornerSampling):
         return _stiffer_side(local, levels(local)[index])
+    assert isinstance(local.element, Element)
     point = np.array([levels(local)[index]])
     return -1 if float(local.element.curvature(point, np.zeros(1), local.coefficients)[0][0]) < 0.0 else 1
 
@@ -109,17 +110,18 @@ def _along(element: BaseElement) -> float:
 
 def rests_in_corner(state: BalanceState) -> bool:
     """Whether the stiffness or damping of an element jumps at rest, u = v = 0."""
-    if any(np.any(law.pieces[:, 1] == 0.0) for law in state.balance.coefficients(state.values)[2]):
+    if any(np.any(law.pieces[:, 1] == 0.0) for law in state.laws.groups):
         return True
-    for nodal in state.nodal:
-        kind = nodal.kind
+    for channel in state.own_channels:
+        ((member, _),) = channel.members()
+        kind, law = member.kind, as_coupled(member.element)
         if not isinstance(kind, CornerSampling):
             continue
-        for row, levels_there in ((0, kind.points), (nodal.own.count, kind.velocities)):
+        for row, levels_there in ((0, kind.points), (channel.count, kind.velocities)):
             if 0.0 in levels_there:
-                q = np.zeros((2 * nodal.own.count if nodal.own.moving else nodal.own.count, 2))
+                q = np.zeros((channel.along.size, 2))
                 q[row] = -1e-12, 1e-12
-                below, above = nodal.own.law.tangent(q, np.full(2, 0.7), nodal.c)[1][row]
+                below, above = law.tangent(q, np.full(2, 0.7), member.coefficients)[1][row]
                 if abs(above - below) > 1e-9 * max(abs(above), abs(below)):
                     return True
     return False

@@ -23,14 +23,10 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.continuation.kernels import determinant_sign
-from suboctave.continuation.lapack import factorise
 from suboctave.continuation.linear import Factor
+from suboctave.floquet import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.evaluation import jacobian
-from suboctave.harmonic.linear_part import StructuralMatrices
-from suboctave.harmonic.state import BalanceState
-from suboctave.stability import FloquetResult
+from suboctave.harmonic.evaluation import BalanceState
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
@@ -98,37 +94,8 @@ def fold_sign(state: BalanceState) -> float:
 
 def half_sign(state: BalanceState) -> float:
     """Sign of det J_half."""
-    linear = state.linear
-    if not isinstance(linear, StructuralMatrices) or state.nodal:
-        # the transpose has the same determinant, and lies in memory as LAPACK wants it
-        return Factor.of(state.half_jacobian.T).sign
-    table, balance = state.spectra_table, state.balance
-    return float(
-        _half_sign(
-            table,
-            balance.moving,
-            state.rate,
-            *balance.directions,
-            linear.matrices,
-            state.basis.half_multiples,
-            state.omega,
-            state.x,
-        )
-    )
-
-
-@kernel()
-def _half_sign(table, moving, rate, starts, dofs, shape, matrices, multiples, omega, x):
-    """`half_sign` of a structure's own matrices, 0 if J_half is singular."""
-    n = x.shape[1] * (x.shape[0] + 1)
-    matrix = np.zeros((n, n))
-    # not a literal, for which the Jacobian would be compiled once more
-    mean = n < 0
-    jacobian(matrix, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x)
-    pivots = np.empty(n, dtype=np.int32)
-    if factorise(matrix, pivots):
-        return 0.0
-    return determinant_sign(matrix, pivots)
+    # the transpose has the same determinant, and lies in memory as LAPACK wants it
+    return Factor.of(state.half_jacobian.T).sign
 
 
 @kernel()

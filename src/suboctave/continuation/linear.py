@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from suboctave.continuation import kernels
-from suboctave.continuation.lapack import leading_block, solve_leading
 
 Array = NDArray[np.float64]
 
@@ -95,19 +94,25 @@ class LeadingBlock:
 
     def __init__(self, whole: Factor, size: int) -> None:
         self.whole = whole
-        self.size = size
         order = len(whole.lu)
         more = order - size
-        #: the last columns of the inverse, and factors of C
-        self.columns, self.corner = np.empty((more, order)), np.empty((more, more))
-        self.pivots = np.empty(more, dtype=np.int32)
+        units = np.zeros((order, more), order="F")
+        units[size + np.arange(more), np.arange(more)] = 1.0
+        #: the last columns of the inverse: V above, C below
+        self.columns = whole.solve(units) if more and not whole.singular else units
+        self.size = size
+        self.corner = Factor.of(self.columns[size:]) if more else None
         #: sign of the block's determinant, 0 if it is singular, and natural logarithm of the determinant's modulus
-        self.sign, self.log_determinant = 0.0, -math.inf
-        if not whole.singular:
-            filled = (self.columns, self.corner, self.pivots)
-            self.sign, self.log_determinant = leading_block(whole.lu.T, whole.pivots, size, *filled)
+        self.sign, self.log_determinant = whole.sign, whole.log_determinant
+        if self.corner is not None:
+            self.sign *= self.corner.sign
+            self.log_determinant += self.corner.log_determinant
 
     def solve(self, rhs: Array) -> Array:
         """Solve with the block."""
-        found: Array = solve_leading(self.whole.lu.T, self.whole.pivots, self.columns, self.corner, self.pivots, rhs)
-        return found
+        filled = np.zeros(len(self.whole.lu))
+        filled[: self.size] = rhs
+        whole = self.whole.solve(filled)
+        if self.corner is None:
+            return whole
+        return whole[: self.size] - self.columns[: self.size] @ self.corner.solve(whole[self.size :])

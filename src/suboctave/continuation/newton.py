@@ -14,16 +14,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation import kernels
-from suboctave.continuation.linear import Factor
-from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.problem import Array, Evaluation, Problem
 from suboctave.errors import ConvergenceError, InputError, check_numbers
 from suboctave.interruption import check_time
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 SHORT = 1e-3
+#: correction, in units of motions and ranges, that leads away from a guess of a square system; corrections of one after
+#: which the rate counts
+_FAR, _TELLING = 4.0, 3
 #: rate at which corrections shrink, twice in succession, that comes to nothing: at a corner of the equations Newton's
 #: method goes to and fro between its sides
 STALLED = 0.8
+#: correction in scaled arclength that rounding of the unknowns makes
+_ROUNDING = 1e-13
 #: share of the tolerance that `closely` leaves, and its least
 _SHARE, _LEAST = 1e-3, 1e-13
 
@@ -40,12 +45,24 @@ class NewtonOptions:
         Corrections before a step is given up and shortened.
     damped
         Shorten corrections until the residual decreases: for starts from far away.
+    longest
+        Length in scaled arclength to which corrections are shortened.
+    rounding
+        Whether the iterate of least residual counts as solved where corrections have come down to rounding of the
+        unknowns: right behind a grazing the equations are so steep that the last digit of an unknown is more than the
+        tolerance.
     """
 
     tolerance: float = 1e-10
     correction: float = 1e-7
     iterations: int = 8
     damped: bool = False
+    longest: float = math.inf
+    rounding: bool = False
+
+    def share(self, step: Array) -> float:
+        """The share of a correction that is taken."""
+        return 1.0 if self.longest == math.inf else self.longest / max(self.longest, length(step))
 
     def __post_init__(self) -> None:
         check_numbers(tolerance=self.tolerance, correction=self.correction, iterations=self.iterations)
@@ -57,10 +74,7 @@ class NewtonOptions:
 
 @dataclass(eq=False, slots=True)
 class Solved:
-    """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`.
-
-    `tangent` and `sign` are the unit tangent along the row and the sign of the factors' determinant, where known.
-    """
+    """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`."""
 
     u: Array
     evaluation: Evaluation
@@ -69,8 +83,6 @@ class Solved:
     iterations: int
     distance: float
     contraction: float
-    tangent: Array | None = None
-    sign: float | None = None
 
 
 def closely(options: NewtonOptions) -> NewtonOptions:
@@ -78,12 +90,11 @@ def closely(options: NewtonOptions) -> NewtonOptions:
     return replace(options, tolerance=min(options.tolerance, max(_SHARE * options.tolerance, _LEAST)))
 
 
-def bordered(evaluation: Evaluation, row: Array, weights: Array) -> Factor:
-    """Factorise `[F_u; row]` with columns scaled to arclength."""
-    filled = getattr(evaluation, "bordered_transposed", None)
-    if filled is None:
-        return Factor.of(kernels.bordered_transposed(evaluation.jacobian, row, weights).T, overwrite=True)
-    return Factor.of(filled(row, weights).T, overwrite=True)
+def bordered(evaluation: Evaluation, row: Array | None, weights: Array) -> Factor:
+    """Factorise `[F_u; row]`, or F_u alone, with columns scaled to arclength."""
+    if row is None:
+        return Factor.of(evaluation.jacobian / weights)
+    return Factor.of(kernels.bordered_transposed(evaluation.jacobian, row, weights).T, overwrite=True)
 
 
 def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
@@ -92,9 +103,9 @@ def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
 
 
 def correct(
-    curve: Curve,
+    curve: Problem,
     guess: Array,
-    row: Array,
+    row: Array | None,
     weights: Array,
     options: NewtonOptions,
     known: Factor | None = None,
@@ -105,7 +116,8 @@ def correct(
     Parameters
     ----------
     row
-        Scaled row, shape (N + 1,): the unit tangent in scaled variables, or a unit vector to keep a parameter.
+        Scaled row, shape (N + 1,): the unit tangent in scaled variables, or a unit vector to keep a parameter. None
+        where there are as many equations as unknowns.
     known
         Factors of a point close by with the same row and weights: for a first correction, which is then made however
         good the guess is.
@@ -119,18 +131,12 @@ def correct(
         If the iterations do not contract or run out.
     """
     check_time()
-    if not options.damped:
-        at_once: Callable[..., Solved | None] | None = getattr(curve, "corrected", None)
-        solved = None if at_once is None else at_once(guess, row, weights, options, spare, known)
-        if solved is not None:
-            return solved
     u = guess.copy()
     last: Evaluation | None = None
-    way = before = 0.0
+    way = before = contraction = first = 0.0
     previous = np.inf
-    contraction = 0.0
-    first = 0.0
     factor = known
+    nearest: Solved | None = None
     for iteration in range(options.iterations + 1):
         check_time()
         evaluation = curve.evaluate(u)
@@ -138,12 +144,12 @@ def correct(
         if not math.isfinite(error):
             raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
         # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
-        settled = previous <= options.correction or previous * min(contraction, 1.0) <= options.correction
+        left = previous if options.rounding and contraction == 0.0 else previous * min(contraction, 1.0)
+        settled = min(previous, left) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
-            distance = kernels.distance(u, guess, weights)
             if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
                 factor = bordered(evaluation, row, weights)
-            return Solved(u, evaluation, weights, factor, iteration, distance, contraction)
+            return Solved(u, evaluation, weights, factor, iteration, kernels.distance(u, guess, weights), contraction)
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
@@ -155,8 +161,14 @@ def correct(
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         before = error
-        step = factor.solve(kernels.right_hand_side(evaluation.residual, row, weights, u, guess))
-        share = _decrease(curve, u, step / weights, error) if options.damped else 1.0
+        rhs = evaluation.residual
+        step = factor.solve(rhs if row is None else kernels.right_hand_side(rhs, row, weights, u, guess))
+        still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
+        if still and (nearest is None or error < nearest.evaluation.error):
+            nearest = Solved(
+                u, evaluation, weights, factor, iteration, kernels.distance(u, guess, weights), contraction
+            )
+        share = _decrease(curve, u, step / weights, error) if options.damped else options.share(step)
         u, size = kernels.moved(u, step, weights, share)
         way += share * size
         if iteration == 0:
@@ -164,22 +176,23 @@ def correct(
         else:
             rate = contraction
             contraction = size / previous if previous > 0.0 else 0.0
-            away = contraction > 2.0 and size > first
-            if (away or min(rate, contraction) > STALLED) and not options.damped:
+            if row is None:
+                # far from a curve, and where two solutions are about to merge, the first corrections tell little
+                lost = size > _FAR or (iteration > _TELLING and contraction > 0.5 and previous > SHORT**2)
+            else:
+                lost = (contraction > 2.0 and size > first) or min(rate, contraction) > STALLED
+            if lost and not options.damped and nearest is None:
                 break
         previous = size if share == 1.0 else np.inf
-    raise not_converged(curve, guess, error, iteration)
-
-
-def not_converged(curve: Curve, guess: Array, error: float, iterations: int) -> ConvergenceError:
-    """What is said where the iterations do not contract or run out."""
-    return ConvergenceError(
+    if nearest is not None:
+        return nearest
+    raise ConvergenceError(
         f"Newton's method did not converge near {curve.where(guess)} "
-        f"(residual {error:.1e} after {iterations} iterations)"
+        f"(residual {error:.1e} after {iteration} iterations)"
     )
 
 
-def _decrease(curve: Curve, u: Array, step: Array, error: float) -> float:
+def _decrease(curve: Problem, u: Array, step: Array, error: float) -> float:
     """The share of a correction with which the residual decreases, 1 if the whole of it does."""
     share = 1.0
     while share > 1e-3:
@@ -194,8 +207,6 @@ def _decrease(curve: Curve, u: Array, step: Array, error: float) -> float:
 
 def tangent(solved: Solved) -> Array:
     """Unit tangent in u, normalised in scaled arclength, oriented along the row the point was solved with."""
-    if solved.tangent is not None:
-        return solved.tangent
     rhs = np.zeros(len(solved.u))
     rhs[-1] = 1.0
     if solved.factor.singular:

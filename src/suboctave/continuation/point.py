@@ -40,7 +40,7 @@ class CurvePoint:
 def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
     """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
     t = tangent(solved)
-    sign = solved.factor.sign if solved.sign is None else solved.sign
+    sign = solved.factor.sign
     # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of
     # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
     if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:

@@ -18,9 +18,8 @@ Array = NDArray[np.float64]
 class Evaluation(Protocol):
     """The equations at one u.
 
-    It may have a method `bordered_transposed(row, weights)` too, for the transpose of `[jacobian / weights; row]` at
-    once; and a method `takes_over(other)` that has it keep the derivatives of another evaluation a rounding away, if it
-    can, and says so.
+    It may have a method `takes_over(other)` that has it keep the derivatives of another evaluation a rounding away, if
+    it can, and says so.
     """
 
     @property
@@ -36,21 +35,26 @@ class Evaluation(Protocol):
         """Dimensionless size of the residual: 1 means as large as the terms that should balance."""
 
 
-class Curve(Protocol):
+class Problem(Protocol):
+    """Equations that Newton's method solves: as many as unknowns, or one fewer."""
+
+    def evaluate(self, u: Array) -> Evaluation:
+        """Equations and derivatives at u. May raise ConvergenceError where they do not exist."""
+
+    def where(self, u: Array) -> str:
+        """A place on the curve in words, for messages: 'omega = 2.31'."""
+
+
+class Curve(Problem, Protocol):
     """A curve as the engine sees it. `parameter` is the index in u of the parameter that bounds and directions refer
     to.
 
-    It may have a method `corrected(guess, row, weights, options, spare, known)` too, which does what `newton.correct`
-    does at once and raises what that does, or returns None where it does not go; and an attribute `delicate`, true
-    where its tangents ask for points as close as rounding allows.
+    It may have an attribute `delicate`, true where its tangents ask for points as close as rounding allows.
     """
 
     @property
     def parameter(self) -> int:
         """Index of the free parameter in u."""
-
-    def evaluate(self, u: Array) -> Evaluation:
-        """Equations and derivatives at u. May raise ConvergenceError where they do not exist."""
 
     def weights(self, u: Array, largest: float) -> Array:
         """Scaled arclength: `|du| = norm(weights * du)`. `largest` is the largest `size` met on the branch so far."""
@@ -70,8 +74,5 @@ class Curve(Protocol):
     def unwrapped(self, u: Array, near: Array) -> Array:
         """The same u with periodic unknowns moved by whole periods next to those of `near`; where none is, u itself."""
 
-    def where(self, u: Array) -> str:
-        """A place on the curve in words, for messages: 'omega = 2.31'."""
 
-
-__all__ = ["Any", "Array", "Curve", "Evaluation"]
+__all__ = ["Any", "Array", "Curve", "Evaluation", "Problem"]

@@ -2,12 +2,11 @@
 as data.
 """
 
-from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.selection import AdaptiveHarmonics
-from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.truncation import AdaptiveHarmonics
 
 __all__ = [
     "AdaptiveHarmonics",

@@ -7,17 +7,11 @@ A motion of period `nu * 2 pi / omega` is
 with `nu = 1` for a response at the period of the load, `nu = 2` after one period doubling, and so on. Its
 coefficients are stored harmonic by harmonic, `X = (a_0, a_1, b_1, a_2, b_2, ...)`, each entry of length n (the number
 of unknown DOFs).
-
-Sub-harmonic motions need some multiples of `omega / nu` to higher frequencies than others. A basis may leave harmonics
-out: coefficients keep the shape of all `0 .. H`, with zeros where nothing is kept, and so do spectra and forces; only
-the equations are fewer, those of the harmonics that are kept.
 """
 
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -51,74 +45,32 @@ def harmonic_index(k: float, nu: int) -> int:
 
 @dataclass(frozen=True, repr=False)
 class HarmonicBasis:
-    """Harmonics of the base frequency `omega / nu`: all of `0 .. harmonics`, or some of them.
+    """Harmonics `0 .. harmonics` of the base frequency `omega / nu`.
 
     Parameters
     ----------
     harmonics
-        Highest multiple of the base frequency that is kept, at least 1.
+        Highest multiple of the base frequency, at least 1.
     nu
         Period of the motion in periods of the load, at least 1.
-    kept
-        The multiples that are kept, 0 and `harmonics` among them; None for all of `0 .. harmonics`.
 
     Raises
     ------
     InputError
-        If one of the former is not a positive whole number, or `kept` holds others than multiples in the range.
+        If one of them is not a positive whole number.
     """
 
     harmonics: int
     nu: int = 1
-    kept: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("harmonics", self.harmonics), ("nu", self.nu)):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise InputError(f"{name} must be a whole number of at least 1, not {value!r}")
-        if self.kept is not None:
-            object.__setattr__(self, "kept", self._checked(self.kept))
-
-    def _checked(self, given: Iterable[int]) -> tuple[int, ...] | None:
-        """The kept multiples in ascending order; None if these are all."""
-        try:
-            kept = tuple(sorted({operator.index(k) for k in given}))
-        except TypeError:
-            raise InputError(f"kept must be whole multiples of the base frequency, not {given!r}") from None
-        if not kept or kept[0] != 0 or kept[-1] != self.harmonics:
-            raise InputError(
-                f"kept must hold 0 and the highest harmonic, {self.harmonics}, and nothing outside of that range"
-            )
-        return None if len(kept) == self.harmonics + 1 else kept
-
-    @property
-    def count(self) -> int:
-        """Number of basis functions that are kept: `2 H + 1`, or fewer where harmonics are left out."""
-        return self.size if self.kept is None else 2 * len(self.kept) - 1
-
-    @property
-    def filled(self) -> HarmonicBasis:
-        """The basis with all harmonics up to the highest."""
-        return self if self.kept is None else HarmonicBasis(self.harmonics, self.nu)
-
-    @cached_property
-    def rows(self) -> NDArray[np.intp] | None:
-        """Which of the `2 H + 1` basis functions are kept, ascending; None for all."""
-        if self.kept is None:
-            return None
-        k = np.array(self.kept[1:], dtype=np.intp)
-        return np.concatenate((np.zeros(1, dtype=np.intp), np.column_stack((2 * k - 1, 2 * k)).ravel()))
-
-    @cached_property
-    def left_out(self) -> NDArray[np.intp]:
-        """The multiples below the highest that are not kept, ascending."""
-        if self.kept is None:
-            return np.zeros(0, dtype=np.intp)
-        return np.setdiff1d(np.arange(self.harmonics + 1), self.kept)
 
     @property
     def size(self) -> int:
-        """Number of basis functions up to the highest harmonic, `2 H + 1`: the length of coefficients."""
+        """Number of basis functions, `2 H + 1`: the length of coefficients."""
         return 2 * self.harmonics + 1
 
     @cached_property
@@ -141,7 +93,7 @@ class HarmonicBasis:
 
     def resized(self, coefficients: Array, other: HarmonicBasis) -> Array:
         """Coefficients (2 H + 1, ...) of this basis in `other`: padded with zeros, truncated, or re-based to a
-        multiple of nu; zero where `other` keeps nothing.
+        multiple of nu.
         """
         if other.nu % self.nu:
             raise InputError(f"a motion of {self.nu} load periods cannot be written in a basis of {other.nu} of them")
@@ -152,10 +104,6 @@ class HarmonicBasis:
         index = stride * np.arange(1, kept + 1)
         result[2 * index - 1] = coefficients[1 : 2 * kept : 2]
         result[2 * index] = coefficients[2 : 2 * kept + 1 : 2]
-        if other.kept is not None:
-            out = other.left_out
-            result[2 * out - 1] = 0.0
-            result[2 * out] = 0.0
         return result
 
     @property
@@ -181,8 +129,7 @@ class HarmonicBasis:
         return result
 
     def __repr__(self) -> str:
-        kept = "" if self.kept is None else f", {len(self.kept) - 1} kept"
-        return f"HarmonicBasis(harmonics={self.harmonics}, nu={self.nu}{kept})"
+        return f"HarmonicBasis(harmonics={self.harmonics}, nu={self.nu})"
 
 
 def to_complex(coefficients: NDArray[Any]) -> ComplexArray:

@@ -1,37 +1,439 @@
-"""One evaluated motion in one compiled call: forces along all directions and the residual, or the Jacobian.
+"""One evaluated motion: what harmonic balance says of it, each part computed when first needed and kept.
 
-What `group_kernels` and `kernels` do piece by piece, for callers who need all of it: between compiled calls a small
-system spends more time than in them.
+    R = A X + B S,    S = F(X, omega) - P(omega),    dF/dX = T(f_x) + T(f_v) omega D,    F_omega = T(f_v) D X
+
+in the notation of `equations`.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
 
 import numpy as np
 
-from suboctave.compiled import kernel, ready
+from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic import kernels
-from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.group_force import PackedLaws, add_sampled_spectra
-from suboctave.harmonic.group_kernels import (
-    add_pieces,
-    add_polynomial,
-    add_smooth_steps,
-    balance_residual,
-    tangent_matrix,
-)
-from suboctave.harmonic.linear_part import StructuralMatrices
-from suboctave.harmonic.nodal import add_tangent
-from suboctave.harmonic.quadrature import rule_tables, uniform_nodes
-from suboctave.harmonic.sharp_nodes import sharp_nodes
+from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.aft.general import GeneralLaw
+from suboctave.harmonic.aft.law import Along, LocalMotion
+from suboctave.harmonic.aft.sampled import settled_samples
+from suboctave.harmonic.aft.table import PackedLaws
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
+from suboctave.harmonic.equations import Equations, Laws
+from suboctave.harmonic.galerkin import add_galerkin, toeplitz
+from suboctave.harmonic.linear_part import LinearPart, add_linear, apply_blocks, multiply_blocks
+from suboctave.lazy import lazy
 
-if TYPE_CHECKING:
-    from suboctave.harmonic.state import BalanceState
+__all__ = ["BalanceState", "HarmonicBalance", "length"]
 
-_NO_MATRICES = np.zeros((0, 1, 1))
+
+class HarmonicBalance(Equations):
+    """Equations for the coefficients X of a system's periodic motion in a basis.
+
+    Parameters
+    ----------
+    system
+        What vibrates.
+    basis
+        Harmonics and period.
+    values
+        Parameter values, default those of the system.
+    linear
+        Linear part, default the system's own matrices.
+    samples
+        Frozen sample counts, one per element (`settle`), None where the smoothness of a law decides.
+
+    Notes
+    -----
+    X has shape (2 H + 1, size), or flattened to `dimension` entries; `size` is the number of unknown DOFs of the linear
+    part.
+    """
+
+    @lazy
+    def completed(self) -> HarmonicBalance:
+        """The same equations in the basis of 2 H + 1 harmonics, which a motion is completed in."""
+        return self.with_basis(HarmonicBasis(self.top, self.basis.nu))
+
+    def at(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> BalanceState:
+        """Evaluate at coefficients x, frequency omega and, where given, other parameter values.
+
+        Raises
+        ------
+        ConvergenceError
+            If an element returns a force that is not finite.
+        """
+        used = self.values if values is None else values
+        linear = self.linear
+        if used is not self.values and any(used[n] != self.values[n] for n in self.matrix_names):
+            linear = self.linear.rebuilt(used)
+        return BalanceState(self, linear, self.shaped(np.asarray(x, float)), float(omega), used)
+
+    def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
+        """These equations with sample counts chosen for a motion and frozen from here on."""
+        if self.settled:
+            return self
+        state = self.at(x, omega, values)
+        samples: list[int | None] = [None] * len(self.samples)
+        for channel in state.channels:
+            for member, law in channel.members():
+                own = law.settled_samples() if isinstance(law, GeneralLaw) else settled_samples(channel.along, member)
+                samples[member.number] = own
+        return self.with_samples(tuple(samples))
+
+
+class BalanceState:
+    """One evaluated motion: residual, Jacobian and derivatives, each computed when first needed."""
+
+    def __init__(
+        self, balance: HarmonicBalance, linear: LinearPart, x: Array, omega: float, values: Mapping[str, float]
+    ) -> None:
+        self.balance = balance
+        self.basis = balance.basis
+        self.linear = linear
+        self.x = x
+        self.omega = omega
+        self.values = values
+        self.rate = omega / balance.basis.nu
+
+    @lazy
+    def frequencies(self) -> Array:
+        """Circular frequencies of the harmonics, shape (H + 1,)."""
+        return self.basis.multiples * self.omega
+
+    @lazy
+    def blocks(self) -> ComplexArray:
+        """A at the harmonics, shape (H + 1, size, size)."""
+        return self.linear.stiffness(self.frequencies)
+
+    @lazy
+    def compliance(self) -> ComplexArray | None:
+        """B at the harmonics, None for the identity."""
+        return self.linear.compliance(self.frequencies)
+
+    @lazy
+    def laws(self) -> Laws:
+        """The laws of all elements."""
+        return self.balance.laws(self.values)
+
+    @property
+    def packed(self) -> PackedLaws:
+        """The laws of all groups that are known in closed form, as arrays."""
+        return self.laws.packed
+
+    @lazy
+    def motions(self) -> ComplexArray:
+        """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
+        motions = np.empty((len(self.balance.groups), self.basis.harmonics + 1), dtype=complex)
+        along_directions(self.x, *self.balance.directions, motions)
+        return motions
+
+    @lazy
+    def channels(self) -> list[Channel]:
+        """All elements along the motion: the groups of one displacement, then those with channels of their own."""
+        balance, nu, top = self.balance, self.basis.nu, self.balance.top
+        channels = []
+        for group, laws, motion in zip(balance.groups, self.laws.groups, self.motions, strict=True):
+            along = Along(motion[None], self.rate, nu, group.moving, top)
+            channels.append(Channel(group, along, laws.along(along)))
+        for group in balance.own:
+            motions = np.ascontiguousarray((to_complex(self.x) @ group.inputs.T).T)
+            along = Along(motions, self.rate, nu, group.moving, top)
+            members = tuple([self.laws.members[i] for i in group.members])
+            channels.append(Channel(group, along, [GeneralLaw(along, members)]))
+        return channels
+
+    @property
+    def own_channels(self) -> list[Channel]:
+        """The channels of elements with several inputs, corners, or time."""
+        return self.channels[len(self.balance.groups) :]
+
+    def local(self, index: int) -> LocalMotion:
+        """One of the system's elements on the motion."""
+        member = self.laws.members[index]
+        channel = next(channel for channel in self.channels if index in channel.group.members)
+        return LocalMotion(member.element, member.kind, member.coefficients, channel.along.motions)
+
+    @lazy
+    def force_spectra(self) -> ComplexArray:
+        """Fourier coefficients 0 .. top of the force along every channel, (C, top + 1)."""
+        table = np.empty((len(self.channels), self.balance.top + 1), dtype=complex)
+        for c, channel in enumerate(self.channels):
+            spectra = channel.spectra
+            # a number that is not finite at any instant is in all coefficients
+            if not cmath.isfinite(spectra[:, 0].sum()):
+                self._refuse(channel)
+            table[c] = spectra[0]
+        return table
+
+    def _refuse(self, channel: Channel) -> None:
+        labels = ", ".join(member.element.label for member, _ in channel.members())
+        raise ConvergenceError(
+            f"{labels} returned a force that is not finite at omega = {self.omega:.6g} "
+            f"(largest coefficient of the motion {np.abs(self.x).max():.3g})"
+        )
+
+    @lazy
+    def _parts(self) -> tuple[Array, Array]:
+        """A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P with residual weights."""
+        balance = self.balance
+        parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
+        load = balance.load(self.values, self.omega)
+        weight = balance.scales()[1]
+        balance_residual(self.x, self.blocks, self.force_spectra, load, *balance.directions, weight, parts, sizes)
+        return parts, sizes
+
+    @property
+    def unknowns(self) -> Array:
+        """Coefficients as a vector, shape (dimension,)."""
+        return self.x.ravel()
+
+    @property
+    def force(self) -> Array:
+        """Element forces F, shape (2 H + 1, size)."""
+        force: Array = self._parts[0][1]
+        return force
+
+    @lazy
+    def unbalanced(self) -> Array:
+        """S = F - P, shape (2 H + 1, size)."""
+        return self.force - self.balance.load(self.values, self.omega)
+
+    @lazy
+    def residual(self) -> Array:
+        """R, shape (dimension,)."""
+        if self.compliance is None:
+            return self._parts[0][2].ravel()
+        return (self._parts[0][0] + apply_blocks(self.compliance, self.unbalanced)).ravel()
+
+    @lazy
+    def force_jacobian(self) -> Array:
+        """dF/dX for all harmonics up to H, square, with size (2 H + 1) rows."""
+        return self._tangent(np.zeros((self.x.size, self.x.size)), mean=True)
+
+    def _tangent(self, out: Array, mean: bool) -> Array:
+        """Add the Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis to `out`."""
+        count, n = self.basis.harmonics + 1, self.balance.size
+        for channel in self.channels:
+            for i, incoming in enumerate(channel.group.incoming):
+                stiffness, damping = channel.stiffness(i), channel.damping(i)
+                outgoing = channel.group.outgoing
+                add_galerkin(out, stiffness, damping, self.rate, mean, count, *outgoing, *incoming, n)
+        return out
+
+    @lazy
+    def jacobian(self) -> Array:
+        """R_X, shape (dimension, dimension)."""
+        return self._operator(np.zeros((self.x.size, self.x.size)), self.blocks, self.compliance, mean=True)
+
+    def extended_jacobian(self, name: str) -> Array:
+        """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
+        m = self.x.size
+        out = np.zeros((m, m + 1))
+        if "jacobian" in vars(self):
+            out[:, :-1] = self.jacobian
+        else:
+            out = self._operator(out, self.blocks, self.compliance, mean=True)
+        out[:, -1] = self.residual_by(name)
+        return out
+
+    @lazy
+    def half_jacobian(self) -> Array:
+        """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
+        frequencies, rows = self.basis.half_multiples * self.omega, self.balance.size * (self.basis.size + 1)
+        blocks, compliance = self.linear.stiffness(frequencies), self.linear.compliance(frequencies)
+        return self._operator(np.zeros((rows, rows)), blocks, compliance, mean=False)
+
+    def _operator(self, out: Array, blocks: ComplexArray, compliance: ComplexArray | None, mean: bool) -> Array:
+        """Add `A + B dF/dX` to zeros, whose first columns it takes."""
+        self._tangent(out, mean)
+        if compliance is not None:
+            expanded = np.zeros((len(out), len(out)))
+            add_linear(expanded, compliance, mean)
+            out = expanded @ out
+        add_linear(out, blocks, mean)
+        return out
+
+    @property
+    def linear_jacobian(self) -> Array:
+        """The part of R_X that stays without elements: A on the block diagonal."""
+        return self.block_diagonal(self.blocks)
+
+    def block_diagonal(self, blocks: ComplexArray) -> Array:
+        """A linear operator given by its blocks (H + 1, size, size), one a harmonic, in the unknowns, as R_X is."""
+        out = np.zeros((self.x.size, self.x.size))
+        add_linear(out, blocks, True)
+        return out
+
+    def residual_by(self, name: str) -> Array:
+        """R differentiated by "omega" or a parameter, shape (dimension,)."""
+        linear, freq = self.linear, self.frequencies
+        result = np.zeros(self.x.shape)
+        if name == "omega":
+            m = self.basis.multiples[:, None, None]
+            result += apply_blocks(m * linear.stiffness(freq, 1), self.x)
+            slope = linear.compliance(freq, 1)
+            if slope is not None:
+                result += apply_blocks(m * slope, self.unbalanced)
+        elif name in self.balance.matrix_names:
+            block = linear.stiffness_by(freq, (name,))
+            if block is not None:
+                result += apply_blocks(block, self.x)
+            slope = linear.compliance_by(freq, (name,))
+            if slope is not None:
+                result += apply_blocks(slope, self.unbalanced)
+        change = self.unbalanced_by(name)
+        if change is not None:
+            result += change if self.compliance is None else apply_blocks(self.compliance, change)
+        return result.ravel()
+
+    def unbalanced_by(self, name: str) -> Array | None:
+        """S differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
+        load = None
+        if name in self.balance.load_names:
+            load = -self.balance.loads.value({**self.values, "omega": self.omega}, self.balance.size, (name,))
+        force = self._force_by(name)
+        if force is None:
+            return load
+        return force if load is None else force + load
+
+    def _force_by(self, name: str) -> Array | None:
+        """Element forces differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
+        high = self.basis.harmonics
+        total: Array | None = None
+        if name == "omega":
+            for channel in self.channels:
+                for i, d in enumerate(channel.ins if channel.moving else ()):
+                    slope = toeplitz(channel.damping(i), high) @ self.basis.derivative(self.x @ d)
+                    part = np.multiply.outer(slope, channel.out)
+                    total = part if total is None else total + part
+            return total
+        for channel, change in self.changes_by(name):
+            part = np.multiply.outer(spectrum_to_real(change[0], high), channel.out)
+            total = part if total is None else total + part
+        return total
+
+    def changes_by(self, name: str) -> list[tuple[Channel, ComplexArray]]:
+        """For every channel whose forces depend on a parameter: what that does to f and f_q, (1 + Q, top + 1)."""
+        if name not in self._changes:
+            self._changes[name] = self._changes_by(name)
+        return self._changes[name]
+
+    @lazy
+    def _changes(self) -> dict[str, list[tuple[Channel, ComplexArray]]]:
+        return {}
+
+    def _changes_by(self, name: str) -> list[tuple[Channel, ComplexArray]]:
+        rates = {}
+        for i in self.balance.elements_with(name):
+            rate = self.laws.members[i].element.parameter_rates(self.values, {name: 1.0})
+            if rate.any():
+                rates[i] = rate
+        if not rates:
+            return []
+        return [(c, c.change(rates)) for c in self.channels if any(i in rates for i in c.group.members)]
+
+    @lazy
+    def neglected(self) -> ComplexArray:
+        """Amplitudes of the harmonics H + 1 .. 2 H + 1 that the force on the motion would excite, shape (H + 1, size).
+
+        To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
+        """
+        k = np.arange(self.basis.harmonics + 1, self.balance.top + 1)
+        force = np.zeros((len(k), self.balance.size), dtype=complex)
+        for channel, spectrum in zip(self.channels, self.force_spectra, strict=True):
+            force += np.multiply.outer(2.0 * spectrum[k[0] :], channel.out)
+        frequency = k / self.basis.nu * self.omega
+        compliance = self.linear.compliance(frequency)
+        if compliance is not None:
+            force = np.einsum("kij,kj->ki", compliance, force)
+        blocks = self.linear.stiffness(frequency)
+        if self.balance.size == 1:
+            return -(force / blocks[:, :, 0])
+        amplitudes = np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+        return np.asarray(-amplitudes, dtype=complex)
+
+    @lazy
+    def tails(self) -> tuple[Array, float]:
+        """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
+        tail = np.empty(2 * self.basis.harmonics + 2)
+        return tail, float(add_tails(self.x, self.neglected, self.balance.scales()[0], tail))
+
+    @lazy
+    def completed(self) -> BalanceState:
+        """The motion together with the harmonics it neglects, in the basis of 2 H + 1 harmonics.
+
+        It solves the equations no better within the basis, but as a function of time it lies closer to the true motion.
+        """
+        return BalanceState(self.balance.completed, self.linear, self.completed_x[1], self.omega, self.values)
+
+    @lazy
+    def completed_x(self) -> tuple[HarmonicBasis, Array]:
+        """The basis of 2 H + 1 harmonics, and the coefficients of the completed motion in it."""
+        basis = HarmonicBasis(self.balance.top, self.basis.nu)
+        x = self.basis.resized(self.x, basis)
+        x[self.basis.size :: 2] = self.neglected.real
+        x[self.basis.size + 1 :: 2] = -self.neglected.imag
+        return basis, x
+
+    def force_scale(self) -> float:
+        """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
+        sizes = self._parts[1]
+        if self.compliance is None:
+            _, linear, force, load = sizes.tolist()
+            return float(linear + force + load)
+        weight = self.balance.scales()[1]
+        load = self.balance.load(self.values, self.omega)
+        return float(sizes[1]) + sum(
+            length(apply_blocks(self.compliance, part) * weight) for part in (self.force, load)
+        )
+
+    def residual_size(self) -> float:
+        """Size of R with residual weights."""
+        if self.compliance is None:
+            return float(self._parts[1][0])
+        return length(self.residual.reshape(-1, self.balance.size) * self.balance.scales()[1])
+
+
+def length(vector: Array) -> float:
+    """Euclidean norm of all entries."""
+    flat = vector.ravel()
+    return math.sqrt(flat.dot(flat))
+
+
+@kernel()
+def balance_residual(x, blocks, force, load, starts, dofs, shape, weight, parts, sizes):
+    """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n), and |R|, |A X|, |F|, |P| into `sizes` (4,).
+
+    blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions, whose non-zero
+    entries are `shape[starts[g] : starts[g + 1]]` at `dofs`. Sizes are weighted by `weight` per DOF.
+    """
+    rows, n = x.shape
+    linear, forces, residual = parts[0], parts[1], parts[2]
+    for r in range(rows):
+        for i in range(n):
+            forces[r, i] = 0.0
+    multiply_blocks(blocks, x, linear)
+    for g in range(force.shape[0]):
+        for s in range(starts[g], starts[g + 1]):
+            i, d = dofs[s], shape[s]
+            forces[0, i] += d * force[g, 0].real
+            for h in range(1, blocks.shape[0]):
+                forces[2 * h - 1, i] += 2.0 * d * force[g, h].real
+                forces[2 * h, i] -= 2.0 * d * force[g, h].imag
+    for k in range(4):
+        sizes[k] = 0.0
+    for r in range(rows):
+        for i in range(n):
+            residual[r, i] = linear[r, i] + forces[r, i] - load[r, i]
+            w = weight[i] * weight[i]
+            sizes[0] += w * residual[r, i] * residual[r, i]
+            sizes[1] += w * linear[r, i] * linear[r, i]
+            sizes[2] += w * forces[r, i] * forces[r, i]
+            sizes[3] += w * load[r, i] * load[r, i]
+    for k in range(4):
+        sizes[k] = math.sqrt(sizes[k])
 
 
 @kernel()
@@ -51,288 +453,29 @@ def along_directions(x, starts, dofs, shape, motions):
 
 
 @kernel()
-def evaluate(
-    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
-    table, motions, parts, sizes,
-):  # fmt: skip
-    """Evaluate harmonic balance at a motion; returns whether the forces are finite.
+def add_tails(x, neglected, weight, out):
+    """Size of all harmonics above k relative to the motion, into `out` for k = 0 .. 2 H + 1; returns the motion's size.
 
-    Parameters
-    ----------
-    x, omega, multiples
-        Coefficients (2 H + 1, n), frequency, harmonics in units of it (H + 1,).
-    matrices
-        Mass, damping, stiffness (3, n, n), or nothing, (0, n, n), where `blocks` is given.
-    starts, dofs, shape
-        Directions, as in `balance_residual`.
-    pieces, first
-        Stiffness, gap and side of piecewise-linear pieces (P, 3), or None without any, direction by direction: where
-        each begins, (G + 1,).
-    polynomial
-        Coefficients of u^0, u^1, ... along every direction (G, D).
-    grid, nodes
-        Points on the circle (cosines and sines, (2, N)): for searches, and for polynomials.
-    load, weight
-        Load coefficients (2 H + 1, n), weights of residual entries per DOF.
-    blocks, table, motions, parts, sizes
-        Filled: dynamic stiffness (H + 1, n, n), unless given; spectra of force, stiffness, damping (3, G, top + 1),
-        which may hold the spectra of other laws already; displacements (G, H + 1); the results of `balance_residual`.
+    x (2 H + 1, n): coefficients; `neglected` (H + 1, n) complex amplitudes from H + 1 on; sizes are weighted per DOF.
     """
-    if matrices.shape[0] > 0:
-        n = x.shape[1]
-        for h in range(multiples.shape[0]):
-            om = multiples[h] * omega
-            for i in range(n):
-                for j in range(n):
-                    blocks[h, i, j] = complex(matrices[2, i, j] - om * om * matrices[0, i, j], om * matrices[1, i, j])
-    along_directions(x, starts, dofs, shape, motions)
-    finite = True
-    for g in range(motions.shape[0]):
-        c = motions[g]
-        # without pieces nobody waits for the compilation of what they need
-        if pieces is not None and first[g + 1] > first[g]:
-            add_pieces(c, pieces[first[g] : first[g + 1]], grid[0], grid[1], table[0, g], table[1, g])
-        if polynomial.shape[1] > 0:
-            add_polynomial(c, polynomial[g], nodes[0], nodes[1], table[0, g], table[1, g])
-        # a number that is not finite at any instant is in all coefficients
-        for r in range(3):
-            finite = finite and math.isfinite(table[r, g, 0].real) and math.isfinite(table[r, g, 0].imag)
-    balance_residual(x, blocks, table[0], load, starts, dofs, shape, weight, parts, sizes)
-    return finite
-
-
-@kernel()
-def add_told(c, points, widths, steps, line, grid, rule_nodes, rule_weights, force, stiffness):
-    """Add the Fourier coefficients of the arctan steps along one direction to force and stiffness (top + 1,), in place;
-    returns the nodes with the motion there (`sharp_nodes`). Arguments as in `evaluate_told`.
-    """
-    degree = force.shape[0] + c.shape[0] - 2
-    # not a literal, for which the nodes would be compiled once more
-    moving = degree < 0
-    sampled = sharp_nodes(c, points, widths, degree, moving, grid[0], grid[1], rule_nodes, rule_weights)
-    add_smooth_steps(sampled, steps, line, force, stiffness)
-    return sampled
-
-
-@kernel()
-def evaluate_told(
-    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
-    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-):  # fmt: skip
-    """`evaluate` with laws that have arctan steps; the table's spectra are zero before. Returns besides the nodes of
-    the last direction that has steps, as `sharp_nodes` gives them.
-
-    Parameters
-    ----------
-    points, widths, steps, step_first
-        Places and widths of the steps (S,); they as `add_smooth_steps` wants them (S, 3), direction by direction: where
-        each direction's begin, (G + 1,).
-    line
-        Constant and slope of the laws that they belong to, (G, 2).
-    rule_nodes, rule_weights
-        `sharp_nodes.tables()`.
-    """
-    along_directions(x, starts, dofs, shape, motions)
-    sampled = np.empty((4, 0))
-    for g in range(motions.shape[0]):
-        low, high = step_first[g], step_first[g + 1]
-        if high > low:
-            sampled = add_told(
-                motions[g], points[low:high], widths[low:high], steps[low:high], line[g], grid, rule_nodes,
-                rule_weights, table[0, g], table[1, g],
-            )  # fmt: skip
-    finite = evaluate(
-        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-        weight, table, motions, parts, sizes,
-    )  # fmt: skip
-    return finite, sampled
-
-
-@kernel()
-def evaluate_anew(
-    x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load, weight,
-    points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-):  # fmt: skip
-    """`evaluate`, or `evaluate_told` where there are `points`, into a table that holds anything before; returns
-    whether the forces are finite, and the nodes of the last direction with steps, (4, 0) without any.
-    """
-    table.fill(0.0)
-    if points is None:
-        finite = evaluate(
-            x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-            weight, table, motions, parts, sizes,
-        )  # fmt: skip
-        return finite, np.empty((4, 0))
-    return evaluate_told(
-        x, omega, multiples, matrices, blocks, starts, dofs, shape, pieces, first, polynomial, grid, nodes, load,
-        weight, points, widths, steps, step_first, line, rule_nodes, rule_weights, table, motions, parts, sizes,
-    )  # fmt: skip
-
-
-@kernel()
-def jacobian(out, table, moving, rate, mean, starts, dofs, shape, matrices, multiples, omega, x):
-    """Add R_X of a structure's own matrices to a matrix of zeros, in the integer (mean) or the half-odd basis.
-
-    Parameters
-    ----------
-    out
-        Filled. Where it has a column more than rows, that is the linear part of R_omega.
-    table, moving, rate
-        Spectra (3, G, top + 1), whether a direction has damping, the base frequency.
-    matrices, multiples
-        Mass, damping, stiffness (3, n, n); the basis's frequencies in units of omega.
-    x
-        Coefficients (2 H + 1, n).
-    """
-    n = x.shape[1]
-    tangent_matrix(out, table[1], table[2], moving, rate, mean, starts, dofs, shape, n)
-    first = 1 if mean else 0
-    last = out.shape[1] - 1
-    extended = last == out.shape[0]
-    for h in range(multiples.shape[0]):
-        om = multiples[h] * omega
-        single = mean and h == 0
-        at = 0 if single else (2 * h - first) * n
-        for i in range(n):
-            slope = other = 0.0
-            for j in range(n):
-                p = matrices[2, i, j] - om * om * matrices[0, i, j]
-                q = om * matrices[1, i, j]
-                # an amplitude a - i b stands for a cos + b sin: the block is [[P, Q], [-Q, P]]
-                out[at + i, at + j] += p
-                if single:
-                    continue
-                out[at + n + i, at + n + j] += p
-                out[at + i, at + n + j] += q
-                out[at + n + i, at + j] -= q
-                if extended:
-                    p = -2.0 * om * multiples[h] * matrices[0, i, j]
-                    q = multiples[h] * matrices[1, i, j]
-                    slope += p * x[2 * h - 1, j] + q * x[2 * h, j]
-                    other += p * x[2 * h, j] - q * x[2 * h - 1, j]
-            if extended and not single:
-                out[at + i, last] += slope
-                out[at + n + i, last] += other
-
-
-@kernel()
-def neglected_of_one(force, shape, multiples, omega, matrices, out):
-    """Answer of one DOF to the harmonics of the element forces beyond the basis, into `out` (H + 1, 1).
-
-    force (G, 2 H + 2): spectra along the directions, whose entries are `shape` (G,); multiples (H + 1,): the harmonics
-    beyond, in units of omega; matrices: mass, damping, stiffness (3, 1, 1).
-    """
-    high = multiples.shape[0] - 1
+    rows, n = x.shape
+    high = rows // 2
+    squares = np.zeros(2 * high + 2)
+    for i in range(n):
+        w = weight[i] * weight[i]
+        squares[0] += w * x[0, i] * x[0, i]
+        for h in range(1, high + 1):
+            a, b = x[2 * h - 1, i], x[2 * h, i]
+            squares[h] += w * (a * a + b * b)
+        for h in range(high + 1):
+            a, b = neglected[h, i].real, neglected[h, i].imag
+            squares[high + 1 + h] += w * (a * a + b * b)
+    size = 0.0
     for h in range(high + 1):
-        om = multiples[h] * omega
-        total = 0.0 + 0.0j
-        for g in range(shape.shape[0]):
-            total += 2.0 * shape[g] * force[g, high + 1 + h]
-        block = complex(matrices[2, 0, 0] - om * om * matrices[0, 0, 0], om * matrices[1, 0, 0])
-        out[h, 0] = -total / block if abs(block) > 0.0 else complex(np.inf, np.inf)
-
-
-def evaluated(state: BalanceState) -> tuple[ComplexArray, Array, Array]:
-    """Spectra along all directions, A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P.
-
-    The state gets its displacements and the blocks of A besides. Raises ConvergenceError if a force is not finite.
-    """
-    balance, basis, linear = state.balance, state.basis, state.linear
-    count, size = len(balance.groups), balance.size
-    packed, nodes = state.packed
-    table = np.zeros((3, count, balance.top + 1), dtype=complex)
-    if packed.sampled and not packed.told:
-        laws = balance.coefficients(state.values)[2]
-        for g, (law, motion) in enumerate(zip(laws, state.motions, strict=True)):
-            out = (table[0, g], table[1, g], table[2, g])
-            add_sampled_spectra(law, balance.elements, balance.samples, motion, state.rate, out)
-    pieces = packed.pieces if len(packed.pieces) else None
-    if pieces is not None and ready(evaluate) and not ready(add_pieces):
-        # compiled one after the other, where `evaluate` has been compiled for laws without pieces
-        grid = balance.grid
-        for g, motion in enumerate(state.motions):
-            own = pieces[packed.first[g] : packed.first[g + 1]]
-            add_pieces(motion, own, grid[0], grid[1], table[0, g], table[1, g])
-        pieces = None
-    if isinstance(linear, StructuralMatrices):
-        matrices = linear.matrices
-        blocks = np.empty((basis.harmonics + 1, size, size), dtype=complex)
-    else:
-        matrices, blocks = _NO_MATRICES, np.ascontiguousarray(state.blocks, dtype=complex)
-    motions = np.empty((count, basis.harmonics + 1), dtype=complex)
-    parts, sizes = np.empty((3, *state.x.shape)), np.empty(4)
-    given = (
-        state.x,
-        state.omega,
-        basis.multiples,
-        matrices,
-        blocks,
-        *balance.directions,
-        pieces,
-        packed.first,
-        packed.polynomial,
-        balance.grid,
-        nodes,
-        balance.load(state.values, state.omega),
-        balance.scales()[1],
-    )
-    filled = (table, motions, parts, sizes)
-    known = state.__dict__
-    if packed.told:
-        finite, sampled = evaluate_told(*(*given, *told_steps(packed), *filled))
-        known["_told_nodes"] = int(packed.step_owner[-1]), sampled
-    else:
-        finite = evaluate(*given, *filled)
-    known["motions"], known["blocks"] = motions, blocks
-    if not balance.own:
-        known["nodal"] = []
-    if not finite:
-        _refuse(state)
-    return table, parts, sizes
-
-
-def told_steps(packed: PackedLaws) -> tuple[Any, ...]:
-    """Arctan steps as `evaluate_told` wants them, from `points` to `rule_weights`."""
-    return (*packed.places, packed.steps, packed.step_first, packed.line, *rule_tables())
-
-
-def _refuse(state: BalanceState) -> None:
-    for local in state.local_motions:
-        nodes = uniform_nodes(64) if local.pieces is not None else local.nodes()
-        u, du = kernels.motion(local.motion, nodes.zr, nodes.zi)
-        parts = local.element.tangent(u, state.rate * du, local.coefficients)
-        if not all(np.isfinite(part).all() for part in parts if part is not None):
-            raise ConvergenceError(
-                f"{local.element.label} returned a force that is not finite at omega = {state.omega:.6g} "
-                f"(largest coefficient of the motion {np.abs(state.x).max():.3g})"
-            )
-    raise ConvergenceError(f"the element forces are not finite at omega = {state.omega:.6g}")
-
-
-def structural_jacobian(state: BalanceState, matrices: Array, mean: bool, columns: int = 0) -> Array:
-    """R_X in the integer (mean=True) or the half-odd basis with all harmonics up to H, and the linear part of R_omega
-    if a column is added for it; matrices: M, C, K.
-    """
-    balance, basis, table = state.balance, state.basis, state.spectra_table
-    rows = balance.size * (2 * basis.harmonics + (1 if mean else 2))
-    out = np.zeros((rows, rows + columns))
-    multiples = basis.multiples if mean else basis.half_multiples
-    jacobian(
-        out, table, balance.moving, state.rate, mean, *balance.directions, matrices, multiples, state.omega, state.x
-    )
-    if state.nodal:
-        add_tangent(state.nodal, out, mean, balance.size)
-    return out
-
-
-__all__ = [
-    "add_told",
-    "along_directions",
-    "evaluate",
-    "evaluate_anew",
-    "evaluate_told",
-    "evaluated",
-    "jacobian",
-    "neglected_of_one",
-    "structural_jacobian",
-]
+        size += squares[h]
+    size = math.sqrt(size)
+    out[2 * high + 1] = total = 0.0
+    for h in range(2 * high, -1, -1):
+        total += squares[h + 1]
+        out[h] = math.sqrt(total) / size if size > 0.0 else 0.0
+    return size

@@ -22,7 +22,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from suboctave.harmonic import group_kernels
+from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.system import System
 
@@ -70,7 +70,6 @@ class StructuralMatrices:
         self.size = system.n
         #: M, C, K, shape (3, n, n)
         self.matrices = np.array(system.matrices(self.values), dtype=float)
-        self._mass, self._damping, self._stiffness = self.matrices
         #: the same of one DOF
         self.scalars = tuple(float(matrix[0, 0]) for matrix in self.matrices)
 
@@ -80,7 +79,8 @@ class StructuralMatrices:
 
     def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
-        return _dynamic_stiffness(self._mass, self._damping, self._stiffness, frequency, order)
+        blocks: ComplexArray = dynamic_stiffness(self.matrices[0], self.matrices[1], self.matrices[2], frequency, order)
+        return blocks
 
     def compliance(self, frequency: Array, order: int = 0) -> None:
         """Identity."""
@@ -93,7 +93,8 @@ class StructuralMatrices:
             return None
         zero = np.zeros((self.size, self.size))
         mass, damping, stiffness = (zero if part is None else part for part in parts)
-        return _dynamic_stiffness(mass, damping, stiffness, frequency, order)
+        blocks: ComplexArray = dynamic_stiffness(mass, damping, stiffness, frequency, order)
+        return blocks
 
     def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> None:
         """Identity."""
@@ -105,19 +106,81 @@ class StructuralMatrices:
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """M, C, K of the system."""
-        return self._mass, self._damping, self._stiffness
+        mass, damping, stiffness = self.matrices
+        return mass, damping, stiffness
 
     def expand(self, direction: Array) -> Array:
         """The unknowns are the DOFs of the equation of motion."""
         return direction
 
 
-def _dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, frequency: Array, order: int) -> ComplexArray:
-    blocks: ComplexArray = group_kernels.dynamic_stiffness(mass, damping, stiffness, frequency, order)
-    return blocks
-
-
 def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
     """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
-    result: Array = group_kernels.apply_blocks(np.ascontiguousarray(blocks, dtype=complex), np.ascontiguousarray(x))
+    result = np.empty(x.shape)
+    multiply_blocks(np.ascontiguousarray(blocks, dtype=complex), np.ascontiguousarray(x), result)
     return result
+
+
+@kernel()
+def dynamic_stiffness(mass, damping, stiffness, frequency, order):
+    """`K - Omega^2 M + i Omega C` at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
+    n = mass.shape[0]
+    out = np.empty((frequency.shape[0], n, n), dtype=np.complex128)
+    for f in range(frequency.shape[0]):
+        om = frequency[f]
+        for i in range(n):
+            for j in range(n):
+                if order == 0:
+                    out[f, i, j] = complex(stiffness[i, j] - om * om * mass[i, j], om * damping[i, j])
+                elif order == 1:
+                    out[f, i, j] = complex(-2.0 * om * mass[i, j], damping[i, j])
+                else:
+                    out[f, i, j] = complex(-2.0 * mass[i, j], 0.0)
+    return out
+
+
+@kernel()
+def multiply_blocks(blocks, x, out):
+    """Complex matrices per harmonic (H + 1, n, n) times real coefficients, into `out` (2 H + 1, n)."""
+    n = x.shape[1]
+    for h in range(blocks.shape[0]):
+        for i in range(n):
+            re = 0.0
+            im = 0.0
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                # amplitude a - i b of a cos + b sin
+                a = x[0, j] if h == 0 else x[2 * h - 1, j]
+                b = 0.0 if h == 0 else -x[2 * h, j]
+                re += p * a - q * b
+                im += p * b + q * a
+            if h == 0:
+                out[0, i] = re
+            else:
+                out[2 * h - 1, i] = re
+                out[2 * h, i] = -im
+
+
+@kernel()
+def add_linear(out, blocks, mean):
+    """Add complex blocks (h, n, n), one per harmonic, to the block diagonal of a real matrix of the sine/cosine basis.
+
+    A complex amplitude `a - i b` stands for `a cos + b sin`: the block of a matrix `P + i Q` is [[P, Q], [-Q, P]].
+    """
+    n = blocks.shape[1]
+    for h in range(blocks.shape[0]):
+        if mean and h == 0:
+            for i in range(n):
+                for j in range(n):
+                    out[i, j] += blocks[0, i, j].real
+            continue
+        at = (2 * h - 1 if mean else 2 * h) * n
+        for i in range(n):
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                out[at + i, at + j] += p
+                out[at + n + i, at + n + j] += p
+                out[at + i, at + n + j] += q
+                out[at + n + i, at + j] -= q

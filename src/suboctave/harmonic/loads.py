@@ -30,8 +30,6 @@ class LoadSpectrum:
                     f"a load at {component.harmonic} omega needs harmonics={component.harmonic} or more, "
                     f"the basis ends at {basis.harmonics / basis.nu:g} omega"
                 )
-            if component.harmonic * basis.nu in basis.left_out:
-                raise InputError(f"the basis leaves out the load's harmonic at {component.harmonic} omega")
 
     def value(self, values: Mapping[str, float], size: int, names: tuple[str, ...] = ()) -> Array:
         """Coefficients (2 H + 1, size), differentiated by each of `names` (at most two; "omega" is one of them)."""
@@ -53,15 +51,6 @@ class LoadSpectrum:
                 if wave.imag != 0.0:
                     result[2 * k] -= wave.imag * shape
         return result
-
-    def constant_rate(self, name: str, size: int) -> Array | None:
-        """The derivative by a parameter (2 H + 1, size), None if it depends on parameters or omega."""
-        for component, _ in self.components:
-            turned = name in component.phase.names
-            touched = name in component.amplitude.names
-            if turned or (touched and not (component.phase.constant and component.amplitude.derivative(name).constant)):
-                return None
-        return self.value({}, size, (name,))
 
 
 def _unit(component, values: Mapping[str, float]) -> complex:

@@ -1,20 +1,20 @@
-"""A solved periodic motion, as data."""
+"""A solved periodic motion, as data, and the forces of single elements along it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from suboctave.errors import InputError, shortened
-from suboctave.harmonic import instants
-from suboctave.harmonic.balance import HarmonicBalance
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex
-from suboctave.harmonic.selection import AdaptiveHarmonics
-from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.trigonometric import motion, peak
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.system import System
 
 #: share of a motion that its sub-harmonics may have where it repeats earlier
@@ -141,7 +141,7 @@ class PeriodicOrbit:
         return math.sqrt(c[0].real ** 2 + 0.5 * float(np.sum(np.abs(c[1:]) ** 2)))
 
     def _peak(self, c: ComplexArray) -> float:
-        return float(instants.peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0])
+        return float(peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0])
 
     def start(self) -> Array:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""
@@ -161,9 +161,28 @@ class PeriodicOrbit:
 
     def __repr__(self) -> str:
         period = "" if self.basis.nu == 1 else f", {self.basis.nu}T"
-        kept = self.basis.kept
-        harmonics = str(self.basis.harmonics) if kept is None else f"{len(kept) - 1} of {self.basis.harmonics}"
         return (
-            f"PeriodicOrbit(omega={self.omega:.8g}, harmonics={harmonics}{period}, "
+            f"PeriodicOrbit(omega={self.omega:.8g}, harmonics={self.basis.harmonics}{period}, "
             f"residual={self.residual:.1e}, truncation={self.truncation:.1e})"
         )
+
+
+def force_along(state: BalanceState, element: int) -> Callable[[Array], Array]:
+    """The force f of an element as a function of instants `tau = omega t / nu` (m,), values (m,).
+
+    Of its law, not of a truncated series of the force.
+    """
+    local = state.local(element)
+    law, moving = as_coupled(local.element), local.element.depends_on_velocity
+
+    def force(tau: Array) -> Array:
+        zr, zi = np.cos(tau), np.sin(tau)
+        values = [motion(one, zr, zi) for one in local.motions]
+        q = [u for u, _ in values]
+        if moving:
+            q += [state.rate * du for _, du in values]
+        theta = np.mod(state.basis.nu * tau, 2.0 * math.pi)
+        result: Array = law.tangent(np.array(q), theta, local.coefficients)[0]
+        return result
+
+    return force

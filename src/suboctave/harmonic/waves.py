@@ -2,19 +2,30 @@
 
 A perturbation with the motion's period lives on whole f, one of twice the period on half-odd ones, one with Floquet
 exponent `i kappa` on `m + kappa / w0`. Products of them live on sums of their frequencies, so that the second and third
-derivatives of the equations take waves in and give waves out, whatever the shifts (`harmonic.third`).
+derivatives of the equations take waves in and give waves out, whatever the shifts (`harmonic.derivatives`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
 
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.state import BalanceState
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.trigonometric import spectra
+
+__all__ = ["Frequencies", "Kind", "Waves", "along_basis", "fourier"]
+
+
+class Kind(Enum):
+    """Which shift of the frequencies: none, half the base frequency, or any."""
+
+    INTEGER = 0
+    HALF = 1
+    FREE = 2
 
 
 @dataclass(frozen=True)
@@ -46,17 +57,13 @@ class Waves:
     at: Frequencies
 
     @classmethod
-    def of(cls, state: BalanceState, kind: Kind, vector: np.ndarray, kappa: float = 0.0) -> Waves:
-        """A vector of the basis of J_kappa: real coefficients of cosines and sines, or complex amplitudes."""
+    def of(cls, state: BalanceState, kind: Kind, vector: np.ndarray, kappa: float = 0.0, left: bool = False) -> Waves:
+        """A vector of the basis of J_kappa: real coefficients of cosines and sines, or complex amplitudes.
+
+        Left vectors are scaled such that `left^H J_kappa right` is the same number in both notations.
+        """
         shaped = np.asarray(vector).reshape(-1, state.balance.size)
-        at = Frequencies.of(state, kind, kappa)
-        if kind is Kind.FREE:
-            return cls(shaped.astype(complex), at)
-        if kind is Kind.HALF:
-            positive = 0.5 * (shaped[::2] - 1j * shaped[1::2])
-            return cls(np.concatenate((positive[::-1].conj(), positive)), at)
-        positive = 0.5 * (shaped[1::2] - 1j * shaped[2::2])
-        return cls(np.concatenate((positive[::-1].conj(), shaped[:1].astype(complex), positive)), at)
+        return cls(as_waves(shaped, kind, left), Frequencies.of(state, kind, kappa))
 
     @cached_property
     def conjugate(self) -> Waves:
@@ -73,12 +80,43 @@ class Waves:
         if kind is Kind.FREE:
             return self.amplitudes.ravel()
         middle = self.at.count // 2
-        if kind is Kind.HALF:
-            positive = 2.0 * self.amplitudes[middle:]
-            out = np.empty((2 * len(positive), positive.shape[1]))
-            out[::2], out[1::2] = positive.real, -positive.imag
-            return out.ravel()
-        positive = 2.0 * self.amplitudes[middle + 1 :]
-        out = np.empty((2 * len(positive) + 1, positive.shape[1]))
-        out[0], out[1::2], out[2::2] = self.amplitudes[middle].real, positive.real, -positive.imag
-        return out.ravel()
+        positive = 2.0 * self.amplitudes[middle + (kind is Kind.INTEGER) :]
+        rows = np.empty((2 * len(positive), positive.shape[1]))
+        rows[::2], rows[1::2] = positive.real, -positive.imag
+        if kind is Kind.INTEGER:
+            rows = np.concatenate((self.amplitudes[middle : middle + 1].real, rows))
+        return rows.ravel()
+
+
+def as_waves(shaped: np.ndarray, kind: Kind, left: bool) -> ComplexArray:
+    """Amplitudes (F, size) of rows of the operator's basis, frequencies ascending."""
+    if kind is Kind.FREE:
+        return shaped.astype(complex)
+    scale = 1.0 if left else 0.5
+    if kind is Kind.HALF:
+        positive = scale * (shaped[::2] - 1j * shaped[1::2])
+        return np.concatenate((positive[::-1].conj(), positive))
+    positive = scale * (shaped[1::2] - 1j * shaped[2::2])
+    return np.concatenate((positive[::-1].conj(), shaped[:1].astype(complex), positive))
+
+
+def fourier(values: np.ndarray, weights: Array, zr: Array, zi: Array, top: int) -> ComplexArray:
+    """`1/(2 pi) sum_j weights_j values[.., j] z_j^-k`, k = 0 .. top, of complex functions (R, N) at instants."""
+    if not np.iscomplexobj(values):
+        real: ComplexArray = spectra(np.ascontiguousarray(values), weights, zr, zi, top)
+        return real
+    both = spectra(np.concatenate((values.real, values.imag)), weights, zr, zi, top)
+    whole: ComplexArray = both[: len(values)] + 1j * both[len(values) :]
+    return whole
+
+
+def along_basis(values: np.ndarray, weights: Array, zr: Array, zi: Array, high: int) -> np.ndarray:
+    """`mean(g phi_k)` for phi_k = 1, cos tau, sin tau, .. up to H of functions (R, N) at instants: (R, 2 H + 1)."""
+    parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
+    found = []
+    for part in parts:
+        s = spectra(np.ascontiguousarray(part), weights, zr, zi, high)
+        rows = np.empty((len(part), 2 * high + 1))
+        rows[:, 0], rows[:, 1::2], rows[:, 2::2] = s[:, 0].real, s[:, 1:].real, -s[:, 1:].imag
+        found.append(rows)
+    return found[0] + 1j * found[1] if len(found) > 1 else found[0]

@@ -5,18 +5,15 @@ A room without any method: nothing here knows of harmonics of the response, of s
 
 from __future__ import annotations
 
-from suboctave.model.callable_element import Callable
-from suboctave.model.clearance import Clearance, Freeplay
-from suboctave.model.coupled import CoupledElement
-from suboctave.model.dampers import QuadraticDamper, TanhFriction
-from suboctave.model.derivative_check import DerivativeReport, check_derivatives
-from suboctave.model.element import Element
-from suboctave.model.excitations import BaseAcceleration, BaseDisplacement, Gravity, RotatingUnbalance, StaticLoad
-from suboctave.model.expression import Coefficient, coefficient
-from suboctave.model.expression_element import Expression
-from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
-from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
-from suboctave.model.sampling import (
+from suboctave.model import library
+from suboctave.model.elements.base import Element
+from suboctave.model.elements.callable import Callable
+from suboctave.model.elements.clearance import Clearance, Freeplay
+from suboctave.model.elements.coupled import CoupledElement
+from suboctave.model.elements.dampers import QuadraticDamper, TanhFriction
+from suboctave.model.elements.derivative_check import DerivativeReport, check_derivatives
+from suboctave.model.elements.expression import Expression
+from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     CornerSampling,
     Piece,
@@ -25,8 +22,20 @@ from suboctave.model.sampling import (
     SharpSampling,
     SharpVelocitySampling,
 )
-from suboctave.model.springs import CubicSpring, PolynomialSpring
-from suboctave.model.stops import ElasticStop
+from suboctave.model.elements.springs import CubicSpring, PolynomialSpring
+from suboctave.model.elements.stops import ElasticStop
+from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.loads import (
+    BaseAcceleration,
+    BaseDisplacement,
+    Gravity,
+    HarmonicLoad,
+    Load,
+    LoadComponent,
+    RotatingUnbalance,
+    StaticLoad,
+)
+from suboctave.model.matrices import MatrixCoefficient, matrix_coefficient
 from suboctave.model.system import System
 
 __all__ = [
@@ -62,5 +71,6 @@ __all__ = [
     "TanhFriction",
     "check_derivatives",
     "coefficient",
+    "library",
     "matrix_coefficient",
 ]

@@ -1,9 +1,10 @@
-"""A system as plain data, and back, bit for bit: `describe(system)` and `build(description)`.
+"""Elements and loads as plain data, and back, bit for bit.
 
-The description is what JSON can hold: numbers, texts, lists, mappings. Elements and loads are `{"type": name, argument:
-value, ...}` with the arguments they were made with; matrices keep their numbers and their expressions apart, as the
-system does. Floating-point numbers survive JSON unchanged. Large arrays may be kept outside, in a mapping that the
-caller provides.
+A part is written as `{"type": name, argument: value, ...}` with the arguments that it was made with, which a class that
+derives from `Recorded` keeps by itself. Such a class is known by name as soon as it is defined: elements and loads of
+the package by their plain names ("CubicSpring"), those of a user as "module:Class". Plain data are what JSON can hold:
+numbers, texts, lists, mappings; floating-point numbers survive JSON unchanged. Large arrays may be kept outside, in a
+mapping that the caller provides.
 
 Nothing that a description says is executed. A user's own class is found if it is already defined in this process;
 modules are imported, and Python functions looked up, only with `allow_code=True`.
@@ -11,48 +12,100 @@ modules are imported, and Python functions looked up, only with `allow_code=True
 
 from __future__ import annotations
 
+import copy
 import importlib
+import inspect
 import math
 import numbers
 from collections.abc import Mapping, MutableMapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from suboctave.errors import InputError, suggest
-from suboctave.model.expression import Coefficient, coefficient
-from suboctave.model.mass_check import check_mass
-from suboctave.model.matrix import MatrixCoefficient
-from suboctave.model.recorded import Recorded, constructor_arguments, known_kinds, type_name
-from suboctave.model.system import System, _assemble, _read_dof_names, _read_parameters
+from suboctave.errors import InputError, located, suggest
+from suboctave.model.expressions.coefficients import Coefficient, coefficient
 
-__all__ = ["build", "build_part", "describe", "describe_part", "plain_value"]
+__all__ = [
+    "Arrays",
+    "Recorded",
+    "build_part",
+    "describe_part",
+    "from_plain",
+    "known_kinds",
+    "plain_number",
+    "plain_value",
+]
 
 Arrays = MutableMapping[str, np.ndarray]
+_PACKAGE = "suboctave."
+_KNOWN: dict[str, type[Recorded]] = {}
 #: entries from which on an array is kept outside the description, where there is an outside
 _LARGE = 64
 #: keys that say what a mapping stands for
 _MARKS = frozenset({"float", "expression", "array", "stored", "sparse", "mapping", "callable", "type"})
 _DTYPES = ("|b1", *(f"{order}{kind}{size}" for order in "<>|" for kind in "iuf" for size in (1, 2, 4, 8)))
-_MATRICES = ("mass", "damping", "stiffness")
 _NO_CODE = "it names Python code, which is used only if you allow it (allow_code=True, or --allow-code)"
 
 
-def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
-    """The system as plain data; large arrays go into `arrays` under names of their own, if that is given.
+class Recorded:
+    """Keeps the constructor's arguments by name in `arguments`.
 
-    Raises InputError where an argument cannot be written down (a function without a name that can be imported).
+    `family` says what a class is to a system ("element", "load"); it is set by the class that roots the family.
     """
+
+    family: ClassVar[str] = ""
+    arguments: Mapping[str, Any]
+
+    def __init_subclass__(cls, family: str = "", **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if family:
+            cls.family = family
+        _KNOWN[type_name(cls)] = cls
+
+    def __new__(cls, *positional: Any, **named: Any) -> Any:
+        made = super().__new__(cls)
+        try:
+            bound = _signature(cls).bind(made, *positional, **named)
+        except TypeError:  # unpickling passes none; what is really wrong is refused by __init__
+            return made
+        given = {name: _kept(value) for name, value in list(bound.arguments.items())[1:]}
+        for parameter in _signature(cls).parameters.values():
+            if parameter.kind is parameter.VAR_KEYWORD:
+                given |= given.pop(parameter.name, {})
+        made.arguments = given
+        return made
+
+
+def type_name(cls: type) -> str:
+    """How a class is called in files: "CubicSpring", or "module:Class" for one of a user's."""
+    return cls.__name__ if cls.__module__.startswith(_PACKAGE) else f"{cls.__module__}:{cls.__qualname__}"
+
+
+def known_kinds(family: str) -> dict[str, type[Recorded]]:
+    """The concrete classes of a family ("element", "load") that have been defined so far, by name."""
     return {
-        "name": system.name,
-        "dof_names": list(system.dof_names),
-        **{what: _matrix(getattr(system, what), arrays) for what in _MATRICES},
-        "elements": [describe_part(element, arrays) for element in system.elements],
-        "loads": [describe_part(load, arrays) for load in system.loads],
-        "parameters": dict(system.parameters),
+        name: cls
+        for name, cls in _KNOWN.items()
+        if cls.family == family and not inspect.isabstract(cls) and not cls.__name__.startswith("_")
     }
 
 
+def constructor_arguments(cls: type) -> list[str]:
+    """The names of the arguments that a class takes."""
+    kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    return [p.name for p in list(_signature(cls).parameters.values())[1:] if p.kind not in kinds]
+
+
+def _signature(cls: type) -> inspect.Signature:
+    return inspect.signature(cls.__init__)  # type: ignore[misc]
+
+
+def _kept(value: Any) -> Any:
+    """A value that later changes to a list or an array cannot reach."""
+    return copy.deepcopy(value) if isinstance(value, list | dict | np.ndarray | tuple) else value
+
+
+# ------------------------------------------------------------------------------------------------------------- parts
 def describe_part(part: Any, arrays: Arrays | None = None) -> dict[str, Any]:
     """An element or load as `{"type": name, argument: value, ...}`."""
     kind = type(part)
@@ -67,35 +120,6 @@ def describe_part(part: Any, arrays: Arrays | None = None) -> dict[str, Any]:
         raise InputError(f"{part!r}: {error}") from None
 
 
-def build(
-    description: Mapping[str, Any], arrays: Mapping[str, np.ndarray] | None = None, allow_code: bool = False
-) -> System:
-    """The system of a description that `describe` made.
-
-    Raises InputError where the description is not one, or names a class that is not known (see `allow_code` above).
-    """
-    try:
-        mass, damping, stiffness = (_read_matrix(description[what], what, arrays or {}) for what in _MATRICES)
-        elements, loads = (
-            tuple(build_part(item, family, arrays or {}, allow_code) for item in description[f"{family}s"])
-            for family in ("element", "load")
-        )
-        parameters, name = description["parameters"], str(description["name"])
-        dof_names = _read_dof_names(description["dof_names"], mass.n)
-    except InputError:
-        raise
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
-    if not mass.n == damping.n == stiffness.n:
-        raise InputError("this is not the description of a system: its matrices have different sizes")
-    read = _read_parameters(parameters)
-    system = _assemble(mass, damping, stiffness, elements, loads, read, name, dof_names)
-    system._check_names()
-    system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
-    check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))
-    return system
-
-
 def build_part(
     item: Mapping[str, Any],
     family: str,
@@ -108,11 +132,12 @@ def build_part(
     given = dict(item)
     if "type" not in given:
         raise InputError(f"the {family} has no type{suggest('', known_kinds(family))}")
-    kind = _kind(given.pop("type"), family, allow_code)
+    with located("type"):
+        kind = _kind(given.pop("type"), family, allow_code)
     known = constructor_arguments(kind)
     for name in given:
         if name not in known:
-            raise InputError(f"{kind.__name__} has no argument {name!r}{suggest(str(name), known)}")
+            raise InputError(f"{kind.__name__} has no argument {name!r}{suggest(str(name), known)}", (name,))
     try:
         return kind(**{name: from_plain(value, arrays or {}, allow_code) for name, value in given.items()})
     except InputError:
@@ -146,15 +171,28 @@ def _import(module: str) -> Any:
 
 
 # ------------------------------------------------------------------------------------------------------------ values
-def plain_value(value: Any, arrays: Arrays | None = None) -> Any:
-    """An argument as plain data."""
+def plain_number(value: Any) -> Any:
+    """A number, text, truth value or None as JSON holds it, `{"float": "inf"}` and the like for what it cannot hold.
+
+    NotImplemented for anything else.
+    """
     if value is None or isinstance(value, bool | str):
         return value
+    if isinstance(value, np.bool_):
+        return bool(value)
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real):
         number = float(value)
         return number if math.isfinite(number) else {"float": repr(number)}
+    return NotImplemented
+
+
+def plain_value(value: Any, arrays: Arrays | None = None) -> Any:
+    """An argument as plain data."""
+    number = plain_number(value)
+    if number is not NotImplemented:
+        return number
     if isinstance(value, Coefficient):
         return {"expression": value.text, "by": list(value.by)} if value.by else {"expression": value.text}
     if isinstance(value, np.ndarray):
@@ -185,7 +223,7 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
         case {"float": "inf" | "-inf" | "nan" as text}:
             return float(text)
         case {"expression": str()}:
-            return _expression(value)
+            return read_expression(value)
         case {"array": _, "dtype": _, "shape": _} | {"stored": str()}:
             return _read_array(value, arrays)
         case {"sparse": Mapping()}:
@@ -203,7 +241,7 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
     }
 
 
-def _expression(value: Mapping[str, Any]) -> Coefficient:
+def read_expression(value: Mapping[str, Any]) -> Coefficient:
     result = coefficient(value["expression"])
     for name in value.get("by", ()):
         result = result.derivative(name)
@@ -212,12 +250,12 @@ def _expression(value: Mapping[str, Any]) -> Coefficient:
 
 def _place_of(function: Any) -> str:
     module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", None)
-    found: Any = None
+    there: Any = None
     if module and name and "<" not in name:
-        found = importlib.import_module(module)
+        there = importlib.import_module(module)
         for part in name.split("."):
-            found = getattr(found, part, None)
-    if found is not function:
+            there = getattr(there, part, None)
+    if there is not function:
         raise InputError(f"cannot be written down: {function!r} is no function at the top of a module")
     return f"{module}:{name}"
 
@@ -228,31 +266,12 @@ def _callable(place: str, allow_code: bool) -> Any:
         raise InputError(f"write a Python function as 'module:function', not {place!r}")
     if not allow_code:
         raise InputError(f"the function {place!r} is not called: {_NO_CODE}")
-    found = _import(module)
+    item = _import(module)
     for part in name.split("."):
-        if not hasattr(found, part):
-            raise InputError(f"the module {module!r} has no {name!r}{suggest(name, dir(found), 4)}")
-        found = getattr(found, part)
-    return found
-
-
-# ---------------------------------------------------------------------------------------------------------- matrices
-def _matrix(matrix: MatrixCoefficient, arrays: Arrays | None) -> dict[str, Any]:
-    return {
-        "base": plain_value(matrix._base, arrays),
-        "terms": [[plain_value(c), plain_value(pattern, arrays)] for c, pattern in matrix._terms],
-    }
-
-
-def _read_matrix(description: Mapping[str, Any], what: str, arrays: Mapping[str, np.ndarray]) -> MatrixCoefficient:
-    base = from_plain(description["base"], arrays)
-    terms = [(_expression(c), from_plain(pattern, arrays)) for c, pattern in description["terms"]]
-    shapes = {matrix.shape for matrix in (base, *(pattern for _, pattern in terms))}
-    if len(shapes) != 1 or len(base.shape) != 2 or base.shape[0] != base.shape[1]:
-        raise InputError(f"this is not the description of a system: {what} has shapes {sorted(shapes)}")
-    if not hasattr(base, "tocsr"):
-        base.setflags(write=False)
-    return MatrixCoefficient(base, terms, what)
+        if not hasattr(item, part):
+            raise InputError(f"the module {module!r} has no {name!r}{suggest(name, dir(item), 4)}")
+        item = getattr(item, part)
+    return item
 
 
 def _plain_array(array: np.ndarray, arrays: Arrays | None) -> Any:

@@ -10,24 +10,39 @@ elements along that direction, as if made by hand (`CubicSpring`, `ElasticStop`,
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import sympy
+from sympy.simplify.fu import TR8
 
-from suboctave.errors import InputError, suggest
-from suboctave.model.element import BaseElement
-from suboctave.model.equation_forces import Forces
-from suboctave.model.expression import RESERVED
-from suboctave.model.law_code import expanded_size, harmonic_of
-from suboctave.model.law_syntax import LONGEST, PRIME, corner_functions, read, symbol
-from suboctave.model.law_text import as_text
+from suboctave.errors import InputError, located, suggest
+from suboctave.model.elements.base import BaseElement
+from suboctave.model.elements.expression import Expression
+from suboctave.model.elements.springs import CubicSpring, PolynomialSpring
+from suboctave.model.elements.stops import ElasticStop
+from suboctave.model.expressions.code import as_text
+from suboctave.model.expressions.coefficients import coefficient
+from suboctave.model.expressions.derivatives import (
+    CORNER_FUNCTIONS,
+    Modulus,
+    Ramp,
+    Step,
+    expanded_size,
+    force_expression,
+    number,
+    symbol,
+)
+from suboctave.model.expressions.law import harmonic_of
+from suboctave.model.expressions.reader import LONGEST, PRIME, RESERVED
 from suboctave.model.loads import HarmonicLoad, Load
 
 __all__ = ["parts_of"]
 
-_MOST_TERMS = 500
+_HIGHEST_POWER, _MOST_TERMS = 30, 500
 
 
 def parts_of(equations: str | Sequence[str], parameters: Mapping[str, float]) -> dict[str, Any]:
@@ -55,24 +70,24 @@ class _Equations:
 
     def _find_names(self) -> list[str]:
         """The degrees of freedom, in the order in which their accelerations appear."""
-        found: list[str] = []
+        names: list[str] = []
         for text in self.texts:
             for name in re.findall(r"([^\W\d]\w*)''(?!')", text):
-                if name not in found:
-                    found.append(name)
-        if not found:
+                if name not in names:
+                    names.append(name)
+        if not names:
             raise InputError("no second derivative such as x'' occurs in the equations: nothing has a mass")
-        if len(found) != len(self.texts):
-            listed = ", ".join(f"{name}''" for name in found)
+        if len(names) != len(self.texts):
+            listed = ", ".join(f"{name}''" for name in names)
             raise InputError(
-                f"{len(self.texts)} equations for {len(found)} accelerations ({listed}); give one for each"
+                f"{len(self.texts)} equations for {len(names)} accelerations ({listed}); give one for each"
             )
-        for name in found:
+        for name in names:
             if name in self.parameters:
                 raise InputError(f"{name!r} is both a parameter and a degree of freedom ({name}'' occurs)")
             if name in RESERVED:
                 raise InputError(f"{name!r} cannot name a degree of freedom: it already has a meaning in expressions")
-        return found
+        return names
 
     def where(self, i: int) -> str:
         return f"equation {i + 1}" if self.n > 1 else "the equation"
@@ -88,15 +103,17 @@ class _Equations:
             if name not in self.names and not self.texts[i].count(name + "''"):
                 hint = suggest(name, self.names)
                 raise InputError(f"{self.where(i)}: {name}' occurs, but no equation has {name}''{hint}")
-        import sympy
-
-        parts = [read(" " * (len(sides[0]) + 1) * k + side, self.where(i), known) for k, side in enumerate(sides)]
-        whole = parts[0] - (parts[1] if len(parts) > 1 else 0)
-        return whole.replace(sympy.Abs, corner_functions().Modulus)
+        parts = [
+            force_expression(" " * (len(sides[0]) + 1) * k + side, self.where(i), known) for k, side in enumerate(sides)
+        ]
+        return parts[0] - (parts[1] if len(parts) > 1 else 0)
 
     # ------------------------------------------------------------------------------------------------------ sorting
     def parts(self) -> dict[str, Any]:
-        equations = [self._read(i) for i in range(self.n)]
+        equations = []
+        for i in range(self.n):
+            with located("equations", i):
+                equations.append(self._read(i))
         mass = [[equation.diff(a) for a in self.a] for equation in equations]
         for i, row in enumerate(mass):
             for a, entry in zip(self.a, row, strict=True):
@@ -114,7 +131,7 @@ class _Equations:
         self.stiffness: list[list[Any]] = [[0] * self.n for _ in range(self.n)]
         self.waves: list[list[tuple[str, int, str]]] = [[] for _ in range(self.n)]
         self.static: list[Any] = [0] * self.n
-        self.forces = Forces(self.names, self.where, self.parameters)
+        self.forces = _Forces(self.names, self.parameters)
         for i, equation in enumerate(equations):
             for term in self._terms(equation):
                 self._sort(i, term)
@@ -122,7 +139,7 @@ class _Equations:
             "mass": _matrix(mass),
             "damping": _matrix(self.damping),
             "stiffness": _matrix(self.stiffness),
-            "elements": self._elements(),
+            "elements": self.forces.elements({*self.parameters, *self.names}),
             "loads": self._loads(),
             "dof_names": tuple(self.names),
         }
@@ -147,8 +164,6 @@ class _Equations:
 
     def _terms(self, expression: Any) -> Iterable[Any]:
         """Additive terms, as they are written but where that hides linear ones."""
-        import sympy
-
         for term in sympy.Add.make_args(expression):
             if self._affine(term) or expanded_size(term) > _MOST_TERMS:
                 yield term
@@ -164,15 +179,11 @@ class _Equations:
         inside = term.free_symbols.intersection(self.states)
         if not inside:
             return True
-        corner = corner_functions()
-        kinds = (corner.Ramp, corner.Step, corner.Modulus, corner.Sign)
-        if any(atom.free_symbols.intersection(self.states) for atom in term.atoms(*kinds)):
+        if any(atom.free_symbols & self.states for atom in term.atoms(*CORNER_FUNCTIONS)):
             return False
         return not any(term.diff(s).free_symbols.intersection(self.states) for s in inside)
 
     def _sort(self, i: int, term: Any) -> None:
-        import sympy
-
         inside = sorted(term.free_symbols.intersection(self.states), key=str)
         if not inside:
             self._load(i, term)
@@ -206,21 +217,18 @@ class _Equations:
 
     def _without_modulus(self, term: Any) -> tuple[Any, Any] | None:
         """`k |a|` as `2 k max(a, 0) - k a` where `a` is linear in the displacements: a stop and a spring."""
-        corner = corner_functions()
-        atoms = [atom for atom in term.atoms(corner.Modulus) if atom.free_symbols & self.states]
+        atoms = [atom for atom in term.atoms(Modulus) if atom.free_symbols & self.states]
         if len(atoms) != 1:
             return None
         argument = atoms[0].args[0]
         factor = term / atoms[0]
         if factor.free_symbols & {*self.states, self.t} or argument.free_symbols & {*self.v, self.t}:
             return None
-        return (2 * factor * corner.Ramp(argument), -factor * argument) if self._affine(argument) else None
+        return (2 * factor * Ramp(argument), -factor * argument) if self._affine(argument) else None
 
     # -------------------------------------------------------------------------------------------------------- loads
     def _load(self, i: int, term: Any, reduced: bool = False) -> None:
         """A term without state, on the right-hand side with the opposite sign."""
-        import sympy
-
         for part in sympy.Add.make_args(sympy.expand(term)):
             if self.t not in part.free_symbols:
                 if self.omega in part.free_symbols:
@@ -236,8 +244,6 @@ class _Equations:
                     self._wave(i, -part / waves[0], waves[0], multiple)
                     continue
             elif not reduced:
-                from sympy.simplify.fu import TR8
-
                 turned = sympy.expand(TR8(part))  # products of waves to sums
                 if turned != part:
                     self._load(i, turned, True)
@@ -248,8 +254,6 @@ class _Equations:
             )
 
     def _wave(self, i: int, amplitude: Any, wave: Any, multiple: int) -> None:
-        import sympy
-
         phase = wave.args[0].subs(self.t, 0)
         sine = type(wave).__name__ == "sin"
         if multiple < 0:
@@ -257,38 +261,238 @@ class _Equations:
             amplitude = -amplitude if sine else amplitude
         if sine:
             phase = phase - sympy.pi / 2
-        self.waves[i].append(
-            (as_text(amplitude), multiple, "-pi/2" if sine and phase == -sympy.pi / 2 else as_text(phase))
-        )
+        self.waves[i].append((as_text(amplitude), multiple, as_text(phase)))
 
     def _loads(self) -> list[Load]:
         loads: list[Load] = []
         for i, (waves, static) in enumerate(zip(self.waves, self.static, strict=True)):
             if not waves and static == 0:
                 continue
-            listed = waves or [("0", 0, "0")]
-            loads.append(
-                HarmonicLoad(
-                    dof=i,
-                    amplitude=[amplitude for amplitude, _, _ in listed],
-                    harmonic=[multiple for _, multiple, _ in listed],
-                    phase=[phase for _, _, phase in listed],
-                    static=as_text(static) if static != 0 else 0.0,
-                )
-            )
+            amplitudes, harmonics, phases = map(list, zip(*(waves or [("0", 0, "0")]), strict=True))
+            loads.append(HarmonicLoad(i, amplitudes, harmonics, phases, as_text(static) if static != 0 else 0.0))
         return loads
-
-    def _elements(self) -> list[BaseElement]:
-        return self.forces.elements({*self.parameters, *self.names})
 
 
 def _matrix(entries: list[list[Any]]) -> Any:
     """Entries as numbers and texts; a matrix of one entry as that."""
-    read = [[_entry(entry) for entry in row] for row in entries]
+    read = [
+        [as_text(entry) if getattr(entry, "free_symbols", ()) else float(entry) for entry in row] for row in entries
+    ]
     return read[0][0] if len(read) == 1 else read
 
 
-def _entry(entry: Any) -> float | str:
-    if isinstance(entry, int):
-        return float(entry)
-    return as_text(entry) if entry.free_symbols else float(entry)
+# ------------------------------------------------------------------------------------------------------------ forces
+class _Forces:
+    """Collects the terms of all equations that are no part of the linear structure.
+
+    A term that depends on a single combination `d . x` (and its rate) is kept with its place in each equation; the
+    vector of those places says along which direction it acts.
+    """
+
+    def __init__(self, names: list[str], parameters: Mapping[str, float]) -> None:
+        self.names, self.parameters = names, parameters
+        self.n = len(names)
+        self.x = [symbol(name) for name in names]
+        self.v = [symbol(name + PRIME) for name in names]
+        self.u, self.rate = symbol("(input)"), symbol("(input)" + PRIME)
+        #: law in u and its rate, direction: in which equations it stands
+        self.along: dict[tuple[Any, tuple[float, ...]], np.ndarray] = {}
+        self.several: list[tuple[int, Any]] = []
+
+    def add(self, i: int, term: Any) -> None:
+        """A term of the left-hand side of equation i."""
+        direction = self._direction(term)
+        if direction is None:
+            self.several.append((i, term))
+            return
+        first = next(j for j, entry in enumerate(direction) if entry)
+        swaps = {self.x[first]: self.u, self.v[first]: self.rate}
+        swaps |= {s[j]: 0 * self.u for s in (self.x, self.v) for j in range(self.n) if j != first}
+        factor, law = term.xreplace(swaps).as_coeff_Mul()
+        key = (law, tuple(direction))
+        self.along.setdefault(key, np.zeros(self.n))[i] += float(factor)
+
+    def _direction(self, term: Any) -> list[float] | None:
+        """d, its first entry 1, if the term depends on `d . x` and `d . x'` alone."""
+        inside = [j for j in range(self.n) if term.free_symbols & {self.x[j], self.v[j]}]
+        direction = [0.0] * self.n
+        direction[inside[0]] = 1.0
+        for states in (self.x, self.v):
+            slopes = [term.diff(states[j]) for j in inside]
+            if slopes[0] == 0:
+                if any(slope != 0 for slope in slopes[1:]):
+                    return None
+                continue
+            for j, slope in zip(inside[1:], slopes[1:], strict=True):
+                ratio = sympy.cancel(slope / slopes[0]) if expanded_size(slope) < _MOST_TERMS else slope / slopes[0]
+                factor = _real(ratio)
+                if factor is None or direction[j] not in (0.0, factor):
+                    return None
+                direction[j] = factor
+        return direction if all(direction[j] for j in inside) else None
+
+    # ----------------------------------------------------------------------------------------------------- elements
+    def elements(self, taken: set[str]) -> list[BaseElement]:
+        """Everything that was collected; `taken` are names that are in use."""
+        made: list[BaseElement] = []
+        smooth: dict[tuple[tuple[float, ...], tuple[float, ...]], Any] = {}
+        for (law, direction), places in self.along.items():
+            if not np.any(places):
+                continue  # terms that cancel
+            acting = tuple(float(place) for place in places)
+            scale = acting[next(j for j, entry in enumerate(direction) if entry)]
+            if scale and np.allclose(places, scale * np.array(direction), rtol=1e-14, atol=0.0):
+                law, acting = law * number(scale), direction
+            stop = self._stop(law, direction) if acting == direction else None
+            if stop is not None:
+                made.append(stop)
+            elif self._has_corner(law):
+                made.append(self._expression(law, direction, acting, taken))
+            else:
+                key = (direction, acting)
+                smooth[key] = smooth.get(key, 0) + law
+        for (direction, acting), law in smooth.items():
+            spring = self._spring(law, direction) if direction == acting else None
+            made.append(spring or self._expression(law, direction, acting, taken))
+        return made + self._coupled(taken)
+
+    def _has_corner(self, law: Any) -> bool:
+        states = {self.u, self.rate, *self.x, *self.v}
+        return any(atom.free_symbols & states for atom in law.atoms(*CORNER_FUNCTIONS))
+
+    def _stop(self, law: Any, direction: tuple[float, ...]) -> BaseElement | None:
+        """`k max(a u + b, 0)`, or the same with a Heaviside function, as an elastic stop."""
+        atoms = [a for a in law.atoms(Ramp, Step) if self.u in a.free_symbols]
+        if len(atoms) != 1:
+            return None
+        argument = atoms[0].args[0]
+        factor = law / atoms[0]
+        if isinstance(atoms[0], Step):
+            factor = sympy.cancel(factor / argument)
+        slope = argument.diff(self.u)
+        varying = {self.u, self.rate, symbol("t"), symbol("omega")}
+        if (
+            factor.free_symbols & varying
+            or not slope.is_number
+            or slope == 0
+            or argument.free_symbols & (varying - {self.u})
+        ):
+            return None
+        stiffness = as_text(factor * slope)
+        if coefficient(stiffness).value(self.parameters) < 0.0:  # gets softer there: a spring, but no stop
+            return None
+        gap = -argument.subs(self.u, 0) / slope
+        side = "right" if slope > 0 else "left"
+        place = self._place(direction)
+        return ElasticStop(stiffness=stiffness, gap=as_text(gap), side=side, **place)
+
+    def _spring(self, law: Any, direction: tuple[float, ...]) -> BaseElement | None:
+        """A polynomial in the displacement."""
+        if not law.is_polynomial(self.u) or law.free_symbols & {self.rate, symbol("t"), symbol("omega")}:
+            return None
+        if expanded_size(law) > _MOST_TERMS:
+            return None
+        polynomial = sympy.Poly(law, self.u)
+        terms = {power: as_text(factor) for (power,), factor in polynomial.terms()}
+        if min(terms) < 1 or max(terms) > _HIGHEST_POWER:
+            return None
+        place = self._place(direction)
+        if list(terms) == [3]:
+            return CubicSpring(coefficient=terms[3], **place)
+        return PolynomialSpring(coefficients=terms, **place)
+
+    def _place(self, direction: tuple[float, ...], name: str = "dof") -> dict[str, Any]:
+        """A direction as an index, a pair, or a vector."""
+        inside = [(j, entry) for j, entry in enumerate(direction) if entry]
+        if len(inside) == 1 and inside[0][1] == 1.0:
+            return {name: inside[0][0]}
+        if len(inside) == 2 and (inside[0][1], inside[1][1]) == (1.0, -1.0):
+            return {name: (inside[0][0], inside[1][0])}
+        return {"direction": [float(entry) for entry in direction]}
+
+    def _expression(
+        self, law: Any, direction: tuple[float, ...], acting: tuple[float, ...], taken: set[str]
+    ) -> BaseElement:
+        inside = [j for j, entry in enumerate(direction) if entry]
+        name = self.names[inside[0]] if len(inside) == 1 else _fresh("u", taken)
+        law = law.xreplace({self.u: symbol(name), self.rate: symbol(name + PRIME)})
+        read = next(iter(self._place(direction).values()))
+        return Expression(expression=as_text(law), inputs={name: read}, **self._place(acting))
+
+    def _coupled(self, taken: set[str]) -> list[BaseElement]:
+        """Forces that depend on several displacements, along the direction in which each acts."""
+        cores: dict[Any, np.ndarray] = {}
+        for i, term in self.several:
+            factor, core = term.as_coeff_Mul()
+            cores.setdefault(core, np.zeros(self.n))[i] += float(factor)
+        made: list[BaseElement] = []
+        smooth: dict[tuple[float, ...], Any] = {}
+        for core, places in cores.items():
+            if not np.any(places):
+                continue  # terms that cancel
+            scale = places[np.flatnonzero(places)[0]]
+            acting, law = tuple(float(place) for place in places / scale), core * number(scale)
+            if self._has_corner(law):
+                made.append(self._with_corner(acting, law, taken))
+            else:
+                smooth[acting] = smooth.get(acting, 0) + law
+        for acting, law in smooth.items():
+            if law != 0:
+                inputs = {self.names[j]: j for j in self._inside(law)}
+                made.append(Expression(expression=as_text(law), inputs=inputs, **self._place(acting)))
+        return made
+
+    def _inside(self, law: Any) -> list[int]:
+        return [j for j in range(self.n) if law.free_symbols & {self.x[j], self.v[j]}]
+
+    def _with_corner(self, acting: tuple[float, ...], law: Any, taken: set[str]) -> BaseElement:
+        """The displacement that the corner depends on is made the first input, a combination of several if need be."""
+        inside = self._inside(law)
+        forms = {self._form(atom.args[0], inside) for atom in law.atoms(*CORNER_FUNCTIONS)}
+        form = forms.pop()
+        if forms or form is None:
+            plain = {self.names[j]: j for j in inside}
+            return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
+        lead = next(k for k, entry in enumerate(form) if entry)
+        name = _fresh("u", taken)
+        # x_lead = u - sum of the others
+        swaps = {}
+        for mark, states in (("", self.x), (PRIME, self.v)):
+            others = sum((number(form[k]) * states[j] for k, j in enumerate(inside) if k != lead), 0 * self.u)
+            swaps[states[inside[lead]]] = symbol(name + mark) - others
+        changed = law.subs(swaps, simultaneous=True)
+        direction = [0.0] * self.n
+        for k, j in enumerate(inside):
+            direction[j] = form[k]
+        inputs: dict[str, Any] = {name: next(iter(self._place(tuple(direction)).values()))}
+        inputs |= {self.names[j]: j for k, j in enumerate(inside) if k != lead}
+        left = {state.name.rstrip(PRIME) for state in changed.free_symbols}
+        inputs = {n: p for n, p in inputs.items() if n in left or n == name}
+        return Expression(expression=as_text(changed), inputs=inputs, **self._place(acting))
+
+    def _form(self, argument: Any, inside: list[int]) -> tuple[float, ...] | None:
+        """The combination of displacements, or of velocities, on which alone an argument depends, its first entry 1."""
+        slopes, rates = ([argument.diff(states[j]) for j in inside] for states in (self.x, self.v))
+        used = slopes if any(slopes) else rates
+        if (any(rates) and any(slopes)) or not any(used) or not all(slope.is_number for slope in used):
+            return None
+        first = next(slope for slope in used if slope)
+        ratios = tuple(_real(slope / first) for slope in used)
+        return None if None in ratios else ratios  # type: ignore[return-value]
+
+
+def _fresh(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _real(value: Any) -> float | None:
+    """A real number, None for all else (an expression, a complex number, infinity)."""
+    if not value.is_number:
+        return None
+    try:
+        real = float(value)
+    except (TypeError, OverflowError):
+        return None
+    return real if math.isfinite(real) else None

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 
 from suboctave.errors import InputError
-from suboctave.model.excitations import RotatingUnbalance
-from suboctave.model.expression_element import Expression
-from suboctave.model.loads import HarmonicLoad
-from suboctave.model.springs import CubicSpring
-from suboctave.model.stops import ElasticStop
+from suboctave.model.elements.expression import Expression
+from suboctave.model.elements.springs import CubicSpring
+from suboctave.model.elements.stops import ElasticStop
+from suboctave.model.loads import HarmonicLoad, RotatingUnbalance
 from suboctave.model.system import System
 
 __all__ = [

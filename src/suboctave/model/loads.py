@@ -1,4 +1,14 @@
-"""Periodic loads: `amplitude cos(harmonic omega t + phase)` on the right-hand side of the equation of motion."""
+"""Loads on the right-hand side of the equation of motion: cosines of time, and those that mass or motion make.
+
+A cosine is `amplitude cos(harmonic omega t + phase)`. Motion of the base, `y(t) = amplitude cos(harmonic omega t +
+phase)` along the direction r of rigid translation (`x = r` moves all DOFs as the base does):
+
+- in relative coordinates, `x` measured from the base: `M x'' + C x' + K x + f = -M r y''`. Elements between the
+  structure and the ground are between structure and base: nothing else changes.
+- in absolute coordinates: `M x'' + C x' + K x = C r y' + K r y`, where stiffness and damping of the structure that hold
+  it to the ground (`K r`, `C r`) hold it to the base. An element that feels `r` would need the base's motion too; such
+  systems are written in relative coordinates.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +21,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError, shortened
-from suboctave.model.element import Array, Dof, Place, required
-from suboctave.model.expression import ZERO, Coefficient, coefficient
-from suboctave.model.matrix import MatrixCoefficient
-from suboctave.model.recorded import Recorded
+from suboctave.errors import InputError, shortened, suggest
+from suboctave.model.description import Recorded
+from suboctave.model.elements.base import Array, Dof, Place, required
+from suboctave.model.expressions.coefficients import ZERO, Coefficient, coefficient
+from suboctave.model.matrices import MatrixCoefficient
 
-__all__ = ["HarmonicLoad", "Load", "LoadComponent", "Matrices"]
+__all__ = [
+    "BaseAcceleration",
+    "BaseDisplacement",
+    "Gravity",
+    "HarmonicLoad",
+    "Load",
+    "LoadComponent",
+    "Matrices",
+    "RotatingUnbalance",
+    "StaticLoad",
+]
 
 Number = float | str | Coefficient
+_QUARTER = coefficient("-pi/2")
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
 _HIGHEST = 10_000
 #: mass, damping and stiffness of the structure that a load acts on
@@ -63,7 +84,7 @@ class Load(Recorded, ABC, family="load"):
         try:
             return coefficient(source)
         except InputError as error:
-            raise InputError(f"{self.label}, {what}: {error}") from None
+            raise InputError(f"{self.label}, {what}: {error}", (what,)) from None
 
     def _read_harmonic(self, given: Any, least: int = 0) -> int:
         try:
@@ -157,3 +178,232 @@ def _listed(given: Any) -> list[Any]:
 def _shown(items: Sequence[Any]) -> str:
     texts = [item.text if isinstance(item, Coefficient) else str(item) for item in items]
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+
+
+class StaticLoad(Load):
+    """A constant force on the right-hand side, at `dof` (an index, or a pair) or along `direction`."""
+
+    def __init__(
+        self, dof: Dof | None = None, force: Number | None = None, *, direction: ArrayLike | None = None
+    ) -> None:
+        self.place = Place("StaticLoad", dof, direction)
+        required(self.label, force=force)
+        self.force = self._read("force", force)
+
+    @property
+    def label(self) -> str:
+        """How messages name this load."""
+        return f"StaticLoad({self.place})"
+
+    @property
+    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
+        """See `Load.coefficients`."""
+        return (("force", self.force),)
+
+    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+        """See `Load.components`."""
+        return (LoadComponent(_fixed(self.place.direction(n)), 0, self.force, ZERO),)
+
+    def __repr__(self) -> str:
+        return f"StaticLoad({self.place}, force={self.force.text})"
+
+
+class RotatingUnbalance(Load):
+    """The force of a mass that rotates off its axis, `mass_eccentricity * omega^2`.
+
+    It acts at `dof` as `m e (harmonic omega)^2 cos(harmonic omega t + phase)` and, if the DOF `perpendicular` is given,
+    there as the same with sin: forwards whirl from `dof` towards `perpendicular`. `harmonic` is the speed of the shaft
+    in units of omega. Unit of `mass_eccentricity`: mass times length.
+    """
+
+    def __init__(
+        self,
+        dof: int | None = None,
+        mass_eccentricity: Number | None = None,
+        perpendicular: int | None = None,
+        phase: Number = 0.0,
+        harmonic: int = 1,
+    ) -> None:
+        places = [Place("RotatingUnbalance", dof, None)]
+        if perpendicular is not None:
+            places.append(Place("RotatingUnbalance, perpendicular", perpendicular, None))
+        if any(len(place.dofs) != 1 for place in places) or len({place.dofs for place in places}) < len(places):
+            raise InputError("RotatingUnbalance: dof and perpendicular must be two different DOFs, one index each")
+        self.places = tuple(places)
+        required(self.label, mass_eccentricity=mass_eccentricity)
+        self.mass_eccentricity = self._read("mass_eccentricity", mass_eccentricity)
+        self.phase = self._read("phase", phase)
+        self.harmonic = self._read_harmonic(harmonic, 1)
+
+    @property
+    def label(self) -> str:
+        """How messages name this load."""
+        return f"RotatingUnbalance({self.places[0]})"
+
+    @property
+    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
+        """See `Load.coefficients`."""
+        return (("mass_eccentricity", self.mass_eccentricity), ("phase", self.phase))
+
+    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+        """See `Load.components`."""
+        amplitude = coefficient(f"({self.mass_eccentricity.text}) * {self.harmonic**2} * omega**2")
+        phases = (self.phase, _sum(self.phase, _QUARTER))
+        return tuple(
+            LoadComponent(_fixed(place.direction(n)), self.harmonic, amplitude, phase)
+            for place, phase in zip(self.places, phases, strict=False)
+        )
+
+    def __repr__(self) -> str:
+        dofs = f"dof={self.places[0].dofs[0]}"
+        if len(self.places) > 1:
+            dofs += f", perpendicular={self.places[1].dofs[0]}"
+        return f"RotatingUnbalance({dofs}, mass_eccentricity={self.mass_eccentricity.text})"
+
+
+class _WithMatrices(Load):
+    """A load along `M r`, `C r` or `K r`; `direction` r (n,), None for all DOFs alike."""
+
+    def __init__(self, direction: ArrayLike | None) -> None:
+        self.vector = None if direction is None else Place(type(self).__name__, None, direction)
+
+    @property
+    def label(self) -> str:
+        """How messages name this load."""
+        return type(self).__name__
+
+    def direction(self, n: int) -> Array:
+        """The vector r (n,) of a rigid translation."""
+        return np.ones(n) if self.vector is None else self.vector.direction(n)
+
+    def _along(
+        self, matrix: MatrixCoefficient, r: Array, harmonic: int, amplitude: str, phase: Coefficient
+    ) -> list[LoadComponent]:
+        """`matrix r amplitude cos(harmonic omega t + phase)`, one cosine per expression in the matrix."""
+        return [
+            LoadComponent(_fixed(vector), harmonic, coefficient(f"({factor.text}) * {amplitude}"), phase)
+            for factor, vector in matrix.products(r)
+            if np.any(vector)
+        ]
+
+    def _matrices(self, matrices: Matrices | None) -> Matrices:
+        if matrices is None:
+            raise InputError(f"{self.label} needs the matrices of the system it belongs to")
+        return matrices
+
+
+class Gravity(_WithMatrices):
+    """The weight `M r g`: `acceleration` g (length / time^2), along the direction r (n,), by default all DOFs alike.
+
+    r has the entry 1 at every DOF that moves with gravity, 0 at horizontal ones, -1 at those that point upwards.
+    """
+
+    def __init__(self, acceleration: Number | None = None, direction: ArrayLike | None = None) -> None:
+        super().__init__(direction)
+        required("Gravity", acceleration=acceleration)
+        self.acceleration = self._read("acceleration", acceleration)
+
+    @property
+    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
+        """See `Load.coefficients`."""
+        return (("acceleration", self.acceleration),)
+
+    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+        """See `Load.components`."""
+        mass = self._matrices(matrices)[0]
+        return tuple(self._along(mass, self.direction(n), 0, f"({self.acceleration.text})", ZERO))
+
+    def __repr__(self) -> str:
+        return f"Gravity(acceleration={self.acceleration.text})"
+
+
+class _Base(_WithMatrices):
+    """Motion of the base: see the top of the module."""
+
+    #: power of i omega from what is given (displacement or acceleration) to the acceleration
+    _order = 0
+
+    def __init__(
+        self,
+        amplitude: Number | None = None,
+        direction: ArrayLike | None = None,
+        coordinates: str = "relative",
+        harmonic: int = 1,
+        phase: Number = 0.0,
+    ) -> None:
+        super().__init__(direction)
+        required(self.label, amplitude=amplitude)
+        if coordinates not in ("relative", "absolute"):
+            hint = suggest(str(coordinates), ("relative", "absolute"))
+            raise InputError(f"{self.label}: coordinates must be 'relative' or 'absolute', not {coordinates!r}{hint}")
+        self.coordinates = coordinates
+        self.amplitude = self._read("amplitude", amplitude)
+        self.phase = self._read("phase", phase)
+        self.harmonic = self._read_harmonic(harmonic, 1)
+
+    @property
+    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
+        """See `Load.coefficients`."""
+        return (("amplitude", self.amplitude), ("phase", self.phase))
+
+    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+        """See `Load.components`."""
+        mass, damping, stiffness = self._matrices(matrices)
+        r, k, given = self.direction(n), self.harmonic, f"({self.amplitude.text})"
+        frequency = f"({k}*omega)"
+        if self.coordinates == "relative":
+            # -M r y''; a displacement has y'' = -(k omega)^2 y
+            amplitude = f"-1.0 * {given}" if self._order == 0 else f"{given} * {frequency}**2"
+            return tuple(self._along(mass, r, k, amplitude, self.phase))
+        # y' = k omega amplitude cos(.. + pi / 2); an acceleration has y = -y'' / (k omega)^2
+        shown = f"-1.0 * {given} / {frequency}**2" if self._order == 0 else given
+        return (
+            *self._along(stiffness, r, k, shown, self.phase),
+            *self._along(damping, r, k, f"{shown} * {frequency}", _sum(self.phase, coefficient("pi/2"))),
+        )
+
+    def check_elements(self, n: int, elements: Sequence[Any]) -> None:
+        """Refuse elements that would need the motion of the base."""
+        if self.coordinates == "relative":
+            return
+        r = self.direction(n)
+        for element in elements:
+            felt = element.inputs(n) if hasattr(element, "inputs") else element.direction(n)[None]
+            if np.any(np.abs(felt @ r) > 1e-12 * np.abs(felt).sum(axis=1)):
+                raise InputError(
+                    f"{self.label} in absolute coordinates: {element.label} acts between the structure and the base, "
+                    'which moves; write the system in relative coordinates (coordinates="relative")'
+                )
+
+    def __repr__(self) -> str:
+        return f"{self.label}(amplitude={self.amplitude.text}, coordinates={self.coordinates!r})"
+
+
+class BaseDisplacement(_Base):
+    """A base that moves by `amplitude cos(harmonic omega t + phase)` along r = `direction` (default: all DOFs alike).
+
+    `coordinates="relative"` (default): displacements are measured from the base, the load is `M r (harmonic omega)^2
+    amplitude`. `"absolute"`: they are measured from a fixed frame, and what holds the structure to the ground, `K r`
+    and `C r`, holds it to the base. Unit of `amplitude`: length.
+    """
+
+    _order = 2
+
+
+class BaseAcceleration(_Base):
+    """A base that is accelerated by `amplitude cos(harmonic omega t + phase)` along r = `direction`.
+
+    Otherwise as `BaseDisplacement`; the load in relative coordinates is `-M r amplitude`. Unit of `amplitude`: length /
+    time^2.
+    """
+
+    _order = 0
+
+
+def _fixed(direction: Array) -> Array:
+    direction.setflags(write=False)
+    return direction
+
+
+def _sum(a: Coefficient, b: Coefficient) -> Coefficient:
+    return coefficient(f"({a.text}) + ({b.text})")

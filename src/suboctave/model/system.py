@@ -13,17 +13,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError, shortened, suggest
-from suboctave.model.coupled import CoupledElement
-from suboctave.model.damping_check import check_damping
-from suboctave.model.element import Array, BaseElement
-from suboctave.model.expression import RESERVED, Coefficient
+from suboctave.errors import InputError, Key, Refusals, located, shortened, suggest
+from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value, read_expression
+from suboctave.model.elements.base import Array, BaseElement
+from suboctave.model.elements.coupled import CoupledElement
+from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
+from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.expressions.reader import RESERVED
 from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
-from suboctave.model.mass_check import check_mass
-from suboctave.model.matrix import MatrixCoefficient, matrix_coefficient
-from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpVelocitySampling
+from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient
 
-__all__ = ["System"]
+__all__ = ["System", "build", "describe"]
+
+_MATRICES = ("mass", "damping", "stiffness")
 
 
 class System:
@@ -71,8 +73,8 @@ class System:
             _read_parameters(parameters),
             str(name),
             _read_dof_names(dof_names, read.n),
+            check=True,
         )
-        self._check_names()
         self._check_values(self.parameters)
 
     @classmethod
@@ -104,16 +106,9 @@ class System:
         parameters: Mapping[str, float],
         name: str,
         dof_names: tuple[str, ...],
+        check: bool = False,
     ) -> None:
         n = mass.n
-        for element in elements:
-            element.direction(n)
-            if isinstance(element, CoupledElement):
-                element.inputs(n)
-        for load in loads:
-            load.check_elements(n, elements)
-        matrices = (mass, damping, stiffness)
-        components = tuple(component for load in loads for component in load.components(n, matrices))
         fields = {
             "mass": mass,
             "damping": damping,
@@ -124,10 +119,18 @@ class System:
             "name": name,
             "dof_names": dof_names,
             "n": n,
-            "_components": components,
         }
         for field, value in fields.items():
             object.__setattr__(self, field, value)
+        refusals = Refusals()
+        components: list[LoadComponent] = []
+        for i, load in enumerate(loads):
+            with refusals.at("loads", i):
+                components += load.components(n, (mass, damping, stiffness))
+        if check:
+            self._check_parts(refusals)
+        refusals.refuse()
+        object.__setattr__(self, "_components", tuple(components))
 
     # ------------------------------------------------------------------------------------------------- parameters
     def with_parameters(self, changes: Mapping[str, float] | None = None, /, **more: float) -> System:
@@ -174,58 +177,74 @@ class System:
             has = suggest(str(name), self.parameters) or "; it has none"
             raise InputError(f"the system has no parameter {name!r}{has}")
 
-    def expressions(self) -> Iterator[tuple[str, Coefficient, bool]]:
-        """Every expression: where it stands, itself, and whether it may contain omega."""
+    def expressions(self) -> Iterator[tuple[str, Coefficient, Key]]:
+        """Every expression: where it stands, itself, and the key of the part of the system that it belongs to."""
         for matrix in (self.mass, self.damping, self.stiffness):
             for source in matrix.coefficients:
-                yield matrix.what, source, False
-        for element in self.elements:
+                yield matrix.what, source, (matrix.what,)
+        for i, element in enumerate(self.elements):
             for what, source in zip(element.coefficient_names, element.coefficients, strict=True):
-                yield f"{element.label}, {what}", source, False
-        for load in self.loads:
+                yield f"{element.label}, {what}", source, ("elements", i)
+        for i, load in enumerate(self.loads):
             for what, source in load.coefficients:
-                yield f"{load.label}, {what}", source, True
+                yield f"{load.label}, {what}", source, ("loads", i)
 
-    def _check_names(self) -> None:
+    def _check_parts(self, refusals: Refusals) -> None:
+        """Parts that do not fit each other: places that do not exist, names of no parameter."""
+        for i, element in enumerate(self.elements):
+            with refusals.at("elements", i):
+                element.direction(self.n)
+                if isinstance(element, CoupledElement):
+                    element.inputs(self.n)
+        for i, load in enumerate(self.loads):
+            with refusals.at("loads", i):
+                load.check_elements(self.n, self.elements)
         used: set[str] = set()
-        for where, source, in_load in self.expressions():
-            for name in sorted(source.names):
-                if name == "omega" and not in_load:
-                    raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
-                if name != "omega" and name not in self.parameters:
-                    known = suggest(name, self.parameters) or "; no parameters are given"
-                    raise InputError(f"{where}: unknown parameter {name!r} in the expression {source}{known}")
+        for where, source, key in self.expressions():
             used |= source.names
-        unused = [name for name in self.parameters if name not in used]
-        if unused:
-            listed = ", ".join(repr(name) for name in unused)
-            what = "parameter" if len(unused) == 1 else "parameters"
-            raise InputError(f"{what} {listed} not used in any expression; remove or use it")
+            for name in sorted(source.names):
+                with refusals.at(*key):
+                    self._check_name(name, where, source, key[0] == "loads")
+        if not refusals.mistakes:
+            for name in self.parameters:
+                with refusals.at("parameters", name):
+                    if name not in used:
+                        raise InputError(f"parameter {name!r} not used in any expression; remove or use it")
+
+    def _check_name(self, name: str, where: str, source: Coefficient, in_load: bool) -> None:
+        if name == "omega" and not in_load:
+            raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
+        if name != "omega" and name not in self.parameters:
+            known = suggest(name, self.parameters) or "; no parameters are given"
+            raise InputError(f"{where}: unknown parameter {name!r} in the expression {source}{known}")
 
     def _check_values(self, changed: Mapping[str, float]) -> None:
         """Refuse values at which an expression has no number or the mass is not a mass."""
-        for where, source, _ in self.expressions():
+        for where, source, key in self.expressions():
             if source.names and "omega" not in source.names:
                 try:
                     source.value(self.parameters)
                 except InputError as error:
-                    raise InputError(f"{where}: {error}") from None
+                    raise InputError(f"{where}: {error}", key) from None
         first = changed is self.parameters
-        for element in self.elements:
-            element.check(self.parameters, first)
-            kind = element.sampling(element.coefficient_values(self.parameters))
-            if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
-                raise InputError(
-                    f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class"
-                )
-            if isinstance(kind, PiecewiseLinear) and element.own_nodes:
-                raise InputError(f"{element.label}: a piecewise-linear law needs no nodes, own_nodes must be False")
+        for i, element in enumerate(self.elements):
+            with located("elements", i):
+                self._check_law(element, first)
         if first or self.mass.names.intersection(changed):
             mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
-            check_mass(mass)
+            with located("mass"):
+                check_mass(mass)
         if first:
             damping = self.damping.sparse_value if self.damping.sparse else self.damping.value
             check_damping(damping(self.parameters), mass.diagonal())
+
+    def _check_law(self, element: BaseElement, first: bool) -> None:
+        element.check(self.parameters, first)
+        kind = element.sampling(element.coefficient_values(self.parameters))
+        if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
+            raise InputError(f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class")
+        if isinstance(kind, PiecewiseLinear) and element.own_nodes:
+            raise InputError(f"{element.label}: a piecewise-linear law needs no nodes, own_nodes must be False")
 
     # --------------------------------------------------------------------------------------------------- matrices
     def matrices(self, values: Mapping[str, float] | None = None) -> tuple[Array, Array, Array]:
@@ -318,10 +337,11 @@ def _assemble(
     parameters: Mapping[str, float],
     name: str,
     dof_names: tuple[str, ...] = (),
+    check: bool = False,
 ) -> System:
-    """A system from parts that a system has already accepted."""
+    """A system from parts; `check`: whether they fit each other, where no system has accepted them already."""
     result = object.__new__(System)
-    result._fill(mass, damping, stiffness, elements, loads, parameters, name, dof_names)
+    result._fill(mass, damping, stiffness, elements, loads, parameters, name, dof_names, check)
     return result
 
 
@@ -341,14 +361,18 @@ def _several(items: Any, kind: type, name: str, what: str) -> tuple[Any, ...]:
 def _read_dof_names(names: Iterable[str], n: int) -> tuple[str, ...]:
     read = tuple(str(name) for name in names)
     if len(set(read)) < len(read) or len(read) not in (0, n):
-        raise InputError(f"dof_names must be {n} different names, or none, not {read!r}")
+        raise InputError(f"dof_names must be {n} different names, or none, not {read!r}", ("dof_names",))
     return read
 
 
 def _read_parameters(parameters: Mapping[str, float] | None) -> dict[str, float]:
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"parameters must be a mapping {{name: number}}, not {parameters!r}")
-    return {_name(name): _number(name, value) for name, value in (parameters or {}).items()}
+    read = {}
+    for name, value in (parameters or {}).items():
+        with located("parameters", name):
+            read[_name(name)] = _number(name, value)
+    return read
 
 
 def _name(name: Any) -> str:
@@ -375,3 +399,65 @@ def _number(name: str, value: Any) -> float:
     if not math.isfinite(number):
         raise InputError(f"parameter {name!r} must be finite, not {number}")
     return number
+
+
+# ------------------------------------------------------------------------------------------------------- description
+def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
+    """The system as plain data; large arrays go into `arrays` under names of their own, if that is given.
+
+    Raises InputError where an argument cannot be written down (a function without a name that can be imported).
+    """
+    return {
+        "name": system.name,
+        "dof_names": list(system.dof_names),
+        **{what: _plain_matrix(getattr(system, what), arrays) for what in _MATRICES},
+        "elements": [describe_part(element, arrays) for element in system.elements],
+        "loads": [describe_part(load, arrays) for load in system.loads],
+        "parameters": dict(system.parameters),
+    }
+
+
+def build(
+    description: Mapping[str, Any], arrays: Mapping[str, np.ndarray] | None = None, allow_code: bool = False
+) -> System:
+    """The system of a description that `describe` made.
+
+    Raises InputError where the description is not one, or names a class that is not known (see `allow_code` above).
+    """
+    try:
+        mass, damping, stiffness = (_read_matrix(description[what], what, arrays or {}) for what in _MATRICES)
+        elements, loads = (
+            tuple(build_part(item, family, arrays or {}, allow_code) for item in description[f"{family}s"])
+            for family in ("element", "load")
+        )
+        parameters, name = description["parameters"], str(description["name"])
+        dof_names = _read_dof_names(description["dof_names"], mass.n)
+    except InputError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
+    if not mass.n == damping.n == stiffness.n:
+        raise InputError("this is not the description of a system: its matrices have different sizes")
+    read = _read_parameters(parameters)
+    system = _assemble(mass, damping, stiffness, elements, loads, read, name, dof_names, check=True)
+    system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
+    check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))
+    return system
+
+
+def _plain_matrix(matrix: MatrixCoefficient, arrays: Arrays | None) -> dict[str, Any]:
+    return {
+        "base": plain_value(matrix._base, arrays),
+        "terms": [[plain_value(c), plain_value(pattern, arrays)] for c, pattern in matrix._terms],
+    }
+
+
+def _read_matrix(description: Mapping[str, Any], what: str, arrays: Mapping[str, np.ndarray]) -> MatrixCoefficient:
+    base = from_plain(description["base"], arrays)
+    terms = [(read_expression(c), from_plain(pattern, arrays)) for c, pattern in description["terms"]]
+    shapes = {matrix.shape for matrix in (base, *(pattern for _, pattern in terms))}
+    if len(shapes) != 1 or len(base.shape) != 2 or base.shape[0] != base.shape[1]:
+        raise InputError(f"this is not the description of a system: {what} has shapes {sorted(shapes)}")
+    if not hasattr(base, "tocsr"):
+        base.setflags(write=False)
+    return MatrixCoefficient(base, terms, what)

@@ -1,15 +1,17 @@
 """Curves of bifurcations in the plane of their two parameters: which side of a boundary a design lies on.
 
 Solid where the boundary is one of stable motions (all multipliers but the critical one inside the unit circle), dashed
-where motions on both sides are unstable; extrema and points of codimension two marked and named. Drawn from datasets,
-like response curves; what lines look like is told in `boundary_lines`.
+where motions on both sides are unstable; extrema and points of codimension two marked and named.
+
+Lines of period doublings and limit points have the colour of the period whose motions are born or end there, so that
+what is blue borders motions of period 2T; the other kinds, across which no period begins, have colours of their own.
+The kind is shown by shape as well, by small marks along the line: those of its kind in response curves, hollow where
+period doublings are subcritical.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,97 +20,63 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.pictures import style
-from suboctave.pictures.annotations import annotate
-from suboctave.pictures.boundary_lines import (
-    Part,
-    boundary_names,
-    boundary_styles,
-    is_boundary,
-    kind_of,
-    parts,
-    plane_of,
-    stations,
+from suboctave.pictures.drawing import (
+    Axis,
+    Beads,
+    Drawing,
+    Entry,
+    Frame,
+    Label,
+    Markers,
+    Polyline,
+    event_rank,
+    plain,
 )
-from suboctave.pictures.boundary_marks import event_drawing, event_words, mark_events, small_mark
-from suboctave.pictures.legend import place_legend
-from suboctave.pictures.periods import tinted
-from suboctave.pictures.regions import CENTRE, MERGING, end_text, regions, split, with_ends
-from suboctave.pictures.response import dress
-from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import bent, strokes, without_repeats
-from suboctave.pictures.view import View
+from suboctave.pictures.isolas import CENTRE, MERGING, end_text, shade, split, with_ends
+from suboctave.pictures.options import Coordinates, View
+from suboctave.pictures.paper import figure_of
+from suboctave.pictures.periods import period_colour, period_name, period_of
+from suboctave.pictures.strokes import Line, cut, line_through, without_repeats
+from suboctave.pictures.style import Mark, Pen, tinted
+from suboctave.pictures.words import Hover, differing, fixed_parameters
 from suboctave.store.layout import check_layout, coordinate
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
-__all__ = ["PALE", "Plane", "check_boundaries", "plane_axes", "plot_boundaries"]
+__all__ = [
+    "BORDER",
+    "SMALL",
+    "WITHIN",
+    "boundary_drawing",
+    "boundary_names",
+    "boundary_styles",
+    "chosen_axes",
+    "event_entries",
+    "event_markers",
+    "event_words",
+    "is_boundary",
+    "kind_of",
+    "plane_of",
+    "plot_boundaries",
+]
 
 #: what the strokes mean here
 BORDER, WITHIN = "borders stable motions", "within unstable motions"
 SUBCRITICAL = "subcritical"
-_UPWARDS = "_upwards"
-#: millimetres between the small marks along a line
-_SPACING = 11.0
-#: share of white in the region of an isola
-PALE = 0.82
+#: how large the small marks along a line are beside the others
+SMALL = 0.55
 #: so many extrema are named by their values
 _NAMED = 4
-
-
-@dataclass(frozen=True)
-class Plane:
-    """The two axes of a frame: parameters, or upwards a quantity of the motions, with their units.
-
-    `upwards` is omega, a parameter, or None for the quantity of the view.
-    """
-
-    across: str
-    upwards: str | None
-    view: View = field(default_factory=View)
-
-    def prepared(self, dataset: xarray.Dataset) -> xarray.Dataset:
-        """The dataset with what is drawn upwards as a variable of its own."""
-        if self.upwards is None:
-            self.view.check(dataset)
-            values, at_events = (
-                dataset[self.view.variable].to_numpy(),
-                dataset[f"event_{self.view.variable}"].to_numpy(),
-            )
-        else:
-            values, at_events = coordinate(dataset, self.upwards)
-        return dataset.assign({_UPWARDS: ("point", values), f"event_{_UPWARDS}": ("event", at_events)})
-
-    def factors(self) -> tuple[float, float]:
-        """What values to the right and upwards are multiplied by; `scale` is that of what is no frequency."""
-        if self.upwards is None:
-            return self.view.factors(self.across)
-        frequency, scale = self.view.factors("omega")[0], float(self.view.scale or 1.0)
-        first = frequency if self.across == "omega" else scale if self.upwards == "omega" else 1.0
-        return first, frequency if self.upwards == "omega" else scale
-
-    def marked(self, dataset: xarray.Dataset) -> np.ndarray:
-        """Which of the events of a prepared dataset get a marker, (events,), bool."""
-        kinds, marks = dataset["event_kind"].to_numpy(), self.view.marks
-        chosen = np.array([marks is None or str(kind) in marks for kind in kinds], dtype=bool)
-        for column, limits in zip(places(dataset, self).T, (self.view.xlim, self.view.ylim), strict=True):
-            if limits is not None:
-                chosen &= (column >= limits[0]) & (column <= limits[1])
-        return chosen
-
-    def labels(self, dataset: xarray.Dataset) -> tuple[str, str]:
-        """What the two axes say."""
-        view = self.view
-        if self.upwards is None:
-            return view.labels(dataset, self.across)
-        frequency = View(frequency=view.frequency, omega_reference=view.omega_reference).labels(dataset, "omega")[0]
-        unit = f" ({view.unit})" if view.unit else ""
-        first = frequency if self.across == "omega" else self.across + (unit if self.upwards == "omega" else "")
-        second = frequency if self.upwards == "omega" else self.upwards + unit
-        return view.xlabel or first, view.ylabel or second
+#: share of the axes beyond what is drawn
+_MARGIN = 0.06
+_COLOURS = {"NS": "#009E73", "BP": "#CC79A7", "grazing": style.SOFT}
+_WIDTHS = {"PD": 1.35, "grazing": 0.8}
+#: share of white in the colours of those of kinds with a colour of their own, for motions of several periods
+_STAGE = 0.4
+#: of the second and third curve of one kind and period: share of white, width
+_APART = ((0.0, 1.0), (0.45, 0.7), (0.25, 1.4))
 
 
 def plot_boundaries(
@@ -141,68 +109,242 @@ def plot_boundaries(
 
     Others as `suboctave.plot`. Raises InputError for what cannot be drawn.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
-    given, heads = split(several)
-    group = [with_ends(dataset, heads) for dataset in check_boundaries(given)]
+    sheet = style.sheet_of(size)
+    drawing = boundary_drawing(several, x=x, y=y, labels=labels, view=view, projected=projected)
+    drawing.frames[0].title = plain(title or "")
+    if sheet.named:  # a named size is a width: what stands above the frame adds height
+        drawing.legend = "grow"
+    return figure_of(drawing, sheet, path)
+
+
+def boundary_drawing(
+    curves: Sequence[xarray.Dataset],
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    labels: Sequence[str] | None = None,
+    view: View | None = None,
+    projected: bool = False,
+) -> Drawing:
+    """Curves of bifurcations laid out over the plane of two parameters, with the regions of isolas behind."""
+    given, heads = split(curves)
+    group = [with_ends(dataset, heads) for dataset in _checked(given)]
     if projected and y is not None:
         raise InputError("y= names a parameter; with a quantity= that is what is drawn upwards")
-    horizontal, upwards = _first(group, x) if projected else plane_axes(group, x, y)
-    plane = Plane(horizontal, None if projected else upwards, view or View())
+    axes = Coordinates((_first(group, x), None) if projected else plane_axes(group, x, y), view or View())
     if labels is not None and len(labels) != len(group):
         raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
-    prepared = [plane.prepared(dataset) for dataset in group]
-    inches = style.size_in_inches(size)
-    look = style.PRINT if isinstance(size, str) else style.look_of(inches[0])
-    figure = Figure(figsize=inches, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    dress(axes, *plane.labels(group[0]), look)
-    if title:
-        axes.set_title(title.replace("$", r"\$"), fontsize=look.large, color=style.INK)
-    _limit(axes, prepared, plane)
-    if plane.view.xlim is not None:
-        axes.set_xlim(*plane.view.xlim)
-    if plane.view.ylim is not None:
-        axes.set_ylim(*plane.view.ylim)
-    names = [name.replace("$", r"\$") for name in (labels if labels is not None else boundary_names(group))]
-    styles = boundary_styles(group, names)
-    cut = [parts(dataset, plane.across, _UPWARDS) for dataset in prepared]
-    _lines(axes, prepared, styles, plane, look)
-    legend = _shade(axes, heads, plane) | _entries(prepared, cut, names, styles, plane, look)
-    for dataset in prepared:
-        mark_events(axes, dataset, places(dataset, plane).T, look, plane.marked(dataset))
-    # a named size is a width: what stands above the frame adds height
-    place_legend(figure, [axes], legend, look, grow=isinstance(size, str))
-    figure.draw_without_rendering()  # the frame has its place: marks along lines are spaced on paper
-    for dataset, pieces, curve in zip(prepared, cut, styles, strict=True):
-        _along(figure, axes, dataset, pieces, curve, plane, look)
-    _name_events(figure, axes, prepared, plane, look)
-    if path is not None:
-        save_figure(figure, path)
-    setattr(figure, "_repr_png_", partial(png_bytes, figure))  # noqa: B010
-    return figure
-
-
-def check_boundaries(curves: Any) -> list[xarray.Dataset]:
-    """The datasets of curves of bifurcations, at least one; InputError for anything else."""
-    group: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
-    if not group:
-        raise InputError("no curve to draw")
     for dataset in group:
+        axes.check(dataset)
+    names = [plain(name) for name in (labels if labels is not None else boundary_names(group))]
+    pens = boundary_styles(group, names)
+    limits = axes.limits(group, _MARGIN, _MARGIN)
+    spread = (limits[0][1] - limits[0][0], limits[1][1] - limits[1][0])
+    shaded = shade(heads, axes.names, axes.factors)
+    entries = {region.name: Entry(patch=region.colour) for region in shaded}
+    frame, verdicts, hollow = Frame([*shaded]), set(), False
+    earlier: dict[Pen, list[np.ndarray]] = {}
+    for dataset, name, pen in zip(group, names, pens, strict=True):
+        places, hover = axes.of(dataset)[1], Hover(dataset)
+        whole = line_through(dataset, *axes.of(dataset))
+        for stroke in without_repeats(cut(dataset, whole), earlier.setdefault(pen, []), spread):
+            role = "curve" if stroke.stable is None else "border" if stroke.stable else "within"
+            words = f"{name}, {WITHIN}" if stroke.stable is False else name
+            seen: dict[str, Any] = {"role": role, "name": words, "group": name, "hover": partial(hover.along, stroke)}
+            frame.items.append(Polyline(stroke.at, pen.along(stroke.stable), smooth=True, **seen))
+        verdicts |= set() if whole.stable is None else set(whole.stable.tolist())
+        below = _subcritical(dataset, whole)
+        hollow = hollow or bool(below.any())
+        for first, last in _runs(below, whole.stable):
+            mark = _small_mark(kind_of(dataset), pen, hollow=bool(below[first]))
+            role, words = ("along-hollow", f"{name}, {SUBCRITICAL}") if below[first] else ("along", "")
+            line = whole.at[:, first : last + 1]
+            frame.items.append(Beads(line, mark, places, role=role, name=words, group=name))
+        entries[name] = Entry(pen.along(None), _small_mark(kind_of(dataset), pen, hollow=False))
+    entries |= _entries(verdicts, hollow)
+    for dataset in group:
+        frame.items += event_markers(dataset, axes, axes.marked(dataset))
+    entries |= event_entries(kind for data in group for kind in data["event_kind"].to_numpy()[axes.marked(data)])
+    frame.labels = _names_of_events(group, axes)
+    lows_and_highs = zip(axes.labels(group), limits, strict=True)
+    return Drawing([Axis(label, *own) for label, own in lows_and_highs], [frame], entries)
+
+
+# --------------------------------------------------------------------------------------------------------------- curves
+def is_boundary(dataset: xarray.Dataset) -> bool:
+    """Whether a dataset is that of a curve of bifurcations in two parameters."""
+    return bool(dataset.attrs.get("tracked"))
+
+
+def kind_of(dataset: xarray.Dataset) -> str:
+    """The kind of bifurcation that a curve consists of."""
+    return str(dataset.attrs["tracked"])
+
+
+def plane_of(dataset: xarray.Dataset) -> tuple[str, str]:
+    """The two parameters that were free."""
+    first, second = str(dataset.attrs["plane"]).split("\n")
+    return first, second
+
+
+def boundary_names(group: Sequence[xarray.Dataset]) -> list[str]:
+    """Kind and period of each, and the parameters in which those of one kind and period differ."""
+    names = [_words(kind_of(dataset), period_of(dataset)) for dataset in group]
+    full = list(names)
+    for name in dict.fromkeys(names):
+        alike = [index for index, other in enumerate(names) if other == name]
+        words = differing([fixed_parameters(group[index]) for index in alike])
+        for index, own in zip(alike, words, strict=True):
+            full[index] = ", ".join([name, *own])
+    return full
+
+
+def _words(kind: str, nu: int) -> str:
+    name = style.kind_style(kind).name
+    if kind == "PD":
+        return f"{name} {period_name(nu)}→{period_name(2 * nu)}"
+    return name if nu == 1 else f"{name} of {period_name(nu)}"
+
+
+def boundary_styles(group: Sequence[xarray.Dataset], names: Sequence[str]) -> list[Pen]:
+    """The pen of each: by kind and period, and among those by name."""
+    seen: dict[tuple[str, int], list[str]] = {}
+    pens = []
+    for dataset, name in zip(group, names, strict=True):
+        kind, nu = kind_of(dataset), period_of(dataset)
+        alike = seen.setdefault((kind, nu), [])
+        if name not in alike:
+            alike.append(name)
+        place = alike.index(name)
+        white, width = _APART[place % len(_APART)]
+        pens.append(
+            Pen(tinted(_colour(kind, nu), white), width * _WIDTHS.get(kind, 1.0), style.curve_style(place).dash)
+        )
+    return pens
+
+
+def _colour(kind: str, nu: int) -> str:
+    if kind in _COLOURS:
+        return tinted(_COLOURS[kind], 0.0 if nu == 1 else _STAGE)
+    return period_colour(2 * nu if kind == "PD" else nu)
+
+
+def _subcritical(dataset: xarray.Dataset, whole: Line) -> np.ndarray:
+    """(vertices - 1,) whether the period doublings between two vertices of the line are subcritical.
+
+    The sign of c3 at the points decides; it changes at a located GPD, where there is one.
+    """
+    result = np.zeros(max(whole.x.size - 1, 0), dtype=bool)
+    if kind_of(dataset) != "PD" or "coefficient" not in dataset:
+        return result
+    positive, here = dataset["coefficient"].to_numpy() > 0.0, False
+    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
+    for piece in range(result.size):
+        if whole.point[piece] >= 0:
+            here = bool(positive[whole.point[piece]])
+        elif kinds[whole.event[piece]] == "GPD":
+            here = not here
+        result[piece] = here
+    return result
+
+
+def _runs(below: np.ndarray, stable: np.ndarray | None) -> list[tuple[int, int]]:
+    """First and last vertex of every stretch of a line of one stability that is wholly subcritical or not."""
+    if not below.size:
+        return []
+    verdict = below if stable is None else stable
+    changes = np.flatnonzero((np.diff(below.astype(int)) != 0) | (np.diff(verdict.astype(int)) != 0)) + 1
+    return list(zip([0, *changes], [*changes, below.size], strict=True))
+
+
+# --------------------------------------------------------------------------------------------------------------- events
+def event_words(kind: str) -> str:
+    """What a legend says of a kind of event; the short name is the one written beside it."""
+    name = style.kind_style(kind).name
+    return name if kind in ("extremum", name) or kind.startswith("isola") else f"{kind}: {name}"
+
+
+def event_markers(dataset: xarray.Dataset, axes: Coordinates, marked: np.ndarray) -> list[Markers]:
+    """Markers of extrema and points of codimension two; `marked`, (events,): which of them."""
+    markers, places, hover = [], axes.of(dataset)[1], Hover(dataset)
+    for kind, style_of, every in style.marks(dataset):
+        which = every[marked[every]]
+        if which.size:
+            words = event_words(kind)
+            seen: dict[str, Any] = {"name": words, "group": words, "hover": partial(hover.of_events, which)}
+            layer = 5.5 if kind.startswith("isola") else 5.0
+            markers.append(Markers(places[:, which], style_of.mark(), role=kind, layer=layer, **seen))
+    return markers
+
+
+def event_entries(kinds: Iterable[Any]) -> dict[str, Entry]:
+    """What the legend says of kinds of events."""
+    names = sorted({str(kind) for kind in kinds}, key=event_rank)
+    return {event_words(kind): Entry(mark=style.kind_style(kind).mark()) for kind in names}
+
+
+def _small_mark(kind: str, pen: Pen, *, hollow: bool) -> Mark:
+    """A mark along a line."""
+    own = style.kind_style(kind)
+    return Mark(own.marker, SMALL * own.size, "white" if hollow else pen.colour, pen.colour)
+
+
+def _entries(verdicts: set[bool], hollow: bool) -> dict[str, Entry]:
+    """What the legend says of strokes, where there are dashed ones, and of hollow marks."""
+    entries = {}
+    if False in verdicts:
+        plain_pen = Pen(style.SOFT, 1.0, style.UNSTABLE_DASH)
+        for stable, words in ((True, BORDER), (False, WITHIN)):
+            if stable in verdicts:
+                entries[words] = Entry(plain_pen.along(stable))
+    if hollow:
+        entries[SUBCRITICAL] = Entry(mark=_small_mark("PD", style.ONE_CURVE, hollow=True))
+    return entries
+
+
+def _names_of_events(group: Sequence[xarray.Dataset], axes: Coordinates) -> list[Label]:
+    """Codimension-two points by their short names; extrema of what is drawn upwards and isolas' ends by values."""
+    ends, extrema, points = [], [], []
+    upwards = axes.names[1]
+    for dataset in group:
+        places = axes.of(dataset)[1].T
+        extremes = dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else [""] * len(places)
+        kinds, marked = dataset["event_kind"].to_numpy(), axes.marked(dataset)
+        for place, kind, extreme in zip(places[marked], kinds[marked], np.array(extremes)[marked], strict=True):
+            if kind in (CENTRE, MERGING):
+                value = place[0] if upwards == "omega" else None if upwards is None else place[1]
+                ends.append(Label(place, end_text(str(kind), value)))
+            elif str(kind) != "extremum":
+                points.append(Label(place, str(kind)))
+            elif upwards is not None and str(extreme).endswith(f" of {upwards}"):
+                extrema.append(Label(place, f"{place[1]:#.4g}"))
+    return ends + (extrema if len(extrema) <= _NAMED else []) + points
+
+
+# ----------------------------------------------------------------------------------------------------------------- axes
+def _checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
+    """The datasets of curves of bifurcations, at least one; InputError for anything else."""
+    if not curves:
+        raise InputError("no curve to draw")
+    for dataset in curves:
         check_layout(dataset)
         if not is_boundary(dataset):
             raise InputError("this is no curve of bifurcations; plot draws responses, plot_space both together")
         if dataset.sizes.get("point", 0) == 0:
             raise InputError("a curve without points cannot be drawn")
-    return group
+    return list(curves)
 
 
 def plane_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:
     """The parameters to the right and upwards; default the two that were free, which must be the same of all."""
-    pairs = {plane_of(dataset) for dataset in group}
+    return chosen_axes(group, {plane_of(dataset) for dataset in group}, x, y, "was not free on these curves")
+
+
+def chosen_axes(
+    group: Sequence[xarray.Dataset], pairs: set[tuple[str, str]], x: str | None, y: str | None, wrong: str
+) -> tuple[str, str]:
+    """The axes given, or those of the one pair there is; `wrong`: what an axis that is none of this pair is not."""
     for name in (x, y):
         if name is not None:
             for dataset in group:
@@ -213,176 +355,19 @@ def plane_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | N
         return x, y
     if len(pairs) != 1:
         raise InputError("the curves were followed in different parameters: choose axes with x= and y=")
-    first, second = next(iter(pairs))
+    pair = next(iter(pairs))
     given = x if x is not None else y
     if given is None:
-        return first, second
-    if given not in (first, second):
-        raise InputError(f"{given!r} was not free on these curves{suggest(given, (first, second))}: give x= and y=")
-    other = second if given == first else first
+        return pair
+    if given not in pair:
+        raise InputError(f"{given!r} {wrong}{suggest(given, pair)}: give x= and y=")
+    other = pair[1] if given == pair[0] else pair[0]
     return (given, other) if x is not None else (other, given)
 
 
-def _first(group: Sequence[xarray.Dataset], x: str | None) -> tuple[str, None]:
-    if x is not None:
-        for dataset in group:
-            coordinate(dataset, x)
-        return x, None
-    return plane_axes(group)[0], None
-
-
-def places(prepared: xarray.Dataset, plane: Plane) -> np.ndarray:
-    """Positions (events, 2) of the events in the frame."""
-    at = coordinate(prepared, plane.across)[1]
-    found: np.ndarray = np.column_stack([at, prepared[f"event_{_UPWARDS}"].to_numpy()]) * np.array(plane.factors())
-    return found
-
-
-def _limit(axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane) -> None:
-    every = np.concatenate(
-        [np.column_stack([coordinate(data, plane.across)[0], data[_UPWARDS].to_numpy()]) for data in prepared]
-    ) * np.array(plane.factors())
-    every = np.concatenate([every, *(places(data, plane) for data in prepared)])
-    setters: tuple[Any, Any] = (axes.set_xlim, axes.set_ylim)
-    for limits, column in zip(setters, every.T, strict=True):
-        known = column[np.isfinite(column)]
-        margin = 0.06 * (float(np.ptp(known)) or abs(float(known[0])) or 1.0)
-        limits(float(known.min()) - margin, float(known.max()) + margin)
-
-
-def _lines(
-    axes: Axes,
-    prepared: Sequence[xarray.Dataset],
-    styles: Sequence[style.CurveStyle],
-    plane: Plane,
-    look: style.Look,
-) -> None:
-    factors = plane.factors()
-    spread = tuple(abs(b - a) / f for (a, b), f in zip((axes.get_xlim(), axes.get_ylim()), factors, strict=True))
-    earlier: dict[style.CurveStyle, list[np.ndarray]] = {}
-    for dataset, curve in zip(prepared, styles, strict=True):
-        pieces = strokes(dataset, plane.across, _UPWARDS)
-        for stroke in without_repeats(pieces, earlier.setdefault(curve, []), (spread[0], spread[1])):
-            x, y = bent(stroke.x, stroke.y, (spread[0], spread[1]))
-            axes.plot(
-                x * factors[0],
-                y * factors[1],
-                color=curve.colour,
-                linewidth=look.line * curve.width,
-                linestyle=_dash(stroke.stable, curve),
-                solid_capstyle="butt",
-                dash_capstyle="butt",
-                solid_joinstyle="round",
-                zorder=3,
-                gid="curve" if stroke.stable is None else "border" if stroke.stable else "within",
-            )
-
-
-def _shade(axes: Axes, heads: Sequence[xarray.Dataset], plane: Plane) -> dict[str, Any]:
-    """The regions of isolas, where the axes are those of their plane; their entries in the legend."""
-    from matplotlib.patches import Patch
-
-    entries: dict[str, Any] = {}
-    for region in regions(heads):
-        names = ["omega", region.parameter]
-        if sorted(names) != sorted((plane.across, plane.upwards or "")):
-            continue
-        parts = dict(zip(names, region.outline, strict=True))
-        (across, up), colour = plane.factors(), tinted(region.colour, PALE)
-        x, y = parts[plane.across] * across, parts[str(plane.upwards)] * up
-        axes.fill(x, y, facecolor=colour, linewidth=0.0, zorder=1.5, gid="isola")
-        entries[region.words] = Patch(facecolor=colour, linewidth=0.0)
-    return entries
-
-
-def _entries(
-    prepared: Sequence[xarray.Dataset],
-    cut: Sequence[Sequence[Part]],
-    names: Sequence[str],
-    styles: Sequence[style.CurveStyle],
-    plane: Plane,
-    look: style.Look,
-) -> dict[str, Line2D]:
-    """The legend: curves, strokes and hollow marks where there are two of them, events."""
-    from matplotlib.lines import Line2D
-
-    entries: dict[str, Line2D] = {}
-    for dataset, name, curve in zip(prepared, names, styles, strict=True):
-        small = small_mark(kind_of(dataset), curve, look, hollow=False)
-        entries[name] = Line2D([], [], color=curve.colour, linewidth=look.line * curve.width, **small)
-    every = [part for pieces in cut for part in pieces]
-    if any(part.stable is False for part in every):
-        for stable, words in ((True, BORDER), (False, WITHIN)):
-            if any(part.stable is stable for part in every):
-                dash = _dash(stable, style.ONE_CURVE)
-                entries[words] = Line2D([], [], color=style.SOFT, linewidth=look.line, linestyle=dash)
-    if any(part.subcritical for part in every):
-        hollow = small_mark("PD", style.ONE_CURVE, look, hollow=True)
-        entries[SUBCRITICAL] = Line2D([], [], linestyle="none", **hollow)
-    kinds = {
-        kind for dataset in prepared for kind, _, which in style.marks(dataset) if plane.marked(dataset)[which].any()
-    }
-    order = list(style.KINDS)
-    for kind in sorted(kinds, key=lambda k: (order.index(k) if k in order else len(order), k)):
-        entries[event_words(kind)] = Line2D([], [], **event_drawing(style.kind_style(kind), look))
-    return entries
-
-
-def _dash(stable: bool | None, curve: style.CurveStyle) -> Any:
-    return curve.dash if stable is False else style.STABLE_DASH
-
-
-def _along(
-    figure: Figure,
-    axes: Axes,
-    dataset: xarray.Dataset,
-    pieces: Sequence[Part],
-    curve: style.CurveStyle,
-    plane: Plane,
-    look: style.Look,
-) -> None:
-    """The small marks along one curve, none beneath the marker of an event."""
-    spacing = _SPACING / 25.4 * figure.dpi
-    events = axes.transData.transform(places(dataset, plane)) if dataset.sizes["event"] else np.empty((0, 2))
-    clear = style.MARKER_SIZE * look.marker * figure.dpi / 72.0
-    for part in pieces:
-        on_paper = axes.transData.transform(np.column_stack([part.x, part.y]) * np.array(plane.factors()))
-        spots = stations(on_paper[:, 0], on_paper[:, 1], spacing)
-        found = [p for p in spots if axes.bbox.contains(*p)]
-        keep = [p for p in found if not len(events) or np.hypot(*(events - p).T).min() > clear]
-        if not keep:
-            continue
-        x, y = axes.transData.inverted().transform(np.array(keep)).T
-        drawing = small_mark(kind_of(dataset), curve, look, hollow=part.subcritical)
-        axes.plot(x, y, linestyle="none", zorder=3.5, gid="along-hollow" if part.subcritical else "along", **drawing)
-
-
-def _name_events(
-    figure: Figure, axes: Axes, prepared: Sequence[xarray.Dataset], plane: Plane, look: style.Look
-) -> None:
-    """Codimension-two points by their short names; extrema of what is drawn upwards and isolas' ends by values."""
-    spots, texts = [], []
-    ends: list[tuple[np.ndarray, str]] = []
-    extrema = []
-    for dataset in prepared:
-        at = places(dataset, plane)
-        told = dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else [""] * len(at)
-        kinds, marked = dataset["event_kind"].to_numpy(), plane.marked(dataset)
-        for place, kind, extreme, wanted in zip(at, kinds, told, marked, strict=True):
-            if not wanted:
-                continue
-            if kind in (CENTRE, MERGING):
-                value = place[0] if plane.upwards == "omega" else None if plane.upwards is None else place[1]
-                ends.append((place, end_text(str(kind), value)))
-            elif str(kind) != "extremum":
-                spots.append(place)
-                texts.append(str(kind))
-            elif plane.upwards is not None and str(extreme).endswith(f" of {plane.upwards}"):
-                extrema.append((place, f"{place[1]:#.4g}"))
-    if len(extrema) <= _NAMED:
-        spots = [place for place, _ in extrema] + spots
-        texts = [text for _, text in extrema] + texts
-    spots = [place for place, _ in ends] + spots
-    texts = [text for _, text in ends] + texts
-    inside = [i for i, place in enumerate(spots) if math.isfinite(place[0]) and math.isfinite(place[1])]
-    annotate(figure, axes, np.array([spots[i] for i in inside]), [texts[i] for i in inside], look)
+def _first(group: Sequence[xarray.Dataset], x: str | None) -> str:
+    if x is None:
+        return plane_axes(group)[0]
+    for dataset in group:
+        coordinate(dataset, x)
+    return x

@@ -1,4 +1,4 @@
-"""What time integration finds: a trajectory over time, stroboscopic points, and brute-force diagrams over branches.
+"""What time integration finds: a trajectory, stroboscopic points, brute-force diagrams and stepped sines over branches.
 
 Motions have the colours of their periods, as in every picture; what does not repeat is grey.
 """
@@ -6,7 +6,6 @@ Motions have the colours of their periods, as in every picture; what does not re
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,23 +13,33 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.pictures import style
-from suboctave.pictures.legend import ordered, place_legend
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, dot, ordered, plain
+from suboctave.pictures.options import Coordinates, View, as_multiple, shown_multiple
+from suboctave.pictures.paper import figure_of
 from suboctave.pictures.periods import period_colour, period_name
-from suboctave.pictures.response import draw_response, dress
-from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.view import View
+from suboctave.pictures.response import response_frame
+from suboctave.pictures.style import Mark, Pen
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
-__all__ = ["plot_brute_force", "plot_sections", "plot_trajectory"]
+__all__ = [
+    "Size",
+    "check_contents",
+    "checked_dof",
+    "plot_brute_force",
+    "plot_sections",
+    "plot_stepped_sine",
+    "plot_trajectory",
+    "symbol_of",
+]
 
 Size = str | tuple[float, float]
 _POINTING = {"up": "^", "down": "v", "rest": "o"}
 _APERIODIC = "aperiodic"
+#: share of the axis beyond what is drawn
+_MARGIN = 0.02
 
 
 def plot_trajectory(
@@ -43,31 +52,21 @@ def plot_trajectory(
     size: Size = (7.2, 3.2),
 ) -> Figure:
     """The displacement (or "velocity") of one degree of freedom over time, instants of phase 0 marked."""
-    _check(trajectory, "trajectory")
+    check_contents(trajectory, "trajectory")
     if quantity not in ("displacement", "velocity"):
         raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), ['displacement', 'velocity'])}")
-    dof = _dof(trajectory, dof)
-    figure, axes, look = _frame(size)
-    omega = float(trajectory.attrs["omega"])
-    time = trajectory["time"].to_numpy() * omega / (2.0 * np.pi)
-    values = trajectory[quantity].to_numpy()[:, dof]
-    axes.plot(time, values, color=style.INK, linewidth=look.line, zorder=3, gid="motion")
-    every = slice(None, None, int(trajectory.attrs["steps_per_period"]))
-    axes.plot(
-        time[every],
-        values[every],
-        "o",
-        color=style.CURVE_COLOURS[0],
-        markersize=3.0 * look.marker,
-        zorder=4,
-        gid="strobe",
+    dof = checked_dof(trajectory, dof)
+    time = trajectory["time"].to_numpy() * float(trajectory.attrs["omega"]) / (2.0 * np.pi)
+    at = np.array([time, trajectory[quantity].to_numpy()[:, dof]])
+    instants = at[:, :: int(trajectory.attrs["steps_per_period"])]
+    line = Polyline(at, Pen(style.INK), role="motion")
+    strobe = Markers(instants, dot(style.CURVE_COLOURS[0], 3.0), cut=True, role="strobe", layer=4.0)
+    axes = (
+        Axis(r"time in load periods, $t/T$", time[0], time[-1]),
+        Axis(symbol_of(trajectory, dof, int(quantity == "velocity"))),
     )
-    symbol = f"x_{{{dof}}}" if trajectory.attrs["dofs"] > 1 else "x"
-    dress(
-        axes, r"time in load periods, $t/T$", f"${symbol}$" if quantity == "displacement" else rf"$\dot {symbol}$", look
-    )
-    axes.set_xlim(time[0], time[-1])
-    return _finish(figure, axes, {}, look, title, path)
+    frame = Frame([line, strobe], title=style.checked_text(title))
+    return figure_of(Drawing(axes, [frame]), style.sheet_of(size), path)
 
 
 def plot_sections(
@@ -79,30 +78,18 @@ def plot_sections(
     size: Size = (5.2, 4.6),
 ) -> Figure:
     """Stroboscopic points in the plane of displacement and velocity of one degree of freedom, coloured by period."""
-    _check(sections, "poincare sections")
-    dof = _dof(sections, dof)
-    figure, axes, look = _frame(size)
-    x, v = (sections[name].to_numpy()[..., dof] for name in ("displacement", "velocity"))
-    legend: dict[str, Any] = {}
+    check_contents(sections, "poincare sections")
+    dof = checked_dof(sections, dof)
+    at = np.array([sections[name].to_numpy()[..., dof] for name in ("displacement", "velocity")])
+    frame, entries = Frame(title=style.checked_text(title)), {}
     periods = sections["period"].to_numpy()
     for period in sorted(set(periods.tolist()), key=lambda p: (p != 0, p)):
-        rows = np.flatnonzero(periods == period)
         last = slice(-period, None) if period else slice(None)
-        axes.plot(
-            x[rows, last].ravel(),
-            v[rows, last].ravel(),
-            "o" if period else ".",
-            color=_colour(period),
-            markersize=(4.0 if period else 1.6) * look.marker,
-            markeredgewidth=0.0,
-            zorder=3 + bool(period),
-            gid=f"period {period}",
-        )
-        legend[_name(period)] = _dot(period, look)
-    several = sections.attrs["dofs"] > 1
-    symbol = f"x_{{{dof}}}" if several else "x"
-    dress(axes, f"${symbol}$", rf"$\dot {symbol}$", look)
-    return _finish(figure, axes, legend, look, title, path)
+        chosen = at[:, np.flatnonzero(periods == period), last].reshape(2, -1)
+        frame.items.append(_points(chosen, period, 4.0 if period else 0.8, f"period {period}"))
+        entries[_name(period)] = Entry(mark=dot(_colour(period)))
+    axes = [Axis(symbol_of(sections, dof, order)) for order in (0, 1)]
+    return figure_of(Drawing(axes, [frame], ordered(entries)), style.sheet_of(size), path)
 
 
 def plot_brute_force(
@@ -116,7 +103,7 @@ def plot_brute_force(
     title: str | None = None,
     size: Size = (6.4, 4.2),
 ) -> Figure:
-    """What was found over the parameter that was varied, with branches beneath if any are given.
+    """The motions over the parameter that was varied, with branches beneath if any are given.
 
     Parameters
     ----------
@@ -135,9 +122,7 @@ def plot_brute_force(
     InputError
         For what cannot be drawn, before anything is.
     """
-    from suboctave.pictures.plot import datasets_of
-
-    _check(diagram, "brute force")
+    check_contents(diagram, "brute force")
     if quantity not in ("amplitude", "section"):
         raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), ['amplitude', 'section'])}")
     if curves is not None and quantity != "amplitude":
@@ -147,77 +132,146 @@ def plot_brute_force(
     for name in shown:
         if name not in known:
             raise InputError(f"there is no start {name!r}{suggest(str(name), known)}")
-    dof = _dof(diagram, dof)
-    name = str(diagram.attrs["varied"])
-    figure, axes, look = _frame(size)
-    view = View()
-    legend: dict[str, Any] = {}
-    if curves is not None:
-        legend |= draw_response(axes, datasets_of(curves, view), x=name, view=view, look=look)
-    draw = _amplitudes if quantity == "amplitude" else _sections
-    marks: dict[str, Any] = {}
+    dof = checked_dof(diagram, dof)
+    varied = str(diagram.attrs["varied"])
+    frame, entries = _beneath(curves, varied, View())
+    add = _add_amplitudes if quantity == "amplitude" else _add_sections
+    marks: dict[str, Entry] = {}
     for start in shown:
-        marks |= draw(axes, diagram.isel(start=known.index(start)), start, dof, look)
-    # beside curves, whose periods have the same names, marks say that they were found in time
-    legend |= {f"{name}, in time" if curves is not None else name: mark for name, mark in marks.items()}
-    several = diagram.attrs["dofs"] > 1
-    symbol = f"x_{{{dof}}}" if several else "x"
+        marks |= add(frame, diagram.isel(start=known.index(start)), start, dof)
+    # beside curves, whose periods have the same names, marks say that they are motions in time
+    entries |= {f"{name}, in time" if curves is not None else name: mark for name, mark in marks.items()}
+    symbol = symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
-    dress(axes, r"$\omega$" if name == "omega" else name.replace("$", r"\$"), upwards, look)
     values = diagram["value"].to_numpy()
-    spread = np.ptp(values) or abs(values[0]) or 1.0
-    axes.set_xlim(values[0] - 0.02 * spread, values[-1] + 0.02 * spread)
-    return _finish(figure, axes, legend, look, title, path)
+    margin = _MARGIN * (np.ptp(values) or abs(values[0]) or 1.0)
+    across = Axis(r"$\omega$" if varied == "omega" else plain(varied), values[0] - margin, values[-1] + margin)
+    frame.title = style.checked_text(title)
+    return figure_of(Drawing((across, Axis(upwards)), [frame], ordered(entries)), style.sheet_of(size), path)
 
 
-def _amplitudes(axes: Axes, row: xarray.Dataset, start: str, dof: int, look: style.Look) -> dict[str, Any]:
-    legend: dict[str, Any] = {}
+def plot_stepped_sine(
+    test: xarray.Dataset,
+    path: str | Path | None = None,
+    *,
+    curves: Any = None,
+    measured: Any = None,
+    harmonic: float = 1,
+    dof: int | None = None,
+    xlim: Sequence[float] | None = None,
+    ylim: Sequence[float] | None = None,
+    title: str | None = None,
+    size: Size = (6.4, 4.2),
+) -> Figure:
+    """The modulus of a component at each step: upward and downward triangles, coloured by the period of the motion.
+
+    Parameters
+    ----------
+    curves
+        Branches, diagrams of branches or their datasets, drawn beneath by the same harmonic.
+    measured
+        `Measured`, or several of them; of the fundamental only.
+    harmonic, dof
+        Which multiple of omega; which degree of freedom (default the observed one).
+    xlim, ylim
+        Part of the axes that is shown, (from, to); default the frequencies of the test, and all amplitudes.
+
+    Raises
+    ------
+    InputError
+        For what cannot be drawn, before anything is.
+    """
+    check_contents(test, "stepped sine")
+    dof = checked_dof(test, dof)
+    harmonic = as_multiple(harmonic)
+    listed = _measured(measured, harmonic)
+    limits = View(xlim=xlim, ylim=ylim)
+    values = _component(test, harmonic, dof)
+    frame, entries = _beneath(curves, "omega", View("harmonic", harmonic, None, dof))
+    omega, periods = test["omega"].to_numpy(), test["period"].to_numpy()
+    for s, direction in enumerate(test["direction"].to_numpy()):
+        for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
+            here = periods[s] == period
+            name = "not settled" if period == 0 else _name(period)
+            mark = Mark(_POINTING.get(str(direction), "s"), 3.6, "none", _colour(period), 0.8)
+            at = np.array([omega[here], values[s][here]])
+            frame.items.append(Markers(at, mark, cut=True, role=f"{direction} {name}", layer=4.0))
+            entries[f"{name}, stepped {direction}"] = Entry(mark=mark)
+    for one, colour in zip(listed, style.CURVE_COLOURS[3:] * len(listed), strict=False):
+        mark = Mark("+", 5.0, colour, colour)
+        at = np.array([one.omega, one.amplitude])
+        frame.items.append(Markers(at, mark, cut=True, role="measured", layer=4.2))
+        entries[plain(one.label)] = Entry(mark=mark)
+    symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
+    every = np.concatenate([omega, *(one.omega for one in listed)])
+    margin = _MARGIN * (np.ptp(every) or abs(every[0]))
+    low, high = limits.xlim or (every.min() - margin, every.max() + margin)
+    axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", *(limits.ylim or (0.0, None)))
+    frame.title = style.checked_text(title)
+    return figure_of(Drawing(axes, [frame], ordered(entries)), style.sheet_of(size), path)
+
+
+def _beneath(curves: Any, x: str, view: View) -> tuple[Frame, dict[str, Entry]]:
+    """The frame with branches over `x`, if any are given, and their entries in the legend."""
+    if curves is None:
+        return Frame(), {}
+    from suboctave.pictures.plot import datasets_of
+
+    return response_frame(datasets_of(curves, view), Coordinates((x, None), view))
+
+
+def _add_amplitudes(frame: Frame, row: xarray.Dataset, start: str, dof: int) -> dict[str, Entry]:
+    entries: dict[str, Entry] = {}
     values, periods = row["value"].to_numpy(), row["period"].to_numpy()
     largest = row["largest"].to_numpy()[..., dof]
     for period in sorted({int(p) for p in periods if p >= 0}):
         here = np.flatnonzero(periods == period)
         heights = largest[here][:, -period:].max(axis=1) if period else largest[here].max(axis=1)
-        legend[_name(period)] = axes.plot(
-            values[here],
-            heights,
-            _POINTING.get(start, "s"),
-            color=_colour(period),
-            markerfacecolor="none",
-            markersize=3.2 * look.marker,
-            markeredgewidth=0.7 * look.edge,
-            zorder=4,
-            gid=f"{start} {_name(period)}",
-        )[0]
-    return legend
+        mark = Mark(_POINTING.get(start, "s"), 3.2, "none", _colour(period), 0.7)
+        at = np.array([values[here], heights])
+        frame.items.append(Markers(at, mark, cut=True, role=f"{start} {_name(period)}", layer=4.0))
+        entries[_name(period)] = Entry(mark=mark)
+    return entries
 
 
-def _sections(axes: Axes, row: xarray.Dataset, start: str, dof: int, look: style.Look) -> dict[str, Any]:
-    legend: dict[str, Any] = {}
+def _add_sections(frame: Frame, row: xarray.Dataset, start: str, dof: int) -> dict[str, Entry]:
+    entries: dict[str, Entry] = {}
     values, periods = row["value"].to_numpy(), row["period"].to_numpy()
     x = row["displacement"].to_numpy()[..., dof]
     for period in sorted({int(p) for p in periods if p >= 0}):
         here = np.flatnonzero(periods == period)
         points = x[here][:, -period:] if period else x[here]
-        axes.plot(
-            np.repeat(values[here], points.shape[1]),
-            points.ravel(),
-            "o",
-            color=_colour(period),
-            markersize=(1.8 if period else 0.9) * look.marker,
-            markeredgewidth=0.0,
-            zorder=3 + bool(period),
-            gid=f"{start} {_name(period)}",
-        )
-        legend[_name(period)] = _dot(period, look)
-    return legend
+        at = np.array([np.repeat(values[here], points.shape[1]), points.ravel()])
+        frame.items.append(_points(at, period, 1.8 if period else 0.9, f"{start} {_name(period)}"))
+        entries[_name(period)] = Entry(mark=dot(_colour(period)))  # large enough for its colour to be seen
+    return entries
 
 
-def _dot(period: int, look: style.Look) -> Line2D:
-    """A point in the legend, large enough for its colour to be seen."""
-    from matplotlib.lines import Line2D
+def _points(at: np.ndarray, period: int, size: float, role: str) -> Markers:
+    return Markers(at, dot(_colour(period), size), cut=True, role=role, layer=3.0 + bool(period))
 
-    return Line2D([], [], marker="o", linestyle="none", color=_colour(period), markersize=4.0 * look.marker,
-                  markeredgewidth=0.0)  # fmt: skip
+
+def _component(test: xarray.Dataset, harmonic: float, dof: int) -> np.ndarray:
+    if harmonic == 1:
+        return np.asarray(np.hypot(test["response_real"], test["response_imag"]))[..., dof]
+    multiples = test["multiple"].to_numpy()
+    which = np.flatnonzero(np.abs(multiples - harmonic) < 1e-9)
+    if not which.size:
+        raise InputError(f"harmonic={harmonic:g} was not measured; there are {multiples.tolist()}")
+    modulus = np.asarray(np.hypot(test["component_real"], test["component_imag"]))
+    return np.asarray(modulus[:, :, int(which[0]), dof])
+
+
+def _measured(measured: Any, harmonic: float) -> list[Any]:
+    if measured is None:
+        return []
+    if harmonic != 1:
+        raise InputError("measured= are amplitudes of the fundamental: they are drawn with harmonic=1")
+    listed = list(measured) if isinstance(measured, Sequence) else [measured]
+    for one in listed:
+        if not (hasattr(one, "omega") and hasattr(one, "amplitude") and hasattr(one, "label")):
+            raise InputError(f"measured= takes what read_measured gives, not {type(one).__name__}")
+    return listed
 
 
 def _colour(period: int) -> str:
@@ -228,41 +282,25 @@ def _name(period: int) -> str:
     return period_name(period) if period else _APERIODIC
 
 
-def _check(dataset: Any, contents: str) -> None:
-    found = getattr(dataset, "attrs", {}).get("contents")
-    if found != contents:
+def symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
+    """A displacement, or its first derivative, as an axis says it."""
+    symbol = f"x_{{{dof}}}" if dataset.attrs["dofs"] > 1 else "x"
+    return rf"$\dot {symbol}$" if order else f"${symbol}$"
+
+
+def check_contents(dataset: Any, contents: str) -> None:
+    """InputError for what is no dataset of these contents."""
+    given = getattr(dataset, "attrs", {}).get("contents")
+    if given != contents:
         raise InputError(
-            f"expected a dataset of {contents!r}, got {found or type(dataset).__name__!r}; use its to_xarray()"
+            f"expected a dataset of {contents!r}, got {given or type(dataset).__name__!r}; use its to_xarray()"
         )
 
 
-def _dof(dataset: xarray.Dataset, dof: int | None) -> int:
+def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
+    """The degree of freedom that is drawn, default the observed one; InputError where there is none."""
     count = int(dataset.attrs["dofs"])
     chosen = int(dataset.attrs["observed"]) if dof is None else dof
     if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer) or not 0 <= chosen < count:
         raise InputError(f"dof={dof!r} is out of range: there are {count} DOFs, numbered from 0")
     return int(chosen)
-
-
-def _frame(size: Size) -> tuple[Figure, Axes, style.Look]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    inches = style.size_in_inches(size)
-    look = style.PRINT if isinstance(size, str) else style.look_of(inches[0])
-    figure = Figure(figsize=inches, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots(), look
-
-
-def _finish(
-    figure: Figure, axes: Axes, legend: dict[str, Any], look: style.Look, title: str | None, path: str | Path | None
-) -> Figure:
-    if title:
-        style.check_text(title)
-        axes.set_title(title, fontsize=look.large, color=style.INK)
-    place_legend(figure, [axes], ordered(legend), look)
-    if path is not None:
-        save_figure(figure, path)
-    setattr(figure, "_repr_png_", partial(png_bytes, figure))  # noqa: B010
-    return figure

@@ -1,48 +1,37 @@
-"""What pictures of single motions have in common: units, frames, captions, colours.
+"""Phase portraits and time histories of single motions.
 
 A motion is a dataset (`suboctave.store.motions`), so that a picture is the same from a live orbit, from a branch and
-from a file. Motions stand in frames of their own on shared axes, or all in one.
+from a file. Motions stand in frames of their own on shared axes, or all in one. A motion of nu load periods has nu
+stroboscopic points, at t = 0, 2 pi / omega, ...: a period doubling doubles their number.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from suboctave.errors import InputError, path_of, suggest
+from suboctave.errors import InputError
 from suboctave.pictures import style
-from suboctave.pictures.legend import place_legend
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
+from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionView, UnitOptions, keywords_of
+from suboctave.pictures.paper import check_path, figure_of
 from suboctave.pictures.periods import curve_styles, period_name, period_of, styles_of_periods
-from suboctave.pictures.saving import SUFFIXES, png_bytes, save_figure
-from suboctave.pictures.view import check_units
+from suboctave.pictures.style import Mark, Pen
+from suboctave.pictures.words import differing
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "DERIVATIVES",
-    "Frames",
-    "MotionView",
-    "captions",
-    "check_path",
-    "differing",
-    "draw_gaps",
-    "draw_sections",
-    "lower_first",
-]
+__all__ = ["MotionDrawing", "plot_history", "plot_phase"]
 
-#: what of a displacement may be shown: the order of its derivative by time
-DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
-_DOTS = ("x", r"\dot{x}", r"\ddot{x}")
-_CALLED = ("displacement", "velocity", "acceleration")
+#: inches of one frame of a portrait, and of a history
+_PORTRAIT, _HISTORY = (3.0, 2.9), (5.6, 2.0)
 #: most frames in one row
 _COLUMNS = 4
 #: inches of width below which captions and labels are cut short
@@ -53,101 +42,152 @@ _WIDE = 5.0
 _LINE = 0.13
 
 
-@dataclass(frozen=True)
-class MotionView:
-    """What is drawn of a motion and in which units; the names mean what they mean for `View`.
+def plot_phase(
+    motions: Any,
+    path: str | Path | None = None,
+    *,
+    points: Sequence[int] | None = None,
+    dof: int | None = None,
+    overlay: bool = False,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: str | tuple[float, float] | None = None,
+    **options: Unpack[UnitOptions],
+) -> Figure:
+    """Draw phase portraits, dx/dt over x along one response period, side by side or in one frame.
 
-    quantity
-        "displacement", "velocity", "acceleration", or "force" with `element`.
-    frequency
-        "Hz" or "rad/s": the system's time is in seconds.
-    omega_reference
-        Frequencies are `omega / omega_reference`, time is `omega_reference t`, and velocities are derivatives by that.
-    scale, unit
-        Factor on lengths (of a force, on the force), and its unit.
+    The colour tells the period, T, 2T, ...; circles are the stroboscopic points t = 0, 2 pi / omega, ..., thin lines
+    the gaps of elements that act on the degree of freedom alone.
+
+    Parameters
+    ----------
+    motions
+        An orbit, a bifurcation, a point of a branch, a branch with `points`, a dataset of a motion, or a sequence of
+        these.
+    path
+        Where the figure is saved: .png, .svg or .pdf, fonts embedded.
+    points
+        Which points of the branches, by index.
+    dof
+        Degree of freedom; default the one that the branch observes, of an orbit alone that of its first load.
+    overlay
+        All in one frame; else each in its own, on shared axes.
+    labels, title
+        Names of the motions, title.
+    size
+        "single-column" (84 mm), "double-column" (174 mm), or width and height in inches. With several frames the named
+        sizes are widths.
+    options
+        `frequency`: "rad/s" or "Hz", where the system's time is in seconds. `omega_reference`: frequencies are stated
+        as `omega / omega_reference`, velocities as derivatives by `omega_reference t`. `scale`, `unit`: factor on
+        lengths, and its unit for the labels, `scale=1e3, unit="mm"`. `xlabel`, `ylabel`: texts of the axes.
+
+    Raises
+    ------
+    InputError
+        For what cannot be drawn, before anything is.
     """
+    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
 
-    quantity: str = "displacement"
-    element: int | None = None
-    frequency: str | None = None
-    omega_reference: float | None = None
-    scale: float | None = None
-    unit: str | None = None
-    xlabel: str | None = None
-    ylabel: str | None = None
-
-    def __post_init__(self) -> None:
-        check_units(self.frequency, self.omega_reference, self.scale)
-
-    def check_quantity(self, known: Sequence[str]) -> None:
-        """InputError for a quantity that is not among those known, or an element where none is asked for."""
-        if self.quantity not in known:
-            raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), known)}")
-        if self.quantity == "force":
-            if isinstance(self.element, bool) or not isinstance(self.element, int | np.integer):
-                raise InputError("the quantity 'force' is one of an element: give element=, its index")
-        elif self.element is not None:
-            raise InputError(
-                f"element={self.element!r} says nothing about the quantity {self.quantity!r}; leave it out"
-            )
-
-    def factor(self, order: int = 0) -> float:
-        """What a derivative of x of this order is multiplied by."""
-        return float(self.scale or 1.0) / (self.omega_reference or 1.0) ** order
-
-    def name(self, dataset: xarray.Dataset, order: int, words: bool = False) -> str:
-        """A derivative of x as an axis says it: `dx/dt (mm/s)`."""
-        one = int(dataset.attrs["dofs"]) == 1
-        index = "" if one else f"_{{{int(dataset.attrs['dof'])}}}"
-        if self.omega_reference is not None and order:
-            power = "" if order == 1 else f"^{order}"
-            said = rf"$d{power}x{index}/d(\omega_0 t){power}$"
-        else:
-            said = f"${_DOTS[order]}{index}$"
-        if words:
-            said = f"{_CALLED[order]} {said}"
-        if self.unit:
-            per = "" if not order or self.omega_reference is not None else ("/s", "/s²")[order - 1]
-            per = per if self.frequency or not per else per.replace("s", "time")
-            said += f" ({self.unit}{per})"
-        return said
-
-    def at_frequency(self, omega: float) -> str:
-        """A frequency in words."""
-        if self.frequency == "Hz":
-            return f"{omega / (2.0 * math.pi):.4g} Hz"
-        if self.omega_reference is not None:
-            return rf"$\omega/\omega_0$ = {omega / self.omega_reference:.4g}"
-        return rf"$\omega$ = {omega:.4g}" + (" rad/s" if self.frequency else "")
+    view = MotionView(**keywords_of("plot_phase", options, UnitOptions))
+    check_path(path)
+    datasets = motion_datasets(motions, points, dof)
+    drawn = MotionDrawing(datasets, view, overlay=overlay, labels=labels, size=size, cell=_PORTRAIT)
+    factors = np.array([[view.factor(0)], [view.factor(1)]])
+    for index in drawn.lower_first:
+        data = datasets[index]
+        at, sections = (
+            np.array([data[f"{prefix}{name}"].to_numpy() for name in ("displacement", "velocity")]) * factors
+            for prefix in ("", "section_")
+        )
+        drawn.add_motion(index, at, sections)
+    drawn.add_gaps(upright=True)
+    texts = [view.name(datasets[0], order, words=not drawn.narrow) for order in (0, 1)]
+    return drawn.figure(Axis(texts[0]), Axis(texts[1]), title, path)
 
 
-def differing(datasets: Sequence[xarray.Dataset]) -> list[list[str]]:
-    """For each motion the parameters that differ between them, such as "p = 0.55"."""
-    values = [
-        dict(zip((str(n) for n in data["parameter"].to_numpy()), data["parameters"].to_numpy(), strict=True))
-        for data in datasets
-    ]
-    shared = [name for name in values[0] if all(name in known for known in values)]
-    names = [name for name in shared if len({float(known[name]) for known in values}) > 1]
-    return [[f"{name} = {known[name]:.4g}" for name in names] for known in values]
+def plot_history(
+    motions: Any,
+    path: str | Path | None = None,
+    *,
+    points: Sequence[int] | None = None,
+    dof: int | None = None,
+    overlay: bool = False,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: str | tuple[float, float] | None = None,
+    **options: Unpack[HistoryOptions],
+) -> Figure:
+    """Draw motions, or the force of an element along them, over one response period.
+
+    Time is counted in load periods from phase zero of the load; beside a motion of longer period others go on, thin.
+    Circles are the stroboscopic instants, thin grey lines the gaps of elements that act on the degree of freedom alone.
+
+    Parameters
+    ----------
+    motions, path, points, dof, overlay, labels, title, size
+        As in `plot_phase`.
+    options
+        `quantity`: "displacement", "velocity", "acceleration", or "force" with `element`, its index. `frequency`: "Hz"
+        or "rad/s", where the system's time is in seconds: the axis shows seconds. `omega_reference`: the axis shows
+        `omega_reference t`. `scale`, `unit`: factor on lengths (or on the force), and its unit for the label.
+        `xlabel`, `ylabel`: texts of the axes.
+
+    Raises
+    ------
+    InputError
+        For what cannot be drawn, before anything is.
+    """
+    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
+
+    view = MotionView(**keywords_of("plot_history", options, HistoryOptions))
+    view.check_quantity([*DERIVATIVES, "force"])
+    check_path(path)
+    datasets = motion_datasets(motions, points, dof, () if view.element is None else (view.element,))
+    drawn = MotionDrawing(datasets, view, overlay=overlay, labels=labels, size=size, cell=_HISTORY, stacked=True)
+    units = [_unit_of_time(dataset, view) for dataset in datasets]
+    longest = max(float(data["time"].to_numpy()[-1]) * unit for data, unit in zip(datasets, units, strict=True))
+    for index in drawn.lower_first:
+        data, unit = datasets[index], units[index]
+        time, values = data["time"].to_numpy() * unit, _values(data, view)
+        at = data["section_time"].to_numpy() * unit
+        drawn.add_motion(index, np.array([time, values]), np.array([at, np.interp(at, time, values)]))
+        for repeated in range(1, math.ceil(longest / time[-1] - 1e-9)):
+            again = Pen(drawn.pens[index].colour, 0.5)
+            line = Polyline(np.array([time + repeated * time[-1], values]), again, role="repeated", layer=2.5)
+            drawn.frame(index).items.append(line)
+    if view.quantity == "displacement":
+        drawn.add_gaps(upright=False)
+    in_periods = view.frequency is None and view.omega_reference is None
+    ticks = Ticks(9, (1, 2, 5, 10)) if in_periods and longest > 1.5 else None
+    text = "time (s)" if view.frequency else r"time in load periods, $t/T$" if in_periods else r"time $\omega_0 t$"
+    across = Axis(text, -0.02 * longest, 1.02 * longest, ticks=ticks)
+    if view.quantity == "force":
+        upwards = f"force of element {view.element}" + (f" ({view.unit})" if view.unit else "")
+    else:
+        upwards = view.name(datasets[0], DERIVATIVES[view.quantity])
+    return drawn.figure(across, Axis(upwards), title, path)
 
 
-def captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:
-    """What is said of each motion: T, 2T, ... with the kind of a bifurcation; frequency; what differs."""
-    told = []
-    for dataset, words in zip(datasets, differing(datasets), strict=True):
-        kind = _plain(str(dataset.attrs.get("kind", "")))
-        period = period_name(period_of(dataset))
-        frequency = view.at_frequency(float(dataset.attrs["omega"]))
-        told.append([f"{period}, {kind}" if kind else period, frequency, *words])
-    return told
+def _values(dataset: xarray.Dataset, view: MotionView) -> np.ndarray:
+    if view.quantity == "force":
+        row = list(dataset["element"].to_numpy()).index(view.element)
+        return np.asarray(dataset["force"].to_numpy()[row] * view.factor())
+    return np.asarray(dataset[view.quantity].to_numpy() * view.factor(DERIVATIVES[view.quantity]))
 
 
-class Frames:
-    """The frames of one figure and what is drawn in which: one for each motion on shared axes, or one for all.
+def _unit_of_time(dataset: xarray.Dataset, view: MotionView) -> float:
+    """What t is multiplied by on the axis."""
+    if view.frequency is not None:
+        return 1.0
+    return view.omega_reference or float(dataset.attrs["omega"]) / (2.0 * math.pi)
 
-    `axes`, one for each motion; `narrow`, whether there is little room for words; `looks`, the style of each motion;
-    `legend` and `last`, the legend's entries, first those of single motions.
+
+class MotionDrawing:
+    """The frames of one figure of motions: one for each motion on shared axes, or one for all.
+
+    `narrow`, whether there is little room for words; `names` and `pens` of the motions; `legend` and `last`, the
+    legend's entries, first those of single motions.
     """
 
     def __init__(
@@ -161,108 +201,92 @@ class Frames:
         cell: tuple[float, float],
         stacked: bool = False,
     ) -> None:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
         count = len(datasets)
         if labels is not None and len(labels) != count:
             raise InputError(f"labels: expected one for each of the {count} motions, got {len(labels)}")
         dofs = sorted({int(dataset.attrs["dof"]) for dataset in datasets})
         if len(dofs) > 1:
             raise InputError(f"the motions are of different degrees of freedom ({dofs}): choose one with dof=")
+        self.datasets, self.view, self.overlay = datasets, view, overlay and count > 1
         frames = 1 if overlay else count
-        self.overlay = overlay and count > 1
-        columns = 1 if stacked else _columns(frames, size)
-        rows = math.ceil(frames / columns)
-        inches = _inches(size, columns, rows, cell)
-        self.narrow = inches[0] / columns < _NARROW
-        told = [("\n" if self.narrow and not overlay else ", ").join(parts) for parts in captions(datasets, view)]
-        if isinstance(size, str) and not overlay and rows * columns > 1:  # room for what stands over the frames
-            inches = inches[0], inches[1] + rows * _LINE * (told[0].count("\n") + (labels is not None))
-        self.look = style.PRINT if isinstance(size, str) else style.look_of(inches[0] / columns)
-        self.figure: Figure = Figure(figsize=inches, layout="constrained", facecolor="white")
-        FigureCanvasAgg(self.figure)
-        grid = self.figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-        every: list[Axes] = list(grid.ravel())
-        self.frames = every[:frames]
-        for index in range(frames, rows * columns):
-            every[index].remove()
-            every[index - columns].tick_params(labelbottom=True)
-        self.axes = self.frames * count if overlay else self.frames
-        self.names = told if labels is None else [_plain(label) for label in labels]
+        self.columns = 1 if stacked else _columns(frames, size)
+        rows = math.ceil(frames / self.columns)
+        inches = _inches(size, self.columns, rows, cell)
+        self.narrow = inches[0] / self.columns < _NARROW
+        captions = [("\n" if self.narrow and not overlay else ", ").join(parts) for parts in _captions(datasets, view)]
+        named = isinstance(size, str)
+        if named and not overlay and rows * self.columns > 1:  # room for what stands over the frames
+            inches = inches[0], inches[1] + rows * _LINE * (captions[0].count("\n") + (labels is not None))
+        self.sheet = style.Sheet(inches, style.PRINT if named else style.look_of(inches[0] / self.columns), named)
+        self.names = captions if labels is None else [plain(label) for label in labels]
         periods = [period_of(dataset) for dataset in datasets]
         # in frames of their own motions of one period need not differ
-        self.looks = curve_styles(datasets, self.names) if overlay else styles_of_periods(periods, [""] * count)
-        self.legend: dict[str, dict[str, Any]] = {}
-        self.last: dict[str, dict[str, Any]] = {}
+        pens = curve_styles(datasets, self.names) if overlay else styles_of_periods(periods, [""] * count)
+        self.pens = [Pen(pen.colour, pen.width if self.overlay else 1.0) for pen in pens]
+        self.frames = [Frame() for _ in range(frames)]
         if not self.overlay:
-            for index, axes in enumerate(self.frames):
-                above = told[index] if labels is None else f"{self.names[index]}\n{told[index]}"
-                axes.set_title(above, fontsize=self.look.normal, color=style.INK)
-        self._edges = (columns, frames)
+            for frame, name, caption in zip(self.frames, self.names, captions, strict=True):
+                frame.title = caption if labels is None else f"{name}\n{caption}"
+        self.legend: dict[str, Entry] = {}
+        self.last: dict[str, Entry] = {}
 
-    def add(self, name: str, drawing: dict[str, Any], last: bool = True) -> None:
-        """An entry of the legend, motions before what is said of all of them; the first of a name stays."""
-        (self.last if last else self.legend).setdefault(name, drawing)
+    @property
+    def lower_first(self) -> list[int]:
+        """The order of drawing: sub-harmonic motions over those of the load's period."""
+        return sorted(range(len(self.datasets)), key=lambda index: period_of(self.datasets[index]))
 
-    def finish(self, across: str, upwards: str, title: str | None, path: str | Path | None) -> Figure:
-        """Labels, legend, title; saved where a path is given."""
-        from matplotlib.lines import Line2D
+    def frame(self, index: int) -> Frame:
+        """The frame of a motion."""
+        return self.frames[index if len(self.frames) > 1 else 0]
 
-        columns, frames = self._edges
-        for index, axes in enumerate(self.frames):
-            lowest = index + columns >= frames
-            _dress(axes, across if lowest else "", upwards if index % columns == 0 else "", self.look)
-        if title:
-            self.figure.suptitle(_plain(title), fontsize=self.look.large, color=style.INK)
-        entries = {name: Line2D([], [], **drawing) for name, drawing in {**self.legend, **self.last}.items()}
+    def add_motion(self, index: int, at: np.ndarray, sections: np.ndarray) -> None:
+        """Add a motion as a line, (2, instants), and circles on its stroboscopic points, (2, points)."""
+        pen = self.pens[index]
+        circle = Mark("o", 0.9 * style.MARKER_SIZE, "#ffffff", pen.colour, 1.4)
+        circles = Markers(sections, circle, role="stroboscopic", layer=5.0)
+        self.frame(index).items += [Polyline(at, pen, role="motion"), circles]
+        self.last.setdefault("stroboscopic points", Entry(mark=replace(circle, edge=style.INK)))
+        if self.overlay:
+            self.legend.setdefault(self.names[index], Entry(pen))
+
+    def add_gaps(self, upright: bool) -> None:
+        """Add thin lines at the gaps that the widest of the motions reaches, or nearly so."""
+        pen, drawn = Pen(style.SOFT, 0.6), set()
+        reach = 1.25 * max(float(dataset.attrs["amplitude"]) for dataset in self.datasets)
+        for index, dataset in enumerate(self.datasets):
+            for level in np.unique(dataset["gap_level"].to_numpy()):
+                if abs(level) > reach or (id(self.frame(index)), float(level)) in drawn:
+                    continue
+                drawn.add((id(self.frame(index)), float(level)))
+                line = Guide(float(level) * self.view.factor(), pen, upright, role="gap", layer=1.0)
+                self.frame(index).items.append(line)
+                self.last.setdefault("gaps", Entry(pen))
+
+    def figure(self, across: Axis, upwards: Axis, title: str | None, path: str | Path | None) -> Figure:
+        """The figure, saved where a path is given."""
+        own = (self.view.xlabel, self.view.ylabel)
+        axes = [replace(a, label=text or a.label) for a, text in zip((across, upwards), own, strict=True)]
         # beside several frames: inside one of them it would seem to be about that one
-        place_legend(self.figure, self.frames if frames == 1 else [], entries, self.look)
-        if path is not None:
-            save_figure(self.figure, path)
-        # Notebooks show an object that has this; without pyplot nothing else would tell them to.
-        setattr(self.figure, "_repr_png_", partial(png_bytes, self.figure))  # noqa: B010
-        return self.figure
+        legend = "free" if len(self.frames) == 1 else "outside"
+        arranged: dict[str, Any] = {"columns": self.columns, "legend": legend, "grid": False, "small": True}
+        entries = {**self.legend, **self.last}
+        drawing = Drawing(axes, self.frames, entries, plain(title or ""), **arranged)
+        return figure_of(drawing, self.sheet, path)
 
 
-def lower_first(datasets: Sequence[xarray.Dataset]) -> list[int]:
-    """The order of drawing: sub-harmonic motions over those of the load's period."""
-    return sorted(range(len(datasets)), key=lambda index: period_of(datasets[index]))
-
-
-def draw_sections(frames: Frames, index: int, x: np.ndarray, y: np.ndarray) -> None:
-    """Circles on the stroboscopic points of a motion."""
-    marks: dict[str, Any] = {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": 0.9 * style.MARKER_SIZE * frames.look.marker,
-        "markerfacecolor": "#ffffff",
-        "markeredgewidth": 1.4 * frames.look.edge,
-    }
-    colour = frames.looks[index].colour
-    frames.axes[index].plot(x, y, zorder=5, gid="stroboscopic", markeredgecolor=colour, clip_on=False, **marks)
-    frames.add("stroboscopic points", {**marks, "markeredgecolor": style.INK})
-
-
-def draw_gaps(frames: Frames, datasets: Sequence[xarray.Dataset], view: MotionView, upright: bool) -> None:
-    """Thin lines at the gaps that the widest of the motions reaches, or nearly so."""
-    drawing: dict[str, Any] = {"color": style.SOFT, "linewidth": 0.6 * frames.look.line}
-    reach = 1.25 * max(float(dataset.attrs["amplitude"]) for dataset in datasets)
-    drawn: set[tuple[int, float]] = set()
-    for axes, dataset in zip(frames.axes, datasets, strict=True):
-        for level in np.unique(dataset["gap_level"].to_numpy()):
-            if abs(level) > reach or (id(axes), float(level)) in drawn:
-                continue
-            drawn.add((id(axes), float(level)))
-            line = axes.axvline if upright else axes.axhline
-            line(float(level) * view.factor(), zorder=1, gid="gap", **drawing)
-            frames.add("gaps", drawing)
-
-
-def check_path(path: str | Path | None) -> None:
-    """InputError for a file of a form that figures do not have, before any work."""
-    if path is not None and (suffix := path_of(path).suffix.lower()) not in SUFFIXES:
-        raise InputError(f"cannot tell the form of {path_of(path).name!r} from its suffix{suggest(suffix, SUFFIXES)}")
+def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:
+    """What stands over each motion: T, 2T, ... with the kind of a bifurcation; frequency; what differs."""
+    values = [
+        dict(zip((str(n) for n in data["parameter"].to_numpy()), data["parameters"].to_numpy().tolist(), strict=True))
+        for data in datasets
+    ]
+    captions = []
+    for dataset, words in zip(datasets, differing(values, digits=4), strict=True):
+        kind = plain(str(dataset.attrs.get("kind", "")))
+        period = period_name(period_of(dataset))
+        frequency = view.at_frequency(float(dataset.attrs["omega"]))
+        captions.append([f"{period}, {kind}" if kind else period, frequency, *words])
+    return captions
 
 
 def _columns(frames: int, size: str | tuple[float, float] | None) -> int:
@@ -281,19 +305,3 @@ def _inches(
     if isinstance(size, str) and max(columns, rows) > 1:
         return width, 0.55 + rows * min(height, 0.75 * cell[1], width / columns * cell[1] / cell[0])
     return width, height
-
-
-def _dress(axes: Axes, across: str, upwards: str, look: style.Look) -> None:
-    axes.set_xlabel(across, fontsize=look.large, color=style.INK)
-    axes.set_ylabel(upwards, fontsize=look.large, color=style.INK)
-    axes.tick_params(direction="in", top=True, right=True, labelsize=look.normal, color=style.INK, zorder=2)
-    axes.tick_params(which="minor", direction="in", top=True, right=True, color=style.INK, zorder=2)
-    axes.set_axisbelow(True)
-    for spine in axes.spines.values():
-        spine.set_color(style.INK)
-        spine.set_linewidth(0.53 * look.line)
-
-
-def _plain(text: str) -> str:
-    """A name as it is: dollar signs in it do not begin mathematics."""
-    return str(text).replace("$", r"\$")

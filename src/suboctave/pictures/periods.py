@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from suboctave.pictures import style
+from suboctave.pictures.style import Pen, tinted
 
 if TYPE_CHECKING:
     import xarray
@@ -22,7 +23,6 @@ __all__ = [
     "period_of",
     "several_periods",
     "styles_of_periods",
-    "tinted",
 ]
 
 # Okabe and Ito's; those of T, 2T, 3T, 4T and 8T stay apart for every kind of colour blindness. The last five, which
@@ -47,13 +47,7 @@ def period_colour(nu: int) -> str:
     return _OF_PERIODS.get(nu) or tinted(list(_OF_PERIODS.values())[1 + nu % (len(_OF_PERIODS) - 1)], _OTHERS)
 
 
-def tinted(colour: str, share: float) -> str:
-    """The colour with a share of white in it."""
-    parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-    return colour if not share else "#" + "".join(f"{round(part + share * (255 - part)):02x}" for part in parts)
-
-
-def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[style.CurveStyle]:
+def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[Pen]:
     """The styles of curves by their periods; those of one period and one name look alike."""
     seen: dict[int, list[str]] = {}
     styles = []
@@ -63,12 +57,12 @@ def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[styl
             alike.append(name)
         place = alike.index(name)
         like = style.curve_style(place)
-        styles.append(style.CurveStyle(tinted(period_colour(nu), _TINTS[place % len(_TINTS)]), like.width, like.dash))
+        styles.append(Pen(tinted(period_colour(nu), _TINTS[place % len(_TINTS)]), like.width, like.dash))
     return styles
 
 
 def several_periods(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether the periods of motions are to be told: one of them is not that of the load."""
+    """Whether the periods of motions are to be shown: one of them is not that of the load."""
     return any(period_of(dataset) != 1 for dataset in datasets)
 
 
@@ -77,9 +71,7 @@ def period_of(dataset: xarray.Dataset) -> int:
     return int(dataset.attrs.get("period", 1))
 
 
-def curve_styles(
-    datasets: Sequence[xarray.Dataset], names: Sequence[str], by_period: bool | None = None
-) -> list[style.CurveStyle]:
+def curve_styles(datasets: Sequence[xarray.Dataset], names: Sequence[str], by_period: bool | None = None) -> list[Pen]:
     """The styles of the curves of one frame: by period (default: where one is not that of the load), or in turn."""
     if several_periods(datasets) if by_period is None else by_period:
         return styles_of_periods([period_of(dataset) for dataset in datasets], names)

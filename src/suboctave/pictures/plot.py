@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from suboctave.errors import InputError
-from suboctave.pictures.boundary import plot_boundaries
-from suboctave.pictures.boundary_lines import is_boundary
-from suboctave.pictures.regions import is_isolas
+from suboctave.pictures.boundary import is_boundary, plot_boundaries
+from suboctave.pictures.isolas import is_isolas
+from suboctave.pictures.options import CurveOptions, View, keywords_of
 from suboctave.pictures.response import plot_response
-from suboctave.pictures.view import View
 
 if TYPE_CHECKING:
     import xarray
@@ -24,24 +23,12 @@ def plot(
     curves: Any,
     path: str | Path | None = None,
     *,
-    quantity: str | None = None,
-    harmonic: float | None = None,
-    element: int | None = None,
-    dof: int | None = None,
     x: str | None = None,
     y: str | None = None,
-    frequency: str | None = None,
-    omega_reference: float | None = None,
-    scale: float | None = None,
-    unit: str | None = None,
-    xlabel: str | None = None,
-    ylabel: str | None = None,
-    xlim: Sequence[float] | None = None,
-    ylim: Sequence[float] | None = None,
-    marks: Sequence[str] | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: str | tuple[float, float] = (6.4, 4.2),
+    **options: Unpack[CurveOptions],
 ) -> Figure:
     """Draw one or several branches: stable parts solid, unstable ones dashed, bifurcations marked.
 
@@ -55,57 +42,50 @@ def plot(
         isolas (their curves and regions, over frequency and parameter), a sequence of these, or the results of a study.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
-    quantity
-        What is drawn: "amplitude" (default), "rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms",
-        "harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force", "transmissibility". A
-        dataset must have it: `to_xarray(readings=...)`.
-    harmonic, element, dof
-        Of which harmonic (alone: its amplitude), of which element, of which degree of freedom. Harmonics are multiples
-        of omega: 0 is the mean, 0.5 a component of motions of two load periods, which is zero for those of one.
     x
         The horizontal axis: "omega" or a parameter; default what the curves were followed in.
     y
         Of curves of bifurcations (`track`), which are drawn over the plane of their two parameters: the vertical axis.
-        A `quantity` that is asked for takes its place.
-    frequency
-        "rad/s" or "Hz", where the system's time is in seconds.
-    omega_reference
-        The axis shows `omega / omega_reference`.
-    scale, unit
-        Factor on the quantity, and its unit for the label: `scale=1e3, unit="mm"`. In the plane of two parameters, of
-        the one that is no frequency.
-    xlabel, ylabel, labels, title
-        Texts of the axes, names of the curves in the legend, title.
-    xlim, ylim
-        Part of the axes that is shown, (from, to).
-    marks
-        Kinds of bifurcations that get markers: ["PD", "LP"]. Default all; of a diagram all but grazing contacts.
+        A `quantity` that is given takes its place.
+    labels, title
+        Names of the curves in the legend, title.
     size
         "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
+    options
+        `quantity`: what is drawn, "amplitude" (default), "rms", "velocity", "velocity_rms", "acceleration",
+        "acceleration_rms", "harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force",
+        "transmissibility"; a dataset must have it: `to_xarray(readings=...)`.
+
+        `harmonic`, `element`, `dof`: of which harmonic (alone: its amplitude), of which element, of which degree of
+        freedom. Harmonics are multiples of omega: 0 is the mean, 0.5 a component of motions of two load periods, which
+        is zero for those of one.
+
+        `frequency`: "rad/s" or "Hz", where the system's time is in seconds. `omega_reference`: the axis shows
+        `omega / omega_reference`. `scale`, `unit`: factor on the quantity, and its unit for the label, such as
+        `scale=1e3, unit="mm"`; in the plane of two parameters, of the one that is no frequency.
+
+        `xlabel`, `ylabel`: texts of the axes. `xlim`, `ylim`: part of the axes that is shown, (from, to). `marks`:
+        kinds of bifurcations that get markers, ["PD", "LP"]; default all, of a diagram all but grazing contacts.
 
     Raises
     ------
     InputError
         For what cannot be drawn, before anything is.
     """
-    projected = quantity is not None or harmonic is not None
-    if quantity is None:
-        quantity = "amplitude" if harmonic is None else "harmonic"
     given = _several(curves)
     if len(given) == 1:  # a diagram says how it is drawn
         labels = getattr(given[0], "legend", None) if labels is None else labels
-        marks = getattr(given[0], "marks", None) if marks is None else marks
-    view = View(
-        quantity, harmonic, element, dof, frequency, omega_reference, scale, unit, xlabel, ylabel, xlim, ylim, marks
-    )
+        if options.get("marks") is None:
+            options["marks"] = getattr(given[0], "marks", None)
+    view = View(**keywords_of("plot", options, CurveOptions))
     datasets = datasets_of(curves, view)
     if any(is_isolas(dataset) for dataset in datasets):  # in the plane, without the closed branches
         datasets = [dataset for dataset in datasets if "isola" not in dataset.attrs]
     tracked = [is_boundary(dataset) or is_isolas(dataset) for dataset in datasets]
+    texts: dict[str, Any] = {"labels": labels, "title": title, "size": size, "view": view}
     if tracked and all(tracked):
-        return plot_boundaries(
-            datasets, path, x=x, y=y, labels=labels, title=title, size=size, view=view, projected=projected
-        )
+        projected = options.get("quantity") is not None or options.get("harmonic") is not None
+        return plot_boundaries(datasets, path, x=x, y=y, projected=projected, **texts)
     if y is not None:
         raise InputError("y= is for curves of bifurcations; of other curves quantity= says what is drawn upwards")
     if any(tracked) and x is None:
@@ -113,8 +93,7 @@ def plot(
             "there are curves of bifurcations among response curves: plot_space draws them together, x= one over the "
             "other; or draw each kind by itself"
         )
-    datasets = [dataset for dataset in datasets if not is_isolas(dataset)]
-    return plot_response(datasets, path, x=x, labels=labels, title=title, size=size, view=view)
+    return plot_response([data for data in datasets if not is_isolas(data)], path, x=x, **texts)
 
 
 def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
@@ -141,5 +120,5 @@ def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
         return [item]
     if not hasattr(item, "to_xarray"):
         raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {type(item).__name__}")
-    found = item.to_xarray(readings=view.readings(getattr(item, "nu", 0)))
-    return list(found.values()) if isinstance(found, dict) else [found]
+    given = item.to_xarray(readings=view.readings(getattr(item, "nu", 0)))
+    return list(given.values()) if isinstance(given, dict) else [given]

@@ -1,7 +1,7 @@
-"""Response curves: amplitude over frequency, or over any parameter that was free.
+"""Response curves of one or several parameter values in one frame, and panels of such frames side by side.
 
-Stable motions solid, unstable ones dashed, located bifurcations marked. Figures are built from datasets
-(`suboctave.store.layout`), so a curve looks the same live and from a file, and without any global plotting state.
+Stable motions solid, unstable ones dashed, located bifurcations marked. Figures are laid out from datasets
+(`suboctave.store.layout`), so a curve looks the same live and from a file.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
-from suboctave.pictures.legend import ordered, place_legend
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, Ticks, ordered, plain
+from suboctave.pictures.options import Coordinates, View
+from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
-from suboctave.pictures.saving import png_bytes, save_figure
-from suboctave.pictures.strokes import Stroke, bent, strokes, without_repeats
-from suboctave.pictures.view import View
+from suboctave.pictures.strokes import cut, line_through, without_repeats
+from suboctave.pictures.style import Pen
+from suboctave.pictures.words import Hover, differing, fixed_parameters
 from suboctave.store.layout import check_layout, coordinate
 
 if TYPE_CHECKING:
@@ -28,7 +30,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["draw_response", "plot_panels", "plot_response"]
+__all__ = ["draw_response", "plot_panels", "plot_response", "response_drawing", "response_frame"]
+
+#: shares of the axes beyond what is drawn
+_MARGINS = (0.02, 0.06)
 
 
 def plot_response(
@@ -47,14 +52,9 @@ def plot_response(
     several curves apart (default: the parameters in which they differ). `size`: "single-column", "double-column", or
     width and height in inches. `view`: the quantity drawn and the units (default: amplitude, as it is).
     """
+    named = None if labels is None else [labels]
     return plot_panels(
-        [_as_list(curves)],
-        path,
-        x=x,
-        labels=None if labels is None else [labels],
-        titles=[title] if title else None,
-        size=size,
-        view=view,
+        [_as_list(curves)], path, x=x, labels=named, titles=[title] if title else None, size=size, view=view
     )
 
 
@@ -73,38 +73,41 @@ def plot_panels(
     Each entry of `panels` is what `plot_response` takes; `labels` and `titles` have one entry for each panel. Saved
     to `path` where one is given.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     groups = [_as_list(panel) for panel in panels]
     for name, given in (("labels", labels), ("titles", titles)):
         if given is not None and len(given) != len(groups):
             raise InputError(f"{name}: expected one entry for each of the {len(groups)} panels, got {len(given)}")
-    horizontal = _common_axis([dataset for group in groups for dataset in group], x)
+    wide = 6.4 if len(groups) == 1 else 1.0 + 4.2 * len(groups)
+    sheet = style.sheet_of((wide, 4.2) if size is None else size, len(groups))
+    drawing = response_drawing(groups, x=x, labels=labels, view=view)
+    for frame, title in zip(drawing.frames, titles or (), strict=False):
+        frame.title = plain(title)
+    return figure_of(drawing, sheet, path)
 
-    shown = view or View()
-    wide = 1.2 + 5.2 * len(groups) if len(groups) == 1 else 1.0 + 4.2 * len(groups)
-    inches = style.size_in_inches((wide, 4.2) if size is None else size)
-    look = style.PRINT if isinstance(size, str) else style.look_of(inches[0] / len(groups))
-    figure = Figure(figsize=inches, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    frames = figure.subplots(1, len(groups), squeeze=False, sharex=True, sharey=True)[0]
-    periods = several_periods([dataset for group in groups for dataset in group])
-    legend: dict[str, Line2D] = {}
-    for index, (axes, group) in enumerate(zip(frames, groups, strict=True)):
-        told = None if labels is None else labels[index]
-        legend |= draw_response(axes, group, x=horizontal, labels=told, view=shown, look=look, by_period=periods)
-        if titles is not None:
-            axes.set_title(_plain(titles[index]), fontsize=look.large, color=style.INK)
-        if index:
-            axes.set_ylabel("")
-    _set_limits(frames, groups, horizontal, shown)
-    place_legend(figure, frames, ordered(legend), look)
-    if path is not None:
-        save_figure(figure, path)
-    # Notebooks show an object that has this; without pyplot nothing else would tell them to.
-    setattr(figure, "_repr_png_", partial(png_bytes, figure))  # noqa: B010
-    return figure
+
+def response_drawing(
+    groups: Sequence[Sequence[xarray.Dataset]],
+    *,
+    x: str | None = None,
+    labels: Sequence[Sequence[str]] | None = None,
+    view: View | None = None,
+    names: Sequence[str] | None = None,
+) -> Drawing:
+    """Response curves laid out: a frame for each group; `names` in the browser, if not their labels."""
+    every = [dataset for group in groups for dataset in group]
+    axes = Coordinates((_common_axis(every, x), None), view or View())
+    by_period = several_periods(every)
+    frames, entries = [], dict[str, Entry]()
+    for index, group in enumerate(groups):
+        frame, own = response_frame(group, axes, None if labels is None else labels[index], by_period, names)
+        frames.append(frame)
+        entries |= own
+    across, upwards = axes.labels(every)
+    (x0, x1), (y0, y1) = axes.limits(every, *_MARGINS, from_zero=True)
+    ticks = Ticks(8, (3, 4.5, 6, 9)) if axes.view.in_degrees and y1 - y0 > 67.0 else None  # degrees
+    return Drawing(
+        (Axis(across, x0, x1), Axis(upwards, y0, y1, ticks=ticks)), frames, ordered(entries), columns=len(groups)
+    )
 
 
 def draw_response(
@@ -121,170 +124,89 @@ def draw_response(
 
     `by_period`: whether colours tell the periods of the motions (default: where one is not that of the load).
     """
-    group, shown = _as_list(curves), view or View()
-    horizontal = _common_axis(group, x)
+    group = _as_list(curves)
+    coordinates = Coordinates((_common_axis(group, x), None), view or View())
+    frame, entries = response_frame(group, coordinates, labels, by_period)
+    draw(axes, frame, look)
+    across, upwards = coordinates.labels(group)
+    dress(axes, (across, upwards), look)
+    return handles(entries, look)
+
+
+def response_frame(
+    curves: xarray.Dataset | Sequence[xarray.Dataset],
+    axes: Coordinates,
+    labels: Sequence[str] | None = None,
+    by_period: bool | None = None,
+    called: Sequence[str] | None = None,
+) -> tuple[Frame, dict[str, Entry]]:
+    """The curves of one frame laid out, and their entries in the legend, only of what occurs.
+
+    `called`: what they are called in the browser, if not by their labels.
+    """
+    group = _as_list(curves)
     for dataset in group:
-        shown.check(dataset)
+        axes.check(dataset)
     if labels is not None and len(labels) != len(group):
         raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
     periods = several_periods(group) if by_period is None else by_period
-    names = [_plain(name) for name in (labels if labels is not None else _tell_apart(group, periods))]
+    names = [plain(name) for name in (labels if labels is not None else _tell_apart(group, periods))]
     several = len(group) > 1
-    styles = curve_styles(group, names, periods)
+    titles = names if called is None else [plain(name) for name in called]
+    pens = curve_styles(group, names, periods)
     # sub-harmonic motions over those that they branch off from
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
-    earlier: dict[style.CurveStyle, list[np.ndarray]] = {}
-    spread = _spread(group, horizontal, shown)
-    legend: dict[str, Line2D] = {}
+    spread = _spread(np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1))
+    earlier: dict[style.Pen, list[np.ndarray]] = {}
+    frame, entries, marks = Frame(), dict[str, Entry](), dict[str, Entry]()
     for index in order:
-        name = names[index] if labels is not None or several or periods else ""
-        pieces = without_repeats(
-            strokes(group[index], horizontal, shown.variable), earlier.setdefault(styles[index], []), spread
-        )
-        drawn = [Stroke(*bent(piece.x, piece.y, spread), piece.stable) for piece in pieces]
-        legend |= _draw_line(axes, drawn, shown.factors(horizontal), styles[index], look, name, periods)
+        dataset, pen = group[index], pens[index]
+        named, hover = names[index] if labels is not None or several or periods else "", Hover(dataset)
+        if named:
+            entries[named] = Entry(Pen(pen.colour, 1.3 * pen.width))
+        whole = line_through(dataset, *axes.of(dataset))
+        for stroke in without_repeats(cut(dataset, whole), earlier.setdefault(pen, []), spread):
+            role = "curve" if stroke.stable is None else "stable" if stroke.stable else "unstable"
+            words = "motions" if stroke.stable is None else role
+            name, curve = (f"{titles[index]}: {words}", titles[index]) if several else (words, words)
+            seen: dict[str, Any] = {"role": role, "name": name, "group": curve, "hover": partial(hover.along, stroke)}
+            frame.items.append(Polyline(stroke.at, pen.along(stroke.stable), smooth=True, **seen))
+            if stroke.stable is not None:
+                # where ink is the colour of one period, the dashes are shown in a colour of none
+                plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
+                entries[role] = Entry(plain_pen.along(stroke.stable))
     for index in order:  # markers after all lines: none is crossed out by another curve
-        edge = styles[index].colour if several or periods else style.INK
-        legend |= _draw_events(axes, group[index], shown, horizontal, edge, look, several)
-    dress(axes, *shown.labels(group[0], horizontal, group), look)
-    return legend
+        dataset = group[index]
+        edge = pens[index].colour if several or periods else style.INK
+        frame.items += _events(dataset, axes, edge, titles[index] if several else "", marks)
+    return frame, entries | marks
 
 
-def _spread(group: Sequence[xarray.Dataset], horizontal: str, view: View) -> tuple[float, float]:
-    """Width and height of what is drawn, in the units of the datasets."""
-    every = np.concatenate([view.values(dataset, horizontal)[1] for dataset in group])
-    across, upwards = (_extent(column) for column in every.T)
-    factors = view.factors(horizontal)
-    return across / factors[0], upwards / factors[1]
-
-
-def _extent(column: np.ndarray) -> float:
-    known = column[np.isfinite(column)]
-    return (float(np.ptp(known)) if known.size else 0.0) or 1.0
-
-
-def _draw_line(
-    axes: Axes,
-    pieces: Sequence[Stroke],
-    factors: tuple[float, float],
-    curve: style.CurveStyle,
-    look: style.Look,
-    name: str,
-    periods: bool,
-) -> dict[str, Line2D]:
-    from matplotlib.lines import Line2D
-
-    legend: dict[str, Line2D] = {}
-    width = look.line * curve.width
-    if name:
-        legend[name] = Line2D([], [], color=curve.colour, linewidth=1.3 * width)
-    for piece in pieces:
-        dash: Any = curve.dash if piece.stable is False else style.STABLE_DASH
-        axes.plot(
-            piece.x * factors[0],
-            piece.y * factors[1],
-            linestyle=dash,
-            color=curve.colour,
-            linewidth=width,
-            solid_capstyle="butt",
-            dash_capstyle="butt",
-            solid_joinstyle="round",
-            zorder=3,
-            gid="stable" if piece.stable else "unstable" if piece.stable is False else "curve",
-        )
-        if piece.stable is not None:
-            key = "stable" if piece.stable else "unstable"
-            drawn: Any = style.STABLE_DASH if piece.stable else style.UNSTABLE_DASH
-            # where ink is the colour of one period, the dashes are shown in a colour of none
-            said = style.SOFT if periods else style.INK
-            legend[key] = Line2D([], [], color=said, linewidth=look.line, linestyle=drawn)
-    return legend
-
-
-def _draw_events(
-    axes: Axes, dataset: xarray.Dataset, view: View, horizontal: str, edge: str, look: style.Look, several: bool
-) -> dict[str, Line2D]:
+def _events(
+    dataset: xarray.Dataset, axes: Coordinates, edge: str, curve: str, entries: dict[str, Entry]
+) -> list[Markers]:
     """Markers: the shape tells the kind, the filling the criticality; the edge the curve, where there are several."""
-    from matplotlib.lines import Line2D
-
-    legend: dict[str, Line2D] = {}
-    smaller = style.OF_SUBHARMONICS if several and period_of(dataset) > 1 else 1.0
-    positions, seen = view.values(dataset, horizontal)[0], view.marked(dataset, horizontal)
+    smaller = style.OF_SUBHARMONICS if curve and period_of(dataset) > 1 else 1.0
+    places, seen, hover = axes.of(dataset)[1], axes.marked(dataset), Hover(dataset)
+    markers = []
     for kind, mark, which in style.marks(dataset):
-        chosen = positions[[i for i in which if seen[i]]]
+        chosen = which[seen[which]]
         if not len(chosen):
             continue
-        drawing: dict[str, Any] = {
-            "linestyle": "none",
-            "marker": mark.marker,
-            "markersize": mark.size * look.marker * smaller,
-            "markerfacecolor": mark.colour,
-            "markeredgecolor": edge,
-            "markeredgewidth": look.edge * (1.5 if several else 1.0),
-        }
-        axes.plot(
-            chosen[:, 0],
-            chosen[:, 1],
-            zorder=(4 if kind == "grazing" else 5) + (0.5 if smaller < 1.0 else 0.0),
-            gid=kind,
-            clip_on=False,
-            **drawing,
-        )
-        plain = {"markeredgecolor": style.INK, "markeredgewidth": look.edge, "markersize": mark.size * look.marker}
-        legend[mark.name] = Line2D([], [], **{**drawing, **plain})
-    return legend
+        layer = (4.0 if kind == "grazing" else 5.0) + (0.5 if smaller < 1.0 else 0.0)
+        seen_as: dict[str, Any] = {"name": f"{curve}: {mark.name}" if curve else mark.name, "group": curve or mark.name}
+        drawn = mark.mark(edge, smaller, 1.5 if curve else 1.0)
+        texts = partial(hover.of_events, chosen)
+        markers.append(Markers(places[:, chosen], drawn, role=kind, layer=layer, hover=texts, **seen_as))
+        entries[mark.name] = Entry(mark=mark.mark())
+    return markers
 
 
-def dress(axes: Axes, across: str, upwards: str, look: style.Look) -> None:
-    axes.set_xlabel(across, fontsize=look.large, color=style.INK)
-    axes.set_ylabel(upwards, fontsize=look.large, color=style.INK)
-    axes.tick_params(direction="in", top=True, right=True, labelsize=look.normal, color=style.INK, zorder=2)
-    axes.grid(True, color=style.GRID, linewidth=0.4 * look.line, zorder=0)
-    axes.set_axisbelow(True)
-    for spine in axes.spines.values():
-        spine.set_color(style.INK)
-        spine.set_linewidth(0.53 * look.line)
-
-
-def _set_limits(
-    frames: Sequence[Axes], groups: Sequence[Sequence[xarray.Dataset]], horizontal: str, view: View
-) -> None:
-    every = np.concatenate([part for group in groups for data in group for part in view.values(data, horizontal)])
-    if view.xlim is not None:
-        every = every[(every[:, 0] >= view.xlim[0]) & (every[:, 0] <= view.xlim[1])]
-    xs, ys = (column[np.isfinite(column)] for column in every.T)
-    if xs.size == 0 or ys.size == 0:
-        _clip(frames, view)
-        return
-    spread = np.ptp(xs) or abs(xs[0]) or 1.0
-    frames[0].set_xlim(xs.min() - 0.02 * spread, xs.max() + 0.02 * spread)
-    if ys.min() >= 0.0:
-        frames[0].set_ylim(0.0, 1.06 * (ys.max() or 1.0))
-    else:
-        height = np.ptp(ys) or abs(ys[0])
-        frames[0].set_ylim(ys.min() - 0.06 * height, ys.max() + 0.06 * height)
-    if view.quantity == "phase" and view.scale is None and np.ptp(ys) > 60.0:
-        frames[0].yaxis.set_major_locator(_degrees())
-    _clip(frames, view)
-
-
-def _clip(frames: Sequence[Axes], view: View) -> None:
-    """The part of the axes that was asked for."""
-    if view.xlim is not None:
-        frames[0].set_xlim(*view.xlim)
-    if view.ylim is not None:
-        frames[0].set_ylim(*view.ylim)
-
-
-def _degrees() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(nbins=8, steps=[3, 4.5, 6, 9])
-
-
-def _plain(text: str) -> str:
-    """A name as it is: dollar signs in it do not begin mathematics."""
-    return str(text).replace("$", r"\$")
+def _spread(at: np.ndarray) -> tuple[float, float]:
+    """Width and height of what is drawn."""
+    known = [row[np.isfinite(row)] for row in at]
+    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known)
+    return width, height
 
 
 def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
@@ -320,25 +242,14 @@ def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:
 def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:
     """Names such as "j = 0" from the parameters that are constant on each curve and differ between curves.
 
-    Where the period is to be told it comes first: "2T", "2T, j = 0"; so does what a curve shows, where that differs.
+    Where periods are shown they come first: "2T", "2T, j = 0"; so does what a curve shows, where that differs.
     """
-    constant: list[dict[str, float]] = []
-    for dataset in datasets:
-        table = dataset["parameters"].to_numpy()
-        names = [str(name) for name in dataset["parameter"].to_numpy()]
-        omega = dataset["omega"].to_numpy()
-        values = {name: float(table[0, i]) for i, name in enumerate(names) if np.ptp(table[:, i]) == 0.0}
-        if np.ptp(omega) == 0.0:
-            values["ω"] = float(omega[0])
-        constant.append(values)
-    shared = [name for name in constant[0] if all(name in values for values in constant)]
-    differing = [name for name in shared if len({values[name] for values in constant}) > 1]
+    words = differing([fixed_parameters(dataset) for dataset in datasets])
     dofs = [int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets]
-    if not differing and not by_period and len(set(dofs)) < 2:
+    if not any(words) and not by_period and len(set(dofs)) < 2:
         return [f"curve {index + 1}" for index in range(len(datasets))]
-    told = [[f"{name} = {values[name]:g}" for name in differing] for values in constant]
     if len(set(dofs)) > 1:
-        told = [[f"$x_{{{dof}}}$", *words] for dof, words in zip(dofs, told, strict=True)]
+        words = [[f"$x_{{{dof}}}$", *own] for dof, own in zip(dofs, words, strict=True)]
     if by_period:
-        told = [[period_name(period_of(data)), *words] for data, words in zip(datasets, told, strict=True)]
-    return [", ".join(words) for words in told]
+        words = [[period_name(period_of(data)), *own] for data, own in zip(datasets, words, strict=True)]
+    return [", ".join(own) for own in words]

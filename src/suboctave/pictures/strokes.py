@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -19,79 +19,99 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Line", "Stroke", "bent", "line", "repeated", "strokes", "without_repeats"]
+__all__ = ["Line", "Stroke", "bent", "cut", "line", "line_through", "strokes", "without_repeats"]
 
 
 @dataclass(frozen=True)
-class Stroke:
-    """A stretch of the curve, (vertices,) each, on which all motions are stable or none is (None: not computed)."""
+class _Vertices:
+    """Vertices `at`, (axes, vertices), of which `x` and `y` are the first and the last row.
 
-    x: np.ndarray
-    y: np.ndarray
-    stable: bool | None
-
-
-@dataclass(frozen=True)
-class Line:
-    """The points of a curve and its events as one line of vertices.
-
-    `x`, `y`, (vertices,); `point` and `event`, (vertices,), the index of the point or event at each, else -1; `stable`,
-    (vertices - 1,), whether the motions between two vertices are (None: not computed).
+    `point` and `event`, (vertices,): the index of the point or event of the curve at each, else -1.
     """
 
-    x: np.ndarray
-    y: np.ndarray
+    at: np.ndarray
     point: np.ndarray
     event: np.ndarray
+
+    @property
+    def x(self) -> np.ndarray:
+        row: np.ndarray = self.at[0]
+        return row
+
+    @property
+    def y(self) -> np.ndarray:
+        row: np.ndarray = self.at[-1]
+        return row
+
+
+@dataclass(frozen=True)
+class Line(_Vertices):
+    """The points of a curve and its events as one line.
+
+    `stable`, (vertices - 1,): whether the motions between two vertices are (None: not computed).
+    """
+
     stable: np.ndarray | None
 
 
-def strokes(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> list[Stroke]:
-    """The curve over parameter `x`, cut where stability changes; `y` is a variable of the dataset.
+@dataclass(frozen=True)
+class Stroke(_Vertices):
+    """A stretch of a curve on which all motions are stable or none is (None: not computed)."""
 
-    A piece between two neighbours of the line is stable when both ends say so. An event takes the stability of the side
-    in question: that of the preceding point before it, of the following point after it. Between two events of the same
-    step `event_stable_after` tells; where it does not, and where stability changes with no located event,
-    the piece counts as unstable: a picture must not promise more than was found.
-    """
-    drawn = line(dataset, x, y)
-    if drawn.stable is None:
-        return [Stroke(drawn.x, drawn.y, None)]
-    if drawn.stable.size == 0:
-        return [Stroke(drawn.x, drawn.y, bool(dataset["stable"].to_numpy().all()))]
-    cuts = [0, *(np.flatnonzero(np.diff(drawn.stable)) + 1), drawn.stable.size]
-    return [
-        Stroke(drawn.x[first : last + 1], drawn.y[first : last + 1], bool(drawn.stable[first]))
-        for first, last in pairwise(cuts)
-    ]
+    stable: bool | None
+
+    def part(self, first: int, last: int) -> Stroke:
+        """The vertices first .. last."""
+        here = slice(first, last + 1)
+        return Stroke(self.at[:, here], self.point[here], self.event[here], self.stable)
 
 
 def line(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> Line:
-    """The curve over parameter `x` as one line, with the verdict on every piece as `strokes` describes it."""
+    """The curve over parameter `x`; `y` is a variable of the dataset."""
     horizontal, event_horizontal = coordinate(dataset, x)
-    vertical, event_vertical = dataset[y].to_numpy(), dataset[f"event_{y}"].to_numpy()
-    after = dataset["event_after"].to_numpy()
+    points, events = (horizontal, dataset[y].to_numpy()), (event_horizontal, dataset[f"event_{y}"].to_numpy())
+    return line_through(dataset, np.array(points), np.array(events))
+
+
+def strokes(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> list[Stroke]:
+    """The curve over parameter `x`, cut where stability changes; `y` is a variable of the dataset."""
+    return cut(dataset, line(dataset, x, y))
+
+
+def cut(dataset: xarray.Dataset, whole: Line) -> list[Stroke]:
+    """The line of a curve, cut where stability changes."""
+    drawn = Stroke(whole.at, whole.point, whole.event, None)
+    if whole.stable is None:
+        return [drawn]
+    if whole.stable.size == 0:
+        return [replace(drawn, stable=bool(dataset["stable"].to_numpy().all()))]
+    ends = [0, *(np.flatnonzero(np.diff(whole.stable)) + 1), whole.stable.size]
+    return [replace(drawn, stable=bool(whole.stable[first])).part(first, last) for first, last in pairwise(ends)]
+
+
+def line_through(dataset: xarray.Dataset, points: np.ndarray, events: np.ndarray) -> Line:
+    """The line through points (axes, points) and events (axes, events) of a curve, with the verdict on every piece.
+
+    A piece between two neighbours is stable when both ends say so. An event takes the stability of the side in
+    question: that of the preceding point before it, of the following point after it. Between two events of the same
+    step `event_stable_after` says it; where it does not, and where stability changes with no located event, the piece
+    counts as unstable: a picture must not promise more than was found.
+    """
+    count, after = points.shape[1], dataset["event_after"].to_numpy()
     order = np.argsort(after, kind="stable")
     # Position on the line: all points, each followed by its events.
-    position = np.searchsorted(after[order], np.arange(vertical.size)) + np.arange(vertical.size)
+    position = np.searchsorted(after[order], np.arange(count)) + np.arange(count)
     event_position = after[order] + 1 + np.arange(order.size)
-    line_x = np.empty(vertical.size + order.size)
-    line_y = np.empty_like(line_x)
-    line_x[position], line_y[position] = horizontal, vertical
-    line_x[event_position], line_y[event_position] = event_horizontal[order], event_vertical[order]
-    point, event = np.full((2, line_x.size), -1)
-    point[position] = np.arange(vertical.size)
+    at = np.empty((len(points), count + order.size))
+    at[:, position], at[:, event_position] = points, events[:, order]
+    point, event = np.full((2, at.shape[1]), -1)
+    point[position] = np.arange(count)
     event[event_position] = order
     verdict = None
     if "stable" in dataset:
-        verdict = _pieces(
-            dataset["stable"].to_numpy().astype(bool),
-            after[order],
-            dataset["event_stable_after"].to_numpy()[order],
-            position,
-            event_position,
-        )
-    return Line(line_x, line_y, point, event, verdict)
+        stable, stable_after = dataset["stable"].to_numpy().astype(bool), dataset["event_stable_after"].to_numpy()
+        verdict = _pieces(stable, after[order], stable_after[order], position, event_position)
+    return Line(at, point, event, verdict)
 
 
 def _pieces(
@@ -129,10 +149,17 @@ def without_repeats(pieces: Sequence[Stroke], earlier: list[np.ndarray], spread:
         if piece.stable is not False or piece.x.size < 2:
             kept.append(piece)
             continue
-        own, fresh = _fresh(piece.x / spread[0], piece.y / spread[1], np.ones(piece.x.size - 1, dtype=bool), earlier)
+        path = piece.at.T / spread
+        own = np.stack([path[:-1], path[1:]], axis=1)
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        fresh = np.ones(len(own), dtype=bool)
+        for i in range(len(own)):
+            there = np.concatenate([*earlier, own[along[1:] < along[i] - _ANOTHER]])
+            probes = np.array([own[i, 0], own[i].mean(axis=0), own[i, 1]])
+            fresh[i] = not len(there) or _distance(probes, there).max() > _UPON
         earlier.append(own)
         cuts = np.flatnonzero(np.diff(np.concatenate([[False], fresh, [False]])))
-        kept += [Stroke(piece.x[a : b + 1], piece.y[a : b + 1], False) for a, b in cuts.reshape(-1, 2)]
+        kept += [piece.part(a, b) for a, b in cuts.reshape(-1, 2)]
     return kept
 
 
@@ -159,45 +186,21 @@ def bent(x: np.ndarray, y: np.ndarray, spread: tuple[float, float]) -> tuple[np.
     steps = np.diff(path, axis=0)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     corners = np.flatnonzero(np.abs(np.diff(heading)) > _CORNER) + 1
-    found = [path[:1]]
+    parts = [path[:1]]
     for first, last in pairwise([0, *corners, len(path) - 1]):
         own = path[first : last + 1]
         if len(own) < 3:
-            found.append(own[1:])
+            parts.append(own[1:])
             continue
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(own, axis=0).T))])
         shares = [np.linspace(a, b, 1 + math.ceil((b - a) / _PIECE))[1:] for a, b in pairwise(along)]
         drawn = Akima1DInterpolator(along, own, method="makima")(np.concatenate(shares))
         # the vertices themselves, without rounding
         drawn[np.cumsum([len(share) for share in shares]) - 1] = own[1:]
-        found.append(drawn)
-    whole = np.concatenate(found) * spread
+        parts.append(drawn)
+    whole = np.concatenate(parts) * spread
     whole[0], whole[-1] = (x[vertices[0]], y[vertices[0]]), (x[-1], y[-1])
     return whole[:, 0], whole[:, 1]
-
-
-def repeated(whole: Line) -> np.ndarray:
-    """(vertices - 1,) whether a piece of the line is unstable and lies upon an earlier one that is."""
-    if whole.stable is None or whole.stable.size == 0:
-        return np.zeros(max(whole.x.size - 1, 0), dtype=bool)
-    x, y = (v / ((np.nanmax(v) - np.nanmin(v)) or 1.0) for v in (whole.x, whole.y))
-    result: np.ndarray = ~whole.stable & ~_fresh(x, y, ~whole.stable, [])[1]
-    return result
-
-
-def _fresh(
-    x: np.ndarray, y: np.ndarray, dashed: np.ndarray, earlier: Sequence[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The segments (m, 2, 2) of a line, and whether each lies apart from `earlier` ones and its own earlier dashed."""
-    path = np.column_stack([x, y])
-    own = np.stack([path[:-1], path[1:]], axis=1)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    fresh = np.ones(len(own), dtype=bool)
-    for i in np.flatnonzero(dashed):
-        there = np.concatenate([*earlier, own[dashed & (along[1:] < along[i] - _ANOTHER)]])
-        probes = np.array([own[i, 0], own[i].mean(axis=0), own[i, 1]])
-        fresh[i] = not len(there) or _distance(probes, there).max() > _UPON
-    return own, fresh
 
 
 def _distance(points: np.ndarray, segments: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ letters are then 7 to 8 points high.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -35,14 +35,21 @@ __all__ = [
     "SOFT",
     "STABLE_DASH",
     "UNSTABLE_DASH",
-    "CurveStyle",
     "KindStyle",
     "Look",
+    "Mark",
+    "Pen",
+    "Sheet",
+    "check_text",
+    "checked_text",
     "curve_style",
     "kind_style",
     "look_of",
     "marks",
+    "rgb",
+    "sheet_of",
     "size_in_inches",
+    "tinted",
 ]
 
 INK = "#1a1a1a"
@@ -50,8 +57,9 @@ SOFT = "#8c8c8c"
 GRID = "#d9d9d9"
 CURVE_COLOURS = ("#0072B2", "#E69F00", INK, "#009E73", "#CC79A7", "#56B4E9")  # then again from the first
 
-STABLE_DASH = "solid"
-UNSTABLE_DASH = (0, (3.2, 1.6))  # in line widths: begins with a dash, so the change shows where it happens
+Dash: TypeAlias = "str | tuple[float, tuple[float, ...]]"
+STABLE_DASH: Dash = "solid"
+UNSTABLE_DASH: Dash = (0, (3.2, 1.6))  # in line widths: begins with a dash, so the change shows where it happens
 
 SUBCRITICAL = ", subcritical"  # in a legend, behind the kind
 
@@ -114,29 +122,69 @@ def check_text(text: str) -> None:
         raise InputError(f"the formula in {text!r} cannot be drawn: {reason}; a plain dollar sign is \\$") from None
 
 
+def checked_text(text: str | None) -> str:
+    """A title with formulas that can be drawn, "" for none; InputError where they cannot."""
+    if text:
+        check_text(text)
+    return text or ""
+
+
 def look_of(width: float) -> Look:
     """The look of a frame this many inches wide: that of print for the columns of a journal."""
     return PRINT if width < _PRINT_BELOW else SCREEN
 
 
 @dataclass(frozen=True)
-class CurveStyle:
-    """How one curve is drawn: colour, width as a multiple of the look's, dashes of its unstable parts."""
+class Sheet:
+    """A page to draw on: width and height in inches, sizes of what is on it, whether its size is one of a journal."""
+
+    inches: tuple[float, float]
+    look: Look
+    named: bool = False
+
+
+def sheet_of(size: str | tuple[float, float], frames: int = 1) -> Sheet:
+    """The page of a named size, or of width and height in inches, for so many frames side by side; InputError."""
+    inches, named = size_in_inches(size), isinstance(size, str)
+    return Sheet(inches, PRINT if named else look_of(inches[0] / frames), named)
+
+
+@dataclass(frozen=True)
+class Pen:
+    """How a line is drawn: colour, width as a multiple of the look's, dashes in line widths.
+
+    The pen of a curve has the dashes of its unstable parts.
+    """
 
     colour: str
-    width: float
-    dash: tuple[float, tuple[float, ...]]
+    width: float = 1.0
+    dash: Dash = STABLE_DASH
+
+    def along(self, stable: bool | None) -> Pen:
+        """The pen for a stretch of the curve: dashed where motions are unstable."""
+        return self if stable is False else replace(self, dash=STABLE_DASH)
 
 
-ONE_CURVE = CurveStyle(INK, 1.0, UNSTABLE_DASH)
+@dataclass(frozen=True)
+class Mark:
+    """How a point is marked: size in points, colours of face and edge, width of the edge in multiples of the look's."""
+
+    marker: str | tuple[int, int, int]
+    size: float
+    face: str
+    edge: str = INK
+    rim: float = 1.0
+
+
+ONE_CURVE = Pen(INK, 1.0, UNSTABLE_DASH)
 _WIDTHS = (1.0, 0.65, 1.5)
-_DASHES = (UNSTABLE_DASH, (0, (5.5, 1.8, 1.2, 1.8)), (0, (1.2, 1.2)))
+_DASHES: tuple[Dash, ...] = (UNSTABLE_DASH, (0, (5.5, 1.8, 1.2, 1.8)), (0, (1.2, 1.2)))
 
 
-def curve_style(index: int) -> CurveStyle:
-    """The style of one of several curves in a frame."""
+def curve_style(index: int) -> Pen:
+    """The pen of one of several curves in a frame."""
     colour = CURVE_COLOURS[index % len(CURVE_COLOURS)]
-    return CurveStyle(colour, _WIDTHS[index % len(_WIDTHS)], _DASHES[index % len(_DASHES)])
+    return Pen(colour, _WIDTHS[index % len(_WIDTHS)], _DASHES[index % len(_DASHES)])
 
 
 @dataclass(frozen=True)
@@ -147,6 +195,10 @@ class KindStyle:
     marker: str | tuple[int, int, int]
     colour: str
     size: float = MARKER_SIZE
+
+    def mark(self, edge: str = INK, size: float = 1.0, rim: float = 1.0) -> Mark:
+        """Its marker, with this edge, and this multiple of its size."""
+        return Mark(self.marker, size * self.size, self.colour, edge, rim)
 
 
 KINDS = {
@@ -175,16 +227,28 @@ def marks(dataset: xarray.Dataset) -> list[tuple[str, KindStyle, np.ndarray]]:
     """The events of a curve by how they are marked: kind, style, which of them. Subcritical ones are hollow."""
     kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
     hollow = [str(word) == "subcritical" for word in dataset["event_criticality"].to_numpy()]
-    found = []
+    groups = []
     for kind, empty in dict.fromkeys(zip(kinds, hollow, strict=True)):
         mark = kind_style(kind)
         if empty:
             mark = replace(mark, name=f"{mark.name}{SUBCRITICAL}", colour="#ffffff")
         chosen = [i for i, pair in enumerate(zip(kinds, hollow, strict=True)) if pair == (kind, empty)]
-        found.append((kind, mark, np.array(chosen, dtype=int)))
-    return found
+        groups.append((kind, mark, np.array(chosen, dtype=int)))
+    return groups
 
 
 def kind_style(kind: str) -> KindStyle:
     """The style of a kind; one that is not in the table (a user's own event) gets a star and its own name."""
     return KINDS.get(kind, KindStyle(kind, "*", "#CC79A7", MARKER_SIZE * 1.4))
+
+
+def tinted(colour: str, share: float) -> str:
+    """The colour with a share of white in it."""
+    parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return colour if not share else "#" + "".join(f"{round(part + share * (255 - part)):02x}" for part in parts)
+
+
+def rgb(colour: str) -> tuple[float, float, float]:
+    """Red, green and blue of a colour, from 0 to 1."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return red, green, blue

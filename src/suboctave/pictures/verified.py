@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from suboctave.pictures import style
-from suboctave.pictures.in_time import _finish, _frame
-from suboctave.pictures.response import draw_response
-from suboctave.pictures.view import View
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Markers, ordered
+from suboctave.pictures.options import Coordinates, View
+from suboctave.pictures.paper import figure_of
+from suboctave.pictures.response import response_frame
+from suboctave.pictures.style import Mark
 
 if TYPE_CHECKING:
     import xarray
@@ -19,11 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_verified"]
 
-#: by outcome: what the legend says, marker, colour, size
+#: by outcome: what the legend says, its mark, its layer
 _MARKS = {
-    "agrees": ("agrees with shooting", r"$\checkmark$", "#009E73", 5.5),
-    "cannot tell": ("cannot tell", r"$?$", style.SOFT, 6.5),
-    "disagrees": ("disagrees", "X", "#D55E00", 8.0),
+    "agrees": ("agrees with shooting", Mark(r"$\checkmark$", 5.5, "#009E73", "#009E73", 0.4), 4.5),
+    "cannot tell": ("cannot tell", Mark(r"$?$", 6.5, style.SOFT, style.SOFT, 0.4), 4.5),
+    "disagrees": ("disagrees", Mark("X", 8.0, "#D55E00", "#D55E00", 0.4), 7.0),
+    "not confirmed": ("not confirmed", Mark("o", 13.0, "none", "#D55E00", 1.6), 7.0),
 }
 
 
@@ -41,36 +44,16 @@ def plot_verified(
 
     `unconfirmed` (B, 2): bifurcations that shooting did not confirm; they get a ring.
     """
-    figure, axes, look = _frame(size)
-    legend: dict[str, Any] = dict(draw_response(axes, [curve], view=View(), look=look))
-    told = np.array(list(outcomes))
-    for outcome, (name, marker, colour, large) in _MARKS.items():
-        here = places[told == outcome] if len(told) else np.zeros((0, 2))
+    axes = Coordinates((str(curve.attrs["free"]), None), View())
+    frame, entries = response_frame([curve], axes)
+    frame.title = style.checked_text(title)
+    every = np.concatenate([np.reshape(places, (-1, 2)), np.reshape(unconfirmed, (-1, 2))])
+    kinds = np.array([*outcomes, *["not confirmed"] * len(unconfirmed)])
+    for outcome, (name, mark, layer) in _MARKS.items():
+        here = every[kinds == outcome]
         if len(here):
-            legend[name] = axes.plot(
-                here[:, 0],
-                here[:, 1],
-                linestyle="none",
-                marker=marker,
-                color=colour,
-                markersize=large * look.marker,
-                markeredgewidth=0.4 * look.edge,
-                zorder=7 if outcome == "disagrees" else 4.5,
-                gid=outcome,
-                clip_on=False,
-            )[0]
-    if len(unconfirmed):
-        legend["not confirmed"] = axes.plot(
-            unconfirmed[:, 0],
-            unconfirmed[:, 1],
-            "o",
-            markersize=13.0 * look.marker,
-            markerfacecolor="none",
-            markeredgecolor="#D55E00",
-            markeredgewidth=1.6 * look.edge,
-            zorder=7,
-            gid="not confirmed",
-            clip_on=False,
-        )[0]
-    axes.set_ylim(bottom=0.0)
-    return _finish(figure, axes, legend, look, title, path)
+            frame.items.append(Markers(here.T, mark, role=outcome, layer=layer))
+            entries[name] = Entry(mark=mark)
+    across, upwards = axes.labels([curve])
+    drawing = Drawing((Axis(across), Axis(upwards, 0.0)), [frame], ordered(entries))
+    return figure_of(drawing, style.sheet_of(size), path)

@@ -7,14 +7,13 @@ does not.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, path_of
 from suboctave.store.blocks import digest
 from suboctave.store.layout import LAYOUT
@@ -23,60 +22,14 @@ from suboctave.version import __version__
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["free_place", "read", "replace_file", "write"]
+__all__ = ["free_place", "number", "read", "replace_file", "write"]
 
 _AGAIN = "run the study again, or take a copy that is whole"
 
 
-def free_place(path: str | Path, overwrite: bool = False, suffixes: tuple[str, ...] = ()) -> Path:
-    """The path, if a file can be written there; found out before any work.
-
-    Raises InputError where a file exists and `overwrite` is not given, or the folder is missing or not writable.
-    """
-    target = path_of(path)
-    if suffixes and target.suffix.lower() not in suffixes:
-        raise InputError(f"{target}: the name must end in {' or '.join(suffixes)}")
-    if target.is_dir():
-        raise InputError(f"{target} is a folder, not a file")
-    if target.exists() and not overwrite:
-        raise InputError(
-            f"{target} exists and is left as it is: choose another name, or overwrite it on purpose "
-            "(overwrite=True, --overwrite)"
-        )
-    folder = target.parent
-    if not folder.is_dir():
-        raise InputError(f"{folder} is no folder: make it, or write elsewhere")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"the folder {folder} is not writable: write elsewhere, or ask for the right to")
-    return target
-
-
-def replace_file(target: Path, make: Any) -> None:
-    """Have `make(path)` write a file beside `target`, sync it to the disk and rename it: all of it, or nothing."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}-", suffix=".part", dir=target.parent)
-    os.close(handle)
-    try:
-        make(Path(name))
-        with open(name, "rb+") as written:
-            os.fsync(written.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    _sync_folder(target.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def number(value: Any) -> Any:
+    """An attribute as a file gives it, as Python's own number or text."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def write(path: Path, groups: Mapping[str, xarray.Dataset], attributes: Mapping[str, Any]) -> None:
@@ -141,14 +94,14 @@ def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
     with h5py.File(source, "r") as file:
         if "layout" not in file.attrs:
             raise InputError(f"{source} is no results file of suboctave: it has no attribute 'layout'")
-        found = int(np.ravel(file.attrs["layout"])[0])
-        if found > LAYOUT:
+        layout = int(np.ravel(file.attrs["layout"])[0])
+        if layout > LAYOUT:
             raise InputError(
-                f"{source} has layout {found}, newer than {LAYOUT}: it was written by suboctave "
+                f"{source} has layout {layout}, newer than {LAYOUT}: it was written by suboctave "
                 f"{file.attrs.get('suboctave', '(unknown version)')}; update suboctave to read it"
             )
-        if found < 1:
-            raise InputError(f"{source} states the unknown layout {found}: {_AGAIN}")
+        if layout < 1:
+            raise InputError(f"{source} states the unknown layout {layout}: {_AGAIN}")
         names: list[str] = []
         file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Group) else None)
     groups = {}
@@ -164,10 +117,10 @@ def _check(source: Path, name: str, dataset: xarray.Dataset) -> None:
     if stated is None:
         raise InputError(f"{part} has no digest: it was changed by another program; {_AGAIN}")
     try:
-        found = digest(dataset)
+        computed = digest(dataset)
     except Exception as error:  # attributes and texts that no writer of ours has made
         raise InputError(f"{part} is damaged ({_first_line(error)}): {_AGAIN}") from None
-    if found != stated:
+    if computed != stated:
         raise InputError(f"{part} is damaged: its content is not what was written; {_AGAIN}")
 
 

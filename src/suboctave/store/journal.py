@@ -1,18 +1,15 @@
-"""What a running study has found so far, on disk at once: records appended to a file, each with its own checksum.
+"""What a running computation has so far, on disk at once: records in an SQLite database, one transaction each.
 
-The file begins with a line that names it. A record is the length of its body (8 bytes), the first 16 bytes of the
-body's SHA-256, and the body: a line of JSON, then, where there is one, a dataset as a block (`blocks`). A process that
-is killed can only leave a torn last record; whatever follows the last whole record is dropped when the journal is
-opened again.
-NetCDF would not do here: HDF5 files do not survive a power cut while they are written.
+SQLite writes ahead (WAL) and syncs at every transaction: a kill or a power cut at any time leaves whole records only.
+Others may read while one process writes. HDF5 files do not survive a power cut while they are written.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
+import sqlite3
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -25,16 +22,17 @@ if TYPE_CHECKING:
 
 __all__ = ["Journal", "Record", "read_journal"]
 
-_MAGIC = b"suboctave journal 1\n"
-_LENGTH, _CHECK = 8, 16
+_TABLE = "suboctave_journal"
+#: how journals begin that were no databases yet
+_FORMER = b"suboctave journal 1\n"
 
 
 @dataclass(frozen=True)
 class Record:
-    """One entry: what it is, what it says, and its dataset as a block of bytes (empty if it has none)."""
+    """One entry: its kind, its fields (what JSON holds), and its dataset as a block of bytes (empty if it has none)."""
 
     kind: str
-    said: Mapping[str, Any] = field(default_factory=dict)
+    fields: Mapping[str, Any] = field(default_factory=dict)
     block: bytes = b""
 
     @property
@@ -43,124 +41,128 @@ class Record:
         return unpack(self.block)
 
 
-def read_journal(path: str | Path) -> tuple[list[Record], int, bool]:
-    """The whole records of a journal, where they end (bytes), and whether something torn followed.
+def read_journal(path: str | Path) -> list[Record]:
+    """The records of a journal, which another process may be writing.
 
     Raises InputError where the file is missing or no journal.
     """
     source = path_of(path)
-    try:
-        content = source.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {source}: {error.strerror}") from None
-    if not content.startswith(_MAGIC):
-        if _MAGIC.startswith(content):  # killed while the first line was written
-            return [], 0, bool(content)
-        raise InputError(f"{source} is no journal of suboctave; move it away, or name another folder")
-    records: list[Record] = []
-    end = len(_MAGIC)
-    while (record := _record_at(content, end)) is not None:
-        records.append(record[0])
-        end = record[1]
-    return records, end, end < len(content)
-
-
-def _record_at(content: bytes, place: int) -> tuple[Record, int] | None:
-    body_at = place + _LENGTH + _CHECK
-    if body_at > len(content):
-        return None
-    end = body_at + int.from_bytes(content[place : place + _LENGTH], "little")
-    body = content[body_at:end]
-    if end > len(content) or hashlib.sha256(body).digest()[:_CHECK] != content[place + _LENGTH : body_at]:
-        return None
-    line, _, block = body.partition(b"\n")
-    try:
-        said = json.loads(line)
-        return Record(said.pop("kind"), said, block), end
-    except (ValueError, KeyError, AttributeError):
-        return None
+    if not source.is_file():
+        raise InputError(f"cannot read {source}: there is no such file")
+    with closing(_connected(source, "ro")) as database:
+        return _records(database)
 
 
 class Journal:
     """A journal open for appending, by one process at a time; use `create` or `reopen`."""
 
-    def __init__(self, path: Path, file: BinaryIO, records: list[Record], torn: bool = False) -> None:
+    def __init__(self, path: Path, lock: BinaryIO) -> None:
         self.path = path
-        self.records = records
-        self.torn = torn
-        self._file = file
+        self._lock = lock
+        try:
+            self._database = _connected(path, "rw")
+        except BaseException:
+            lock.close()
+            raise
+        self._database.execute("PRAGMA journal_mode = WAL")
+        self._database.execute("PRAGMA synchronous = FULL")
+        self._database.execute(
+            f"CREATE TABLE IF NOT EXISTS {_TABLE} (number INTEGER PRIMARY KEY, kind TEXT, fields TEXT, block BLOB)"
+        )
 
     @classmethod
     def create(cls, path: str | Path) -> Journal:
         """A new journal; InputError if there is one already."""
         place = path_of(path)
         try:
-            file = open(place, "xb")  # noqa: SIM115 - it stays open
+            return cls(place, _locked(place, "xb"))
         except FileExistsError:
             raise InputError(f"{place} exists: a run that did not finish left it, or one is under way") from None
-        except OSError as error:
-            raise InputError(f"cannot write {place}: {error.strerror}") from None
-        _lock(file, place)
-        file.write(_MAGIC)
-        journal = cls(place, file, [])
-        journal._sync()
-        return journal
 
     @classmethod
     def reopen(cls, path: str | Path) -> Journal:
-        """The journal of an earlier run, its torn end cut off."""
+        """The journal of an earlier run."""
         place = path_of(path)
-        records, end, torn = read_journal(place)
-        try:
-            file = open(place, "r+b")  # noqa: SIM115 - it stays open
-        except OSError as error:
-            raise InputError(f"cannot write {place}: {error.strerror}") from None
-        _lock(file, place)
-        file.truncate(end)
-        file.seek(end)
-        if not end:
-            file.write(_MAGIC)
-        journal = cls(place, file, records, torn)
-        journal._sync()
-        return journal
+        return cls(place, _locked(place, "r+b"))
 
-    def append(
-        self, kind: str, said: Mapping[str, Any] | None = None, dataset: xarray.Dataset | None = None, sync: bool = True
-    ) -> None:
-        """Write one record; with `sync` it is on the disk when this returns, else in the system's hands."""
-        said = dict(said or {})
-        block = b"" if dataset is None else pack(dataset)
-        body = json.dumps({"kind": kind, **said}, ensure_ascii=False).encode() + b"\n" + block
-        check = hashlib.sha256(body).digest()[:_CHECK]
-        self._file.write(len(body).to_bytes(_LENGTH, "little") + check + body)
-        if sync:
-            self._sync()
-        else:
-            self._file.flush()
-        self.records.append(Record(kind, said, block))
+    @property
+    def records(self) -> list[Record]:
+        """All that it holds, in the order in which it was appended."""
+        return _records(self._database)
+
+    def append(self, kind: str, fields: Mapping[str, Any] | None = None, dataset: xarray.Dataset | None = None) -> None:
+        """Write one record, on the disk when this returns."""
+        self.extend([(kind, fields or {}, dataset)])
+
+    def extend(self, entries: list[tuple[str, Mapping[str, Any], xarray.Dataset | None]]) -> None:
+        """Write records, each of kind, fields and dataset, all of them or none; on the disk when this returns."""
+        rows = [
+            (kind, json.dumps(dict(fields), ensure_ascii=False), b"" if dataset is None else pack(dataset))
+            for kind, fields, dataset in entries
+        ]
+        try:
+            with self._database:
+                self._database.executemany(f"INSERT INTO {_TABLE} (kind, fields, block) VALUES (?, ?, ?)", rows)
+        except sqlite3.OperationalError as error:  # no space is left, ...
+            raise OSError(f"cannot write {self.path}: {error}") from None
 
     def close(self) -> None:
         """Close it; the file stays."""
-        self._file.close()
+        self._database.close()
+        self._lock.close()  # last: to close any handle of the file gives up SQLite's own locks
 
     def remove(self) -> None:
         """Close it and delete the file: everything is elsewhere."""
-        self._file.close()
-        self.path.unlink(missing_ok=True)
-
-    def _sync(self) -> None:
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        self.close()
+        for suffix in ("", "-wal", "-shm"):
+            self.path.with_name(self.path.name + suffix).unlink(missing_ok=True)
 
 
-def _lock(file: BinaryIO, place: Path) -> None:
-    """Refuse a journal that another process is writing; the lock goes with the process."""
+def _connected(place: Path, mode: str) -> sqlite3.Connection:
+    """The database of a journal; InputError where the file is something else."""
+    database = None
+    try:
+        database = sqlite3.connect(f"{place.absolute().as_uri()}?mode={mode}", uri=True)
+        tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if tables <= {_TABLE}:
+            return database
+    except sqlite3.OperationalError as error:
+        raise InputError(f"cannot read {place}: {error}") from None
+    except sqlite3.DatabaseError:
+        pass
+    if database is not None:
+        database.close()
+    with open(place, "rb") as file:
+        if file.read(len(_FORMER)) == _FORMER:
+            raise InputError(
+                f"{place} is the journal of an earlier version of suboctave, which this one does not read: finish it "
+                "with that version, or delete the file and start anew"
+            )
+    raise InputError(f"{place} is no journal of suboctave; move it away, or name another folder")
+
+
+def _records(database: sqlite3.Connection) -> list[Record]:
+    if database.execute("SELECT 1 FROM sqlite_master").fetchone() is None:  # killed before there was a table
+        return []
+    rows = database.execute(f"SELECT kind, fields, block FROM {_TABLE} ORDER BY number")
+    return [Record(kind, json.loads(fields), block) for kind, fields, block in rows]
+
+
+def _locked(place: Path, mode: str) -> BinaryIO:
+    """The open file, which no other process may write; the lock goes with the process."""
+    try:
+        file: Any = open(place, mode)  # noqa: SIM115 - it stays open
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise InputError(f"cannot write {place}: {error.strerror}") from None
     try:
         import fcntl
     except ImportError:  # not a POSIX system
-        return
+        return file
     try:
         fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         file.close()
         raise InputError(f"{place} is being written by another run: wait for it, or use another folder") from None
+    return file

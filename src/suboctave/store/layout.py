@@ -25,21 +25,18 @@ supercritical; else nan), on `event` `event_extreme` ("maximum of j" at an extre
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.store.columns import parameter_column
-from suboctave.store.events import BranchEvents, EventRow, event_rows, event_variables, events_met
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
-
-    from suboctave.harmonic.orbit import PeriodicOrbit
-    from suboctave.model.system import System
 
 __all__ = [
     "LAYOUT",
@@ -55,94 +52,118 @@ __all__ = [
 ]
 
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
+UNKNOWN = -1  # in event_stable_after
 RESERVED = frozenset(
     {"point", "event", "parameter", "multiplier", "omega", "amplitude", "stable", "harmonics", "error", "residual"}
     | {"multipliers", "multiplier_errors", "stability_method", "parameters", "coefficient"}
-    # what files add, and their dimensions (`analysis/saved.py`)
+    # what files add, and their dimensions (`results/files/branch.py`)
     | {"arclength", "iterations", "coefficients", "record", "unknown", "multipliers_real", "multipliers_imag"}
 )
 RESERVED_PREFIXES = ("event_", "system_array_")
+#: variables on `point` besides omega and the parameters: kind, meaning; of those with two dimensions the second one
+_POINTS: dict[str, tuple[type, str]] = {
+    "amplitude": (float, "max |x| over one response period"),
+    "stable": (bool, "all Floquet multipliers inside the unit circle"),
+    "harmonics": (int, "harmonics kept, up to harmonics * omega"),
+    "error": (float, "relative size of the neglected harmonics of the force"),
+    "residual": (float, "residual of the harmonic balance, relative"),
+    "multipliers": (complex, "Floquet multipliers over the response period"),
+    "multiplier_errors": (float, "estimated errors of the multipliers"),
+    "stability_method": (object, "where the multipliers come from"),
+}
+_TABLES = ("multipliers", "multiplier_errors")
+#: attributes of a curve, with their defaults
+_ATTRIBUTES: dict[str, Any] = {"system": "", "ended": "", "closed": False, "period": 1, "observed_dof": 0, "dofs": 1}
+#: variables on `event`, after the fields of `EventRow`: kind, meaning
+_EVENTS: dict[str, tuple[type, str]] = {
+    "kind": (object, ""),
+    "after": (int, ""),
+    "omega": (float, ""),
+    "amplitude": (float, ""),
+    "residual": (float, ""),
+    "uncertainty": (float, "half-width in the free parameter of what is not resolved of an event, else 0"),
+    "contact": (object, "the contact that grazes; empty at a smooth bifurcation"),
+    "contact_at": (float, "value of the free parameter at which that contact grazes"),
+    "multiplier": (complex, "the multiplier that crosses the unit circle"),
+    "multiplier_error": (float, "its estimated error"),
+    "stability_method": (object, ""),
+    "criticality": (object, ""),
+    "stable_after": (np.int8, "motions right after it are stable: 1, unstable: 0, not known: -1"),
+}
+#: where, along a curve of bifurcations, a multiplier other than the critical ones reaches the unit circle
+_BY_ANOTHER = frozenset({"R1", "R2", "LPPD", "LPNS", "PDNS", "NSNS"})
 
 
-class BranchLike(BranchEvents, Protocol):
-    """What the layout asks of a branch; events carry their place as arclength along it."""
+@dataclass(frozen=True)
+class EventRow:
+    """One located bifurcation, as a row of the dataset.
 
-    @property
-    def system(self) -> System: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def orbits(self) -> Sequence[PeriodicOrbit]: ...
-    @property
-    def omega(self) -> np.ndarray: ...
-    @property
-    def amplitude(self) -> np.ndarray: ...
-    @property
-    def harmonics(self) -> np.ndarray: ...
-    @property
-    def truncation(self) -> np.ndarray: ...
-    @property
-    def multipliers(self) -> np.ndarray: ...
-    @property
-    def multiplier_errors(self) -> np.ndarray: ...
-    @property
-    def stability_methods(self) -> Sequence[str]: ...
-    @property
-    def arclength(self) -> np.ndarray: ...
-    @property
-    def closed(self) -> bool: ...
-    @property
-    def ended(self) -> str: ...
-    @property
-    def observe(self) -> int: ...
-    @property
-    def options(self) -> Mapping[str, Any]: ...
-    @property
-    def warnings(self) -> Sequence[str]: ...
-    def parameter(self, name: str) -> np.ndarray: ...
+    `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
+    the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
+    `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at
+    a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does;
+    `multiplier_error` is the estimated error of `multiplier`, `stability_method` where it comes from; `extreme` says of
+    an extremum what it is ("maximum of j").
+    """
+
+    kind: str
+    after: int
+    omega: float
+    amplitude: float
+    residual: float = np.nan
+    multiplier: complex = complex(np.nan, np.nan)
+    multiplier_error: float = np.nan
+    stability_method: str = ""
+    criticality: str | None = None
+    stable_after: bool | None = None
+    uncertainty: float = 0.0
+    contact: str = ""
+    contact_at: float = np.nan
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    extreme: str = ""
 
 
 def curve_dataset(
     omega: ArrayLike,
     amplitude: ArrayLike,
     *,
-    stable: ArrayLike | None = None,
-    harmonics: ArrayLike | None = None,
-    error: ArrayLike | None = None,
-    residual: ArrayLike | None = None,
-    multipliers: ArrayLike | None = None,
-    multiplier_errors: ArrayLike | None = None,
-    stability_method: Sequence[str] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     free: str = "omega",
     events: Sequence[EventRow] = (),
-    system: str = "",
-    ended: str = "",
-    closed: bool = False,
-    period: int = 1,
-    observed_dof: int = 0,
-    dofs: int = 1,
     options: Mapping[str, str | int | float] | None = None,
+    **given: Any,
 ) -> xarray.Dataset:
     """A curve of periodic motions as a labelled dataset; the layout is described at the top of this module.
 
-    Shapes: `omega`, `amplitude`, `stable`, `harmonics`, `error`, `residual` (points,); `multipliers` (points, m),
-    complex, `multiplier_errors` their estimated errors, `stability_method` (points,) where they come from; each of
-    `parameters` a number, or (points,) where it varies along the curve. `omega` is in rad per unit time, `amplitude` is
-    max |x| over one response period at `observed_dof`, in the system's unit of length; `period` counts the forcing
-    periods in one response period; `free` names the parameter that the curve was followed in. `options` are further
-    numbers or texts that tell how the curve was computed.
+    Parameters
+    ----------
+    omega, amplitude
+        At the points, (points,): in rad per unit time; max |x| over one response period at the observed degree of
+        freedom, in the system's unit of length.
+    parameters
+        Each a number, or (points,) where it varies along the curve; `free` names the one that the curve was followed
+        in.
+    options
+        Further numbers or texts that say how the curve was computed.
+    given
+        Variables on `point`: `stable`, `harmonics`, `error`, `residual`, `stability_method` (points,); `multipliers`,
+        complex, and their errors `multiplier_errors` (points, m). Attributes: `system`, `ended`, `closed`, `period` (in
+        periods of the load), `observed_dof`, `dofs`.
 
-    Raises InputError where lengths disagree or `free` is not a parameter.
+    Raises
+    ------
+    InputError
+        Where lengths disagree or `free` is not a parameter.
     """
     import xarray
 
+    for name in given:
+        if name not in _POINTS and name not in _ATTRIBUTES:
+            raise TypeError(f"curve_dataset() got an unexpected keyword argument {name!r}")
     frequency = _points("omega", omega, None)
     count = frequency.size
     values = {
-        name: np.broadcast_to(np.asarray(value, dtype=float), (count,))
-        if np.ndim(value) == 0
-        else _points(name, value, count)
+        name: np.full(count, float(np.asarray(value))) if np.ndim(value) == 0 else _points(name, value, count)
         for name, value in (parameters or {}).items()
     }
     if free != "omega" and free not in values:
@@ -151,49 +172,25 @@ def curve_dataset(
         if not 0 <= row.after < count:
             raise InputError(f"event {row.kind} lies after point {row.after} of a curve of {count} points")
 
-    described = _Described(count)
-    described.add("amplitude", amplitude, "max |x| over one response period")
-    described.add("stable", stable, "all Floquet multipliers inside the unit circle", bool)
-    described.add("harmonics", harmonics, "harmonics kept, up to harmonics * omega", int)
-    described.add("error", error, "relative size of the neglected harmonics of the force")
-    described.add("residual", residual, "residual of the harmonic balance, relative")
-    variables: dict[str, Any] = described.variables
-    names = list(values)
-    variables["parameters"] = (
-        ("point", "parameter"),
-        np.column_stack([values[name] for name in names]) if names else np.empty((count, 0)),
-    )
-    for name, rows, kind, meaning in (
-        ("multipliers", multipliers, complex, "Floquet multipliers over the response period"),
-        ("multiplier_errors", multiplier_errors, float, "estimated errors of the multipliers"),
-    ):
-        if rows is None:
-            continue
-        table = np.asarray(rows, dtype=kind)
-        if table.ndim != 2 or table.shape[0] != count:
-            raise InputError(f"{name}: expected one row for each of the {count} points, got shape {table.shape}")
-        variables[name] = (("point", "multiplier"), table, {"long_name": meaning})
-    described.add("stability_method", stability_method, "where the multipliers come from", object)
-    variables |= event_variables(events, names, values)
+    variables: dict[str, Any] = {"parameters": (("point", "parameter"), np.array([*values.values()]).T)}
+    if not values:
+        variables["parameters"] = (("point", "parameter"), np.empty((count, 0)))
+    for name, (kind, meaning) in _POINTS.items():
+        rows = amplitude if name == "amplitude" else given.get(name)
+        if rows is not None:
+            dims = ("point", "multiplier") if name in _TABLES else ("point",)
+            variables[name] = (dims, _points(name, rows, count, kind, len(dims)), {"long_name": meaning})
+    variables |= _event_variables(events, values)
 
     coords: dict[str, Any] = {
         "omega": ("point", frequency, {"long_name": "circular forcing frequency", "units": "rad per unit time"}),
-        "parameter": ("parameter", np.array(names, dtype=object)),
+        "parameter": ("parameter", np.array(list(values), dtype=object)),
     }
     if free != "omega":
         taken = (free,) if free in RESERVED or free.startswith(RESERVED_PREFIXES) else ()
         coords[parameter_column(free, taken)] = ("point", values[free].copy())
-    attributes: dict[str, Any] = {
-        "layout": LAYOUT,
-        "suboctave": __version__,
-        "system": system,
-        "free": free,
-        "ended": ended,
-        "closed": int(closed),
-        "period": period,
-        "observed_dof": observed_dof,
-        "dofs": dofs,
-    }
+    own = {name: given.get(name, default) for name, default in _ATTRIBUTES.items()}
+    attributes = {"layout": LAYOUT, "suboctave": __version__, "free": free, **own, "closed": int(own["closed"])}
     for name, value in (options or {}).items():
         if name in attributes:
             raise InputError(f"option {name!r} would overwrite an attribute of the layout")
@@ -201,10 +198,35 @@ def curve_dataset(
     return xarray.Dataset(variables, coords, attributes)
 
 
-def branch_dataset(branch: BranchLike) -> xarray.Dataset:
+def _event_variables(events: Sequence[EventRow], values: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The variables on the dimension `event`; `values`: the parameters at the points."""
+    columns = {name: [getattr(row, name) for row in events] for name in _EVENTS}
+    columns["criticality"] = [word or "" for word in columns["criticality"]]
+    columns["stable_after"] = [UNKNOWN if stable is None else int(stable) for stable in columns["stable_after"]]
+    variables: dict[str, Any] = {
+        f"event_{name}": ("event", np.array(columns[name], dtype=kind), {"long_name": meaning} if meaning else {})
+        for name, (kind, meaning) in _EVENTS.items()
+    }
+    rows = [[row.parameters.get(name, values[name][row.after]) for name in values] for row in events]
+    table = np.array(rows, dtype=float).reshape(len(events), len(values))
+    return variables | {"event_parameters": (("event", "parameter"), table)}
+
+
+def _points(name: str, values: ArrayLike, count: int | None, kind: type = float, dimensions: int = 1) -> np.ndarray:
+    array: np.ndarray = np.asarray(values, dtype=kind)
+    if dimensions == 2 and (array.ndim != 2 or len(array) != count):
+        raise InputError(f"{name}: expected one row for each of the {count} points, got shape {array.shape}")
+    if dimensions == 1 and (array.ndim != 1 or (count is not None and array.size != count)):
+        wanted = "a one-dimensional array" if count is None else f"{count} values, one for each point"
+        raise InputError(f"{name}: expected {wanted}, got shape {array.shape}")
+    return array
+
+
+# --------------------------------------------------------------------------------------------------------- a branch
+def branch_dataset(branch: Any) -> xarray.Dataset:
     """A computed branch as a labelled dataset; the layout is described at the top of this module."""
     names = list(branch.system.parameters)
-    rows = event_rows(branch, np.asarray(branch.arclength))
+    rows = _event_rows(branch, np.asarray(branch.arclength))
     dataset = curve_dataset(
         branch.omega,
         branch.amplitude,
@@ -232,7 +254,7 @@ def branch_dataset(branch: BranchLike) -> xarray.Dataset:
     return _with_tracked(dataset, branch, rows)
 
 
-def _with_tracked(dataset: xarray.Dataset, branch: BranchLike, rows: Sequence[EventRow]) -> xarray.Dataset:
+def _with_tracked(dataset: xarray.Dataset, branch: Any, rows: Sequence[EventRow]) -> xarray.Dataset:
     """The dataset with what only curves of bifurcations have."""
     kind = getattr(branch, "kind", None)
     if kind is None:
@@ -245,6 +267,63 @@ def _with_tracked(dataset: xarray.Dataset, branch: BranchLike, rows: Sequence[Ev
     )
 
 
+def events_met(branch: Any) -> list[Any]:
+    """The branch's bifurcations, grazings and events in the order met: the rows of the dimension `event`."""
+    return sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda event: event.arclength)
+
+
+def _event_rows(branch: Any, arclength: np.ndarray) -> list[EventRow]:
+    """The branch's bifurcations, grazings and events in the order met, each with its place and the verdict after it."""
+    own = {id(event) for event in (*branch.grazings, *branch.events)}  # stability goes on through these
+    rows: list[EventRow] = []
+    for event in events_met(branch):
+        place = int(np.searchsorted(arclength, event.arclength, side="right")) - 1
+        after = min(max(place, 0), max(arclength.size - 2, 0))
+        last = rows[-1].stable_after if rows and rows[-1].after == after else None
+        before = bool(branch.stable[after]) if last is None else last
+        critical = event.critical_multiplier()
+        rows.append(
+            EventRow(
+                event.kind,
+                after,
+                event.omega,
+                event.amplitude,
+                residual=event.residual,
+                multiplier=critical,
+                multiplier_error=event.critical_error,
+                stability_method=event.stability_method,
+                criticality=event.criticality,
+                stable_after=_stable_after(branch, event, after, before, id(event) in own),
+                uncertainty=event.uncertainty,
+                contact="" if event.contact is None else str(event.contact),
+                contact_at=np.nan if event.contact is None else event.contact.parameter,
+                parameters=dict(event.parameters),
+                extreme=_extreme(event),
+            )
+        )
+    return rows
+
+
+def _stable_after(branch: Any, event: Any, after: int, before: bool, own: bool) -> bool:
+    """Whether the motions right after an event are stable; of a curve of bifurcations, all but its critical ones."""
+    if getattr(event, "curve", ""):
+        return bool(branch.stable[min(after + 1, len(branch.stable) - 1)]) if event.kind in _BY_ANOTHER else before
+    return before if own else not before and not _others_unstable(event.multipliers, event.critical_multiplier())
+
+
+def _extreme(event: Any) -> str:
+    which = getattr(event, "extreme", "")
+    return f"{which} of {getattr(event, 'parameter_name', '')}" if which else ""
+
+
+def _others_unstable(multipliers: np.ndarray, critical: complex) -> bool:
+    """Whether multipliers other than the critical one (and its conjugate) lie outside the unit circle."""
+    distance = np.minimum(np.abs(multipliers - critical), np.abs(multipliers - np.conj(critical)))
+    skip = np.argsort(distance)[: 1 if abs(critical.imag) < 1e-6 * abs(critical) else 2]
+    return bool(np.any(np.abs(np.delete(multipliers, skip)) > 1.0))
+
+
+# ---------------------------------------------------------------------------------------------------------- names
 def reading_name(what: str, number: float | None = None, dof: int | None = None) -> str:
     """The name that a read-off is stored under: "velocity", "harmonic_3", "harmonic_0.5", "peak_force_0_dof1".
 
@@ -285,32 +364,11 @@ def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarr
 
 def check_layout(dataset: xarray.Dataset) -> None:
     """Raises InputError when the dataset is not one that `curve_dataset` of this version lays out."""
-    found = dataset.attrs.get("layout")
-    if found is None:
+    layout = dataset.attrs.get("layout")
+    if layout is None:
         raise InputError("this dataset was not laid out by suboctave: it has no attribute 'layout'")
-    if int(found) > LAYOUT:
+    if int(layout) > LAYOUT:
         raise InputError(
-            f"this dataset has layout {found}, newer than {LAYOUT}: it was written by suboctave "
+            f"this dataset has layout {layout}, newer than {LAYOUT}: it was written by suboctave "
             f"{dataset.attrs.get('suboctave', '(unknown version)')}; update suboctave"
         )
-
-
-class _Described:
-    """Collects the variables on `point`, each with its length checked and its meaning attached."""
-
-    def __init__(self, count: int):
-        self.count = count
-        self.variables: dict[str, Any] = {}
-
-    def add(self, name: str, values: ArrayLike | None, meaning: str, kind: type = float) -> None:
-        if values is not None:
-            checked = _points(name, values, self.count, kind)
-            self.variables[name] = ("point", checked, {"long_name": meaning})
-
-
-def _points(name: str, values: ArrayLike, count: int | None, kind: type = float) -> np.ndarray:
-    array: np.ndarray = np.asarray(values, dtype=kind)
-    if array.ndim != 1 or (count is not None and array.size != count):
-        wanted = "a one-dimensional array" if count is None else f"{count} values, one for each point"
-        raise InputError(f"{name}: expected {wanted}, got shape {array.shape}")
-    return array

@@ -26,10 +26,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.harmonic.element_force import force_along
-from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.model.coupled import reads
-from suboctave.model.sampling import told_levels
+from suboctave.harmonic.orbit import PeriodicOrbit, force_along
+from suboctave.model.elements.coupled import reads
+from suboctave.model.elements.smoothness import levels
 from suboctave.store.layout import LAYOUT
 from suboctave.version import __version__
 
@@ -208,9 +207,9 @@ def _check_element(orbit: PeriodicOrbit, index: Any) -> None:
 def _gaps(orbit: PeriodicOrbit, dof: int) -> Iterator[tuple[float, int]]:
     """Gaps as values of x of one degree of freedom, with the index of their element."""
     system = orbit.balance.system
-    coefficients, kinds, _ = orbit.balance.coefficients(orbit.values)
+    laws = orbit.balance.laws(orbit.values).members
     for index, element in enumerate(system.elements):
-        places = told_levels(kinds[index], coefficients[index])
+        places = levels(laws[index].kind, laws[index].coefficients)
         if not places:
             continue
         direction = np.asarray(reads(element, system.n), dtype=float)

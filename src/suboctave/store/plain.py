@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import numbers
 from collections.abc import Mapping
 from typing import Any
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.errors import InputError
+from suboctave.model.description import plain_number
 
 __all__ = ["from_json", "to_json"]
 
@@ -34,15 +34,9 @@ def from_json(text: str, classes: Mapping[str, type] | None = None) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    if value is None or isinstance(value, bool | str):
-        return value
-    if isinstance(value, np.bool_):
-        return bool(value)
-    if isinstance(value, numbers.Integral):
-        return int(value)
-    if isinstance(value, numbers.Real):
-        number = float(value)
-        return number if math.isfinite(number) else {"float": repr(number)}
+    number = plain_number(value)
+    if number is not NotImplemented:
+        return number
     if isinstance(value, numbers.Complex):
         pair = complex(value)
         return {"complex": [_plain(pair.real), _plain(pair.imag)]}

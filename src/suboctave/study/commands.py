@@ -5,25 +5,27 @@ from __future__ import annotations
 import json
 from contextlib import AbstractContextManager
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from suboctave.analysis import BifurcationDiagram, Isola, Isolas, Results, Table, load
-from suboctave.analysis.isola_tables import isola_row
-from suboctave.analysis.progress import bar
-from suboctave.analysis.results import Result
-from suboctave.analysis.time_result import TimeResult
 from suboctave.errors import InputError, suggest
+from suboctave.experiments.time_result import TimeResult
 from suboctave.interruption import Interruption
+from suboctave.maps.isolas.isola import Isola, isola_row
+from suboctave.maps.isolas.region import IsolaMap
+from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.regimes.map import RegimeMap
+from suboctave.progress import bar
+from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store import files
-from suboctave.study.demo import significant
+from suboctave.store.table import Table
 from suboctave.study.file import Study, read_study
-from suboctave.study.keeping import recovered
-from suboctave.study.runner import JOURNAL, Finished, Outcome, run_study
-from suboctave.study.screen import console, print_result, print_texts
+from suboctave.study.outputs import tables_of
+from suboctave.study.results import Result, Results, load
+from suboctave.study.runner import JOURNAL, Finished, Outcome, recovered, run_study
+from suboctave.study.screen import console, print_result, print_texts, significant
 from suboctave.study.steps import Step
 
 __all__ = ["check", "examples", "new", "run", "show"]
@@ -86,12 +88,12 @@ def run(
     def watch(step: Step) -> AbstractContextManager[Any]:
         return bar(step.name)
 
-    def said(item: Finished) -> None:
+    def report(item: Finished) -> None:
         while titles:  # above the first result: what is refused before any work has no title
             screen.print(titles.pop(), style="bold", markup=False)
         _print_finished(screen, item)
 
-    outcome = run_study(study, out, overwrite, resume, watch, said, seconds)
+    outcome = run_study(study, out, overwrite, resume, watch, report, seconds)
     if outcome.complete is not None:
         screen.print(f"nothing to compute: {outcome.complete} is complete", markup=False, soft_wrap=True)
     elif outcome.files:
@@ -136,11 +138,11 @@ def _print_finished(screen: Any, item: Finished) -> None:
 def _summary(outcome: Outcome, status: int) -> dict[str, Any]:
     analyses = []
     for item in outcome.finished:
-        said: dict[str, Any] = {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
-        said |= {"reused": item.reused, "failure": item.failure}
+        entry: dict[str, Any] = {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
+        entry |= {"reused": item.reused, "failure": item.failure}
         if item.result is not None:
-            said |= _result(item.result)
-        analyses.append(said)
+            entry |= _result(item.result)
+        analyses.append(entry)
     return {
         "ok": status == 0,
         "status": status,
@@ -163,8 +165,8 @@ def show(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, as_jso
         _no_csv(csv)
         _show_journal(path, as_json)
         return
-    found = load(path, allow_code=allow_code)
-    single = found.to_table() if isinstance(found, TimeResult) else found
+    loaded = load(path, allow_code=allow_code)
+    single = loaded.to_table() if isinstance(loaded, TimeResult | IsolaMap | RegimeMap) else loaded
     results = single if isinstance(single, Results) else Results({path.stem: single})
     written = _csv(results, csv, overwrite) if csv is not None else []
     if as_json:
@@ -177,8 +179,8 @@ def show(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, as_jso
     if results.attributes.get("title"):
         screen.print(str(results.attributes["title"]), style="bold", markup=False)
     if "written" in results.attributes:
-        said = results.attributes
-        screen.print(f"suboctave {said.get('suboctave')}, {said['written']}", markup=False)
+        origin = results.attributes
+        screen.print(f"suboctave {origin.get('suboctave')}, {origin['written']}", markup=False)
     for name, item in results.items():
         seconds = results.details.get(name, {}).get("seconds")
         note = f" in {seconds:.2f} s" if seconds is not None else ""
@@ -197,13 +199,7 @@ def _csv(results: Results, folder: Path, overwrite: bool) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"the folder {folder} cannot be made: {error.strerror}") from None
-    jobs: list[tuple[Path, Any]] = []
-    for name, item in results.items():
-        jobs.append((folder / f"{name}.csv", item.to_csv))
-        if isinstance(item, Isolas):
-            jobs.append((folder / f"{name}_points.csv", partial(item.to_csv, what="points")))
-        if not isinstance(item, Table):
-            jobs.append((folder / f"{name}_bifurcations.csv", partial(item.to_csv, what="bifurcations")))
+    jobs = [job for name, item in results.items() for job in tables_of(name, item, folder)]
     for path, _ in jobs:
         files.free_place(path, overwrite)
     return [write(path, overwrite=overwrite) for path, write in jobs]
@@ -230,8 +226,8 @@ def _show_study(study: Study, as_json: bool) -> None:
     screen.print(repr(study.system), markup=False)
     screen.print("\nanalyses", style="bold")
     for step in steps:
-        said = {k: v for k, v in step["arguments"].items() if k not in ("name", "type")}
-        listed = ", ".join(f"{name} = {_written(value)}" for name, value in said.items())
+        arguments = {k: v for k, v in step["arguments"].items() if k not in ("name", "type")}
+        listed = ", ".join(f"{name} = {_written(value)}" for name, value in arguments.items())
         screen.print(f"  {step['name']}: {step['type']}({listed})", markup=False)
     screen.print(f"\noutputs in {study.folder}", markup=False, soft_wrap=True)
 
@@ -243,24 +239,22 @@ def _written(value: Any) -> str:
 
 
 def _show_journal(path: Path, as_json: bool) -> None:
-    found, torn = recovered(path)
+    analyses = recovered(path)
     if as_json:
-        _print_json({"ok": True, "analyses": [asdict(item) for item in found], "torn": torn})
+        _print_json({"ok": True, "analyses": [asdict(item) for item in analyses]})
         return
     screen = console()
     screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
     rows = [
-        [item.name, item.state, str(item.points), str(item.bifurcations), str(item.branches or "")] for item in found
+        [item.name, item.state, str(item.points), str(item.bifurcations), str(item.branches or "")] for item in analyses
     ]
     names = ("analysis", "state", "points", "bifurcations", "branches")
     print_texts(screen, names, rows, left=("analysis", "state"))
-    for item in found:
+    for item in analyses:
         if item.events:
             screen.print(f"{item.name}, so far", style="bold", markup=False)
             lines = [[kind, significant(omega, 9), significant(amplitude, 7)] for kind, omega, amplitude in item.events]
             print_texts(screen, ("kind", "omega", "max |x|"), lines, left=("kind",))
-    if torn:
-        screen.print("its last record is torn and is left out", markup=False)
 
 
 def _result(item: Result) -> dict[str, Any]:
@@ -274,10 +268,10 @@ def _result(item: Result) -> dict[str, Any]:
             branches.append(place | _result(node.branch))
         return {"stopped": item.stopped, "branches": branches}
     if isinstance(item, Isolas):
-        found = [{k: _plain(v) for k, v in isola_row(isola).items()} | _closed(isola) for isola in item]
-        told: dict[str, Any] = {"parameter": item.parameter, "said": item.said, "isolas": found}
-        told |= {"limit_points": len(item.limit_points), "doublings": len(item.doublings)}
-        return told | {"notes": list(item.notes), "interrupted": item.interrupted}
+        isolas = [{k: _plain(v) for k, v in isola_row(isola).items()} | _closed(isola) for isola in item]
+        counts = {"limit_points": len(item.limit_points), "doublings": len(item.doublings)}
+        state = {"notes": list(item.notes), "interrupted": item.interrupted}
+        return {"parameter": item.parameter, "said": item.summary, "isolas": isolas} | counts | state
     if isinstance(item, Table):
         return {"title": item.title, "rows": len(item), "columns": {n: _listed(c) for n, c in item.columns.items()}}
     events = item.bifurcations_frame().to_dict("records")
@@ -312,5 +306,5 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def _print_json(said: dict[str, Any]) -> None:
-    print(json.dumps(said, ensure_ascii=False, allow_nan=False, default=_plain))
+def _print_json(content: dict[str, Any]) -> None:
+    print(json.dumps(content, ensure_ascii=False, allow_nan=False, default=_plain))

@@ -7,6 +7,7 @@ s = 3000, for the three cases of Figs 6 and 7 of Alcorta, Baguet, Prabel, Piteau
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +15,15 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from suboctave.pictures import plot_boundaries, plot_panels, plot_response
+from suboctave.progress import bar
+from suboctave.study.screen import console, event_lines, print_events
 
 if TYPE_CHECKING:
     import xarray
+    from rich.console import Console
 
-    from suboctave.analysis import BifurcationDiagram, Branch
+    from suboctave.results.branch import Branch
+    from suboctave.results.diagram import BifurcationDiagram
 
 __all__ = [
     "CASES",
@@ -28,9 +33,8 @@ __all__ = [
     "Curve",
     "compute",
     "draw",
-    "event_lines",
+    "run_demo",
     "sequel",
-    "significant",
 ]
 
 OMEGA = (4.5, 1.25)
@@ -69,7 +73,7 @@ CASES = (
 
 def compute(case: Case, progress: Progress | None = None) -> Curve:
     """The response curve of one case, with stability and located bifurcations; `progress(fraction, text)` is called."""
-    from suboctave.analysis import frequency_response
+    from suboctave.analysis.frequency_response import frequency_response
     from suboctave.model import library
 
     begin = perf_counter()
@@ -101,15 +105,17 @@ def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Pa
     frequency and the gap, with the curve of limit points that begins on it; and, off that border, a resonance of twice
     the period that no sweep meets.
     """
-    from suboctave.analysis import bifurcation_diagram, continue_branch, frequency_response, track
+    from suboctave.analysis.diagram import bifurcation_diagram
+    from suboctave.analysis.frequency_response import continue_branch, frequency_response
+    from suboctave.analysis.track import track
     from suboctave.model import library
 
-    told: list[tuple[str, Path]] = []
+    beside: list[tuple[str, Path]] = []
     strong = library.reference_oscillator(p=1.7, j=0.0, regularization=REGULARIZATION)
     diagram = bifurcation_diagram(strong, omega=OMEGA, depth=2, progress=progress)
     count = len(diagram) - 1
-    told.append((f"p = 1.7, j = 0: {count} branches leave the response", folder / "cascade.png"))
-    diagram.plot(told[-1][1])
+    beside.append((f"p = 1.7, j = 0: {count} branches leave the response", folder / "cascade.png"))
+    diagram.plot(beside[-1][1])
     _go_on(diagram)
 
     weak = library.reference_oscillator(p=0.55, j=0.0, regularization=REGULARIZATION)
@@ -120,8 +126,8 @@ def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Pa
     _go_on(limits)
     highest = max(e.parameter("j") for e in border.extrema)
     text = f"p = 0.55: the response doubles its period for gaps up to j = {highest:.5f}"
-    told.append((text, folder / "boundary.png"))
-    plot_boundaries([border.to_xarray(), limits.to_xarray()], told[-1][1])
+    beside.append((text, folder / "boundary.png"))
+    plot_boundaries([border.to_xarray(), limits.to_xarray()], beside[-1][1])
 
     fold = min(limits.orbits, key=lambda orbit: abs(orbit.values["j"] - 0.5))
     isola = continue_branch(fold, "omega", OMEGA, progress=progress)
@@ -129,9 +135,9 @@ def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Pa
     response = frequency_response(weak.with_parameters({"j": gap}), omega=OMEGA, progress=progress)
     born = max(e.parameter("j") for e in limits.extrema)
     text = f"up to j = {born:.5f} an isolated resonance of twice the period hides beside it: at j = {gap:.3f}"
-    told.append((text, folder / "isola.png"))
-    plot_response([response.to_xarray(), isola.to_xarray()], told[-1][1], title=f"p = 0.55, j = {gap:.3f}")
-    return told
+    beside.append((text, folder / "isola.png"))
+    plot_response([response.to_xarray(), isola.to_xarray()], beside[-1][1], title=f"p = 0.55, j = {gap:.3f}")
+    return beside
 
 
 def _go_on(result: Branch | BifurcationDiagram) -> None:
@@ -140,35 +146,57 @@ def _go_on(result: Branch | BifurcationDiagram) -> None:
         raise KeyboardInterrupt
 
 
-def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]:
-    """The located bifurcations as text: kind, omega, max |x|, critical multiplier, residual.
+def run_demo(out: Path, json_wanted: bool = False) -> None:
+    """The demonstration: three response curves, a table of their bifurcations on stdout, figures in `out`."""
+    out.mkdir(parents=True, exist_ok=True)  # before the work: a folder that cannot be made is known now
+    screen = console(quiet=json_wanted)
+    screen.print(
+        "An oscillator that rattles between two stops, at -1 and j:\n"
+        "    x'' + 2 zeta x' + x + alpha x^3 + Fc(x) = p cos(omega t)\n"
+        f"zeta = 0.03, alpha = 0.16, Kc = 4.7, stops regularised with s = {REGULARIZATION:g};\n"
+        f"omega from {OMEGA[0]:g} to {OMEGA[1]:g}.",
+        markup=False,
+    )
+    curves: list[Curve] = []
+    for case in CASES:
+        with bar(f"p = {case.p:g}, j = {case.j:g}") as report:
+            curve = compute(case, report)
+        curves.append(curve)
+        _print_curve(screen, curve)
+        if curve.interrupted:
+            break
+    screen.print()
+    figures = list(draw(curves, out))
+    for path in figures:
+        screen.print(f"figure: {path}", markup=False, soft_wrap=True)
+    if not curves[-1].interrupted:
+        with bar("what hides beside them") as report:
+            hidden = sequel(out, report)
+        for text, path in hidden:
+            screen.print(f"\n{text}\nfigure: {path}", markup=False, soft_wrap=True)
+            figures.append(path)
+    if json_wanted:
+        listed = [
+            {
+                "p": c.case.p,
+                "j": c.case.j,
+                "points": int(c.dataset.sizes["point"]),
+                "seconds": c.seconds,
+                "ended": c.dataset.attrs["ended"],
+                "events": [
+                    {"kind": str(kind), "omega": float(omega)}
+                    for kind, omega in zip(c.dataset["event_kind"].values, c.dataset["event_omega"].values, strict=True)
+                ],
+            }
+            for c in curves
+        ]
+        print(json.dumps({"ok": not curves[-1].interrupted, "curves": listed, "files": [str(f) for f in figures]}))
+    if curves[-1].interrupted:
+        raise KeyboardInterrupt
 
-    One that could only be bracketed shows the half-width of its bracket in place of a residual.
-    """
-    names = ("kind", "omega", "amplitude", "multiplier", "residual", "uncertainty")
-    columns = (dataset[f"event_{name}"].to_numpy() for name in names)
-    return [
-        (
-            str(kind),
-            significant(omega, 9),
-            significant(amplitude, 7),
-            _complex_text(complex(multiplier)),
-            f"± {uncertainty:.0e}" if uncertainty else f"{residual:.0e}",
-        )
-        for kind, omega, amplitude, multiplier, residual, uncertainty in zip(*columns, strict=True)
-    ]
 
-
-def significant(value: float, digits: int) -> str:
-    """A number with so many significant digits, whatever its unit makes of it."""
-    return f"{value:#.{digits}g}".rstrip(".")
-
-
-def _complex_text(value: complex) -> str:
-    if value != value:  # not computed
-        return "-"
-    large = abs(value) >= 1e3
-    if abs(value.imag) < 5e-7 * abs(value):
-        return f"{value.real:+.6e}" if large else f"{value.real:+.6f}"
-    form = ".5e" if large else ".5f"
-    return f"{value.real:+{form}} ± {abs(value.imag):{form}}i"
+def _print_curve(screen: Console, curve: Curve) -> None:
+    case, dataset = curve.case, curve.dataset
+    screen.print(f"\np = {case.p:g}, j = {case.j:g}: {case.title}", style="bold", markup=False)
+    print_events(screen, event_lines(dataset))
+    screen.print(f"{dataset.sizes['point']} points in {curve.seconds:.2f} s; {dataset.attrs['ended']}.", markup=False)

@@ -8,20 +8,18 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from suboctave.errors import InputError, path_of, suggest
-from suboctave.model.description import describe
-from suboctave.model.system import System
-from suboctave.study.curve_figures import CURVE_FIGURES, CurveFigure
-from suboctave.study.lines import Lines
-from suboctave.study.mistakes import Mistake, Mistakes, StudyError
-from suboctave.study.motion_figures import MOTION_FIGURES, MotionFigure
+from suboctave.model.system import System, describe
+from suboctave.study.figures import FIGURES, Figure, StudyCurves
+from suboctave.study.mistakes import Lines, Mistake, Mistakes, StudyError
 from suboctave.study.outputs import Outputs, check_outputs
-from suboctave.study.steps import STEPS, Known, Step, Surroundings
+from suboctave.study.steps import STEPS, CheckContext, Known, Step
 from suboctave.study.system import SystemSection, make_system, overridden
 from suboctave.version import __version__
 
@@ -76,19 +74,23 @@ class Study:
         """The system at the parameters of one analysis."""
         return self.system.with_parameters(step.parameters) if step.parameters else self.system
 
-    def key_of(self, step: Step) -> str:
-        """What an analysis depends on, as a digest: version, system, arguments, and the analyses it starts from.
+    @cached_property
+    def keys(self) -> dict[str, str]:
+        """Of each analysis what it depends on, as a digest: version, system, arguments, the analyses it starts from.
 
         Not its time limit: what is finished did not need more.
         """
-        by_name = {s.name: s for s in self.steps}
-        said = {
-            "version": __version__,
-            "system": describe(self.system_of(step)),
-            "step": {k: v for k, v in step.model_dump(mode="json").items() if k not in ("name", "seconds")},
-            "needs": [self.key_of(by_name[name]) for _, name in step.needs()],
-        }
-        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        keys: dict[str, str] = {}
+        system = describe(self.system)
+        for step in self.steps:
+            content = {
+                "version": __version__,
+                "system": {**system, "parameters": {**system["parameters"], **step.parameters}},
+                "step": {k: v for k, v in step.model_dump(mode="json").items() if k not in ("name", "seconds")},
+                "needs": [keys[name] for _, name in step.needs()],
+            }
+            keys[step.name] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return keys
 
     @property
     def folder(self) -> Path:
@@ -180,9 +182,9 @@ def _parsed(source: Path, text: str) -> dict[str, Any]:
         reason, line = "values are nested too deeply", 0
     except ValueError as error:  # TOMLDecodeError, and whole numbers of thousands of digits
         reason = str(error)
-        found = re.search(r" \(at line (\d+), column (\d+)\)", reason)
-        line = int(found.group(1)) if found else text.count("\n") + 1 if "end of document" in reason else 0
-        reason = reason.replace(found.group(0), f", in column {found.group(2)}") if found else reason
+        place = re.search(r" \(at line (\d+), column (\d+)\)", reason)
+        line = int(place.group(1)) if place else text.count("\n") + 1 if "end of document" in reason else 0
+        reason = reason.replace(place.group(0), f", in column {place.group(2)}") if place else reason
         reason = reason.replace(" (at end of document)", ": the file ends in the middle")
     raise StudyError(str(source), [Mistake("", line, f"this is not TOML: {reason}")])
 
@@ -219,10 +221,10 @@ def _steps(
                 around = _around(step, system, before, known, mistakes, place, allow_code)
                 wrong = list(_checked(step, around)) if around is not None else []
                 for where, text in wrong:
-                    mistakes.add((*place, *(p for p in where if p != "")), text)
-                told = step.known(around) if around is not None and not wrong else None
-                if told is not None:
-                    known[step.name] = told
+                    mistakes.add((*place, *where), text)
+                motions = step.known(around) if around is not None and not wrong else None
+                if motions is not None:
+                    known[step.name] = motions
         name = given.get("name", kind)
         if not isinstance(name, str):
             continue
@@ -246,12 +248,12 @@ def _around(
     mistakes: Mistakes,
     place: tuple[str | int, ...],
     allow_code: bool,
-) -> Surroundings | None:
+) -> CheckContext | None:
     here = overridden(system, step.parameters, (*place, "parameters"), mistakes)
-    return None if here is None else Surroundings(here, before, allow_code, known)
+    return None if here is None else CheckContext(here, before, allow_code, known)
 
 
-def _checked(step: Step, around: Surroundings) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def _checked(step: Step, around: CheckContext) -> Iterator[tuple[tuple[str | int, ...], str]]:
     try:
         yield from step.check(around)
     except InputError as error:
@@ -263,17 +265,16 @@ def _outputs(
 ) -> Outputs | None:
     plain = dict(given)
     figures = plain.pop("figures", [])
-    sections: list[CurveFigure | MotionFigure] = []
-    kinds: dict[str, type[BaseModel]] = {**CURVE_FIGURES, **MOTION_FIGURES}
+    sections: list[Figure] = []
     if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
         mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
         figures = []
     for index, item in enumerate(figures):
         kind, place = item.get("kind", "response"), ("outputs", "figures", index)
-        if not isinstance(kind, str) or kind not in kinds:
-            mistakes.add((*place, "kind"), f"there is no figure of the kind {kind!r}{suggest(str(kind), kinds)}")
+        if not isinstance(kind, str) or kind not in FIGURES:
+            mistakes.add((*place, "kind"), f"there is no figure of the kind {kind!r}{suggest(str(kind), FIGURES)}")
             continue
-        figure = _validated(kinds[kind], item, place, mistakes)
+        figure = _validated(FIGURES[kind], item, place, mistakes)
         if figure is not None:
             sections.append(figure)
     outputs = _validated(Outputs, plain, ("outputs",), mistakes)
@@ -282,6 +283,6 @@ def _outputs(
     complete: Outputs = outputs.model_copy(update={"figures": sections})
     known = [step for step in steps if step is not None]
     if len(known) == len(steps) and steps:
-        for key, text in check_outputs(complete, known, system):
+        for key, text in check_outputs(complete, StudyCurves({step.name: step for step in known}, system)):
             mistakes.add(("outputs", *key), text)
     return complete

@@ -1,19 +1,22 @@
-"""What is wrong in a study file: every mistake with its line, all of them at once."""
+"""What is wrong in a study file: every mistake with its line, all of them at once.
+
+`tomllib` reads values and forgets lines. `Lines` walks over a text that `tomllib` has accepted and notes the line of
+every key, every element of an array and every table, arrays of tables included.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, get_args
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, Key, suggest
 
 if TYPE_CHECKING:
     import pydantic
 
-    from suboctave.study.lines import Lines, Path
-
-__all__ = ["Mistake", "Mistakes", "StudyError", "written"]
+__all__ = ["Lines", "Mistake", "Mistakes", "StudyError"]
 
 
 @dataclass(frozen=True)
@@ -45,16 +48,21 @@ class Mistakes:
     def __init__(self, source: str, lines: Lines) -> None:
         self.source = source
         self.lines = lines
-        self._found: list[Mistake] = []
+        self._mistakes: list[Mistake] = []
 
-    def add(self, path: Path, message: str) -> None:
+    def add(self, path: Key, message: str) -> None:
         """One mistake at the key `path`; the same one is noted once."""
         key = written(path)
         mistake = Mistake(_cut(key, 80), self.lines[path], _cut(message, 600))
-        if mistake not in self._found:
-            self._found.append(mistake)
+        if mistake not in self._mistakes:
+            self._mistakes.append(mistake)
 
-    def add_validation(self, prefix: Path, error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> None:
+    def add_error(self, prefix: Key, error: InputError) -> None:
+        """The mistakes that an InputError tells of, in the table at `prefix`."""
+        for part in error.parts:
+            self.add((*prefix, *part.key), str(part))
+
+    def add_validation(self, prefix: Key, error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> None:
         """What pydantic found in the table at `prefix`, which is a `model`, in our words."""
         for item in error.errors(include_url=False):
             path = (*prefix, *item["loc"])
@@ -63,19 +71,19 @@ class Mistakes:
             )
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._mistakes)
 
     def __bool__(self) -> bool:
-        return bool(self._found)
+        return bool(self._mistakes)
 
     @property
     def sorted(self) -> list[Mistake]:
         """In the order of the file."""
-        return sorted(self._found, key=lambda mistake: mistake.line)
+        return sorted(self._mistakes, key=lambda mistake: mistake.line)
 
     def refuse(self) -> None:
         """Raises StudyError if there is any."""
-        if self._found:
+        if self._mistakes:
             raise StudyError(self.source, self.sorted)
 
 
@@ -83,7 +91,7 @@ def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most // 2]} ... {text[-most // 3 :]}"
 
 
-def written(path: Path) -> str:
+def written(path: Key) -> str:
     """A path as a user reads it: analyses[0].omega."""
     text = ""
     for part in path:
@@ -91,9 +99,9 @@ def written(path: Path) -> str:
     return text
 
 
-def _shortened(path: Path, lines: Lines, missing: bool) -> Path:
+def _shortened(path: Key, lines: Lines, missing: bool) -> Key:
     """Without the names that pydantic gives to alternatives, which are no keys of the file."""
-    kept: Path = ()
+    kept: Key = ()
     for i, part in enumerate(path):
         if isinstance(part, int) or (*kept, part) in lines or i == 0:
             kept = (*kept, part)
@@ -134,9 +142,9 @@ def _in_words(item: Any, known: list[str]) -> str:
         return f"there is no such key{suggest(str(item['loc'][-1]), known)}"
     if kind == "missing":
         return "is missing"
-    said = str(item["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")
+    text = str(item["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")
     if kind in ("value_error", "assertion_error"):
-        return said
+        return text
     if kind in ("too_short", "too_long"):
         about, wanted = item["ctx"], item["ctx"].get("min_length", item["ctx"].get("max_length"))
         bound = "at least" if kind == "too_short" else "at most"
@@ -146,6 +154,164 @@ def _in_words(item: Any, known: list[str]) -> str:
         return f"must be {ways}, not {given!r}"
     if kind == "string_too_short":
         return "must not be empty"
-    said = _WORDS.get(kind, said)
+    text = _WORDS.get(kind, text)
     shown = repr(given)
-    return f"must be {said}, not {shown if len(shown) <= 60 else shown[:57] + '...'}"
+    return f"must be {text}, not {shown if len(shown) <= 60 else shown[:57] + '...'}"
+
+
+# -------------------------------------------------------------------------------------------------------------- lines
+_BLANK = " \t\r\n"
+
+
+class Lines:
+    """The lines (from 1) of the keys of a TOML text."""
+
+    def __init__(self, text: str) -> None:
+        self._places: dict[Key, int] = {(): 1}
+        with suppress(IndexError, RecursionError):  # what stands before it is still right
+            _Walker(text, self._places).walk()
+
+    def __getitem__(self, path: Key) -> int:
+        """The line of a key, or of what it would stand in."""
+        while path not in self._places:
+            path = path[:-1]
+        return self._places[path]
+
+    def __contains__(self, path: Key) -> bool:
+        return path in self._places
+
+
+class _Walker:
+    def __init__(self, text: str, places: dict[Key, int]) -> None:
+        self.text = text + "\n"
+        self.places = places
+        self.at = 0
+        self.line = 1
+        self.counts: dict[Key, int] = {}
+
+    def step(self, count: int = 1) -> None:
+        self.line += self.text.count("\n", self.at, self.at + count)
+        self.at += count
+
+    def note(self, path: Key) -> None:
+        self.places.setdefault(path, self.line)
+
+    def blank(self, newlines: bool = True) -> None:
+        """Past white space and comments."""
+        while self.at < len(self.text):
+            here = self.text[self.at]
+            if here == "#":
+                while self.text[self.at] != "\n":
+                    self.at += 1
+            elif here in _BLANK and (newlines or here != "\n"):
+                self.step()
+            else:
+                return
+
+    def walk(self) -> None:
+        table: Key = ()
+        while True:
+            self.blank()
+            if self.at >= len(self.text):
+                return
+            if self.text.startswith("[[", self.at):
+                self.at += 2
+                *front, last = self.key("]")
+                path = (*self.inside(front), last)
+                self.note(path)
+                self.counts[path] = self.counts.get(path, -1) + 1
+                table = (*path, self.counts[path])
+                self.at += 2
+                self.note(table)
+            elif self.text[self.at] == "[":
+                self.at += 1
+                table = self.inside(self.key("]"))
+                self.at += 1
+                self.note(table)
+            else:
+                self.pair(table)
+
+    def inside(self, keys: list[str]) -> Key:
+        """The path of a header: a name of an array of tables means its last table."""
+        path: Key = ()
+        for key in keys:
+            path = (*path, key)
+            if path in self.counts:
+                path = (*path, self.counts[path])
+        return path
+
+    def pair(self, table: Key) -> None:
+        path = table
+        start = self.line
+        for key in self.key("="):
+            path = (*path, key)
+            self.places.setdefault(path, start)
+        self.at += 1
+        self.value(path)
+
+    def key(self, end: str) -> list[str]:
+        """A dotted key, up to the character `end`."""
+        parts: list[str] = []
+        while True:
+            self.blank(newlines=False)
+            here = self.text[self.at]
+            if here == end:
+                return parts
+            if here == ".":
+                self.at += 1
+            elif here in "\"'":
+                start = self.at
+                self.string()
+                parts.append(_unquoted(self.text[start : self.at]))
+            else:
+                start = self.at
+                while self.text[self.at] not in f" \t.{end}":
+                    self.step()
+                parts.append(self.text[start : self.at])
+
+    def string(self) -> None:
+        quote = self.text[self.at]
+        mark = quote * 3 if self.text.startswith(quote * 3, self.at) else quote
+        self.at += len(mark)
+        while not self.text.startswith(mark, self.at):
+            self.step(2 if quote == '"' and self.text[self.at] == "\\" else 1)
+        self.at += len(mark)
+        while len(mark) == 3 and self.text[self.at] == quote:  # quotes right before the end belong to the text
+            self.at += 1
+
+    def value(self, path: Key) -> None:
+        self.blank()
+        here = self.text[self.at]
+        if here in "\"'":
+            self.string()
+        elif here == "[":
+            self.at += 1
+            index = 0
+            while self.more("]"):
+                self.note((*path, index))
+                self.value((*path, index))
+                index += 1
+        elif here == "{":
+            self.at += 1
+            while self.more("}"):
+                self.pair(path)
+        else:
+            while self.text[self.at] not in ",]}\n#":
+                self.at += 1
+
+    def more(self, end: str) -> bool:
+        """Past a comma; False at the end of an array or inline table, which is passed too."""
+        self.blank()
+        if self.text[self.at] == ",":
+            self.at += 1
+            self.blank()
+        if self.text[self.at] == end:
+            self.at += 1
+            return False
+        return True
+
+
+def _unquoted(text: str) -> str:
+    import tomllib
+
+    return next(iter(tomllib.loads(f"{text} = 0")))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from suboctave.analysis import Seeds
-from suboctave.bifurcation import Alcorta2019, BorderedSystem, ExtendedSystem, Formulation, formulation_of
+from suboctave.analysis.subharmonics import Seeds
 from suboctave.continuation import NewtonOptions, SteppingOptions
+from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, ExtendedSystem, Formulation, formulation_of
 from suboctave.errors import InputError, suggest
-from suboctave.harmonic.selection import AdaptiveHarmonics
-from suboctave.stability import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
+from suboctave.floquet import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
+from suboctave.harmonic.truncation import AdaptiveHarmonics
 
 __all__ = ["as_formulation", "as_harmonics", "as_newton", "as_seeds", "as_stability", "as_stepping"]
 
@@ -21,20 +21,20 @@ _FORMULATIONS: dict[str, Any] = {one.name: one for one in (BorderedSystem, Exten
 
 def as_newton(table: Mapping[str, Any] | None) -> NewtonOptions | None:
     """The Newton options of a table, None where there is none."""
-    return None if table is None else _options(NewtonOptions, table, "newton")
+    return _options(NewtonOptions, table, "newton")
 
 
 def as_stepping(table: Mapping[str, Any] | None) -> SteppingOptions | None:
     """The stepping options of a table, None where there is none."""
-    return None if table is None else _options(SteppingOptions, table, "stepping")
+    return _options(SteppingOptions, table, "stepping")
 
 
 def as_seeds(table: Mapping[str, Any] | None) -> Seeds | None:
     """How finely a search is done, of a table; None where there is none."""
-    return None if table is None else _options(Seeds, table, "seeds")
+    return _options(Seeds, table, "seeds")
 
 
-def as_harmonics(given: Any, size: int = 1) -> Any:
+def as_harmonics(given: Any) -> Any:
     """A whole number, "adaptive", or the options of adaptive harmonics as a table; None stays None."""
     if isinstance(given, Mapping):
         return _options(AdaptiveHarmonics, given, "harmonics")
@@ -47,37 +47,32 @@ def as_harmonics(given: Any, size: int = 1) -> Any:
 
 def as_stability(given: Any) -> StabilityMethod | None:
     """A method by name, or `{method = name, option = value}`; None stays None."""
-    if given is None:
-        return None
-    if isinstance(given, Mapping):
-        table = dict(given)
-        name = table.pop("method", None)
-        if name not in _METHODS:
-            raise InputError(f"method {name!r} is none that takes options{suggest(str(name), _METHODS)}")
-        made: StabilityMethod = _options(_METHODS[name], table, name)
-        return made
-    if not isinstance(given, str):
-        raise InputError(f"give the name of a method, or a table with method = ..., not {given!r}")
-    return method_of(given)
+    made: StabilityMethod | None = _named(given, "method", "method", _METHODS, method_of)
+    return made
 
 
 def as_formulation(given: Any) -> Formulation | None:
     """A formulation by name, or `{name = name, option = value}`; None stays None."""
-    if given is None:
-        return None
+    made: Formulation | None = _named(given, "formulation", "name", _FORMULATIONS, formulation_of)
+    return made
+
+
+def _named(given: Any, what: str, key: str, kinds: Mapping[str, Any], by_name: Callable[[str], Any]) -> Any:
+    """An object by its name, or by a table with its name at `key` beside its options."""
     if isinstance(given, Mapping):
         table = dict(given)
-        name = table.pop("name", None)
-        if name not in _FORMULATIONS:
-            raise InputError(f"unknown formulation {name!r}{suggest(str(name), _FORMULATIONS)}")
-        made: Formulation = _options(_FORMULATIONS[name], table, name)
-        return made
-    if not isinstance(given, str):
-        raise InputError(f"give the name of a formulation, or a table with name = ..., not {given!r}")
-    return formulation_of(given)
+        name = table.pop(key, None)
+        if name not in kinds:
+            raise InputError(f"there is no {what} {name!r} that takes options{suggest(str(name), kinds)}")
+        return _options(kinds[name], table, name)
+    if given is not None and not isinstance(given, str):
+        raise InputError(f"give the name of a {what}, or a table with {key} = ..., not {given!r}")
+    return None if given is None else by_name(given)
 
 
-def _options(kind: Any, table: Mapping[str, Any], what: str) -> Any:
+def _options(kind: Any, table: Mapping[str, Any] | None, what: str) -> Any:
+    if table is None:
+        return None
     known = {f.name: f for f in fields(kind)}
     for name, value in table.items():
         if name not in known:

@@ -11,18 +11,19 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.analysis import BifurcationDiagram, Branch, Isolas, Results
-from suboctave.analysis.results import Result
-from suboctave.errors import InputError
-from suboctave.model.system import System
-from suboctave.pictures.saving import SUFFIXES
+from suboctave.errors import InputError, Key
+from suboctave.maps.isolas.result import Isolas
+from suboctave.pictures.paper import SUFFIXES
 from suboctave.pictures.style import check_text
+from suboctave.results.branch import Branch
+from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store import files
-from suboctave.study.curve_figures import CurveFigure, FigureSection, drawable
-from suboctave.study.motion_figures import MotionFigure
+from suboctave.study.figures import Figure, StudyCurves, drawable
+from suboctave.study.results import Result, Results
 from suboctave.study.steps import Step
+from suboctave.study.steps.base import Complaint
 
-__all__ = ["FigureSection", "Outputs", "check_outputs", "csv_names", "places", "write_outputs"]
+__all__ = ["Outputs", "check_outputs", "csv_names", "places", "tables_of", "write_outputs"]
 
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 #: bytes of a file name: disks take 255, and half a name more is needed while it is written
@@ -42,15 +43,10 @@ class Outputs(BaseModel):
     figures: list[Any] = Field(default_factory=list)
 
 
-def check_outputs(
-    outputs: Outputs, steps: Sequence[Step], system: System | None
-) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
     """What is wrong with the outputs, before any work: key and message."""
-    curves = {step.name: step.plane for step in steps if step.drawn()}
-    isolas = [step.name for step in steps if step.gives_isolas]
-    events = [event.name for step in steps for event in getattr(step, "events", ())]
-    kinds = {step.name: type(step) for step in steps}
-    names: list[tuple[tuple[str | int, ...], str]] = [(("results",), outputs.results)]
+    steps = list(study.steps.values())
+    names: list[Complaint] = [(("results",), outputs.results)]
     yield from _wrong_suffix(("results",), outputs.results, (".nc",))
     if outputs.html is not None:
         names.append((("html",), outputs.html))
@@ -62,10 +58,7 @@ def check_outputs(
         names.append(((*key, "file"), figure.file))
         yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
         yield from _wrong_texts(figure, key)
-        if isinstance(figure, MotionFigure):
-            yield from (((*key, *where), text) for where, text in figure.check(kinds, system))
-            continue
-        yield from (((*key, *where), text) for where, text in figure.check(curves, system, events, isolas))
+        yield from (((*key, *where), text) for where, text in figure.check(study))
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
@@ -87,9 +80,7 @@ def _printable(name: str) -> bool:
     return all(character.isprintable() for character in name)
 
 
-def _wrong_texts(
-    figure: CurveFigure | MotionFigure, key: tuple[str | int, ...]
-) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def _wrong_texts(figure: Figure, key: Key) -> Iterator[Complaint]:
     for where, text in figure.texts:
         try:
             check_text(text)
@@ -97,9 +88,7 @@ def _wrong_texts(
             yield (*key, *where), str(error)
 
 
-def _wrong_suffix(
-    key: tuple[str | int, ...], name: str, suffixes: Sequence[str]
-) -> Iterator[tuple[tuple[str | int, ...], str]]:
+def _wrong_suffix(key: Key, name: str, suffixes: Sequence[str]) -> Iterator[Complaint]:
     if PurePath(name).suffix.lower() not in suffixes:
         yield key, f"{name!r} must end in {' or '.join(suffixes)}"
 
@@ -135,7 +124,7 @@ def write_outputs(
         yield results.save(folder / outputs.results, overwrite=True)
     if outputs.csv:
         for name, item in results.items():
-            for path, write in _tables(name, item, folder):
+            for path, write in tables_of(name, item, folder):
                 if path not in left:
                     yield write(files.free_place(path, True), overwrite=True)
     missing = []
@@ -171,7 +160,7 @@ def _worth(item: Result) -> bool:
     return isinstance(item, Isolas) or bool(len(item))
 
 
-def _tables(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:
+def tables_of(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:
     """The tables of a result: where each goes, and what writes it."""
     yield folder / f"{name}.csv", item.to_csv
     if isinstance(item, Isolas):

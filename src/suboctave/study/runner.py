@@ -2,31 +2,44 @@
 
 A run that was killed left its journal: `resume` takes the finished analyses from it and goes on. An analysis is taken
 over only if version, system, its arguments and those of the analyses it starts from are the same.
+
+Records of the journal: "points" holds what is new on a curve that is being followed, "branch" a branch of a diagram
+that is under way, named by the number of its parent and the bifurcation that it leaves at, "analysis" a finished one.
+The branches of a finished diagram are those records; its own holds the tree. Before the record of finished isolas stand
+those of their curves and closed branches, "part"; before that of a table those of the result that it was taken from.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from suboctave.analysis import Results
-from suboctave.analysis.results import Result
 from suboctave.errors import ConvergenceError, InputError, TimeLimitError
+from suboctave.experiments.time_result import TimeResult
 from suboctave.interruption import Interruption, check_seconds, time_limit
-from suboctave.store.journal import Journal, read_journal
+from suboctave.maps.isolas.result import Isolas
+from suboctave.results.branch import Branch
+from suboctave.store.journal import Journal, Record, read_journal
+from suboctave.store.registry import from_datasets, to_datasets
+from suboctave.store.table import Table
 from suboctave.study.file import Study
-from suboctave.study.keeping import BranchKeeper, Noting, finished, keep
 from suboctave.study.outputs import places, write_outputs
+from suboctave.study.results import Result, Results, load
 from suboctave.study.steps import Context, Step
 
-__all__ = ["JOURNAL", "Finished", "Outcome", "run_study"]
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["JOURNAL", "Finished", "Outcome", "Recovered", "finished", "keep", "recovered", "run_study"]
 
 JOURNAL = "unfinished.journal"
+#: seconds between records of points of an analysis that is under way
+_OFTEN = 1.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +87,7 @@ def run_study(
     overwrite: bool = False,
     resume: bool = False,
     watch: Watch | None = None,
-    said: Callable[[Finished], None] | None = None,
+    report: Callable[[Finished], None] | None = None,
     seconds: float | None = None,
 ) -> Outcome:
     """Run a study and write its outputs.
@@ -88,8 +101,8 @@ def run_study(
         are missing, from its results; with `overwrite` all of them.
     watch
         Gives for each analysis a context whose value is the `progress=` of its verb.
-    said
-        Told of each analysis when it is over.
+    report
+        Called with each analysis when it is over.
     seconds
         Time limit for all analyses together, in place of the study's own.
 
@@ -109,7 +122,7 @@ def run_study(
     for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
         torn.unlink(missing_ok=True)
     try:
-        return _run(study, place, targets, journal, watch, said, study.seconds if seconds is None else seconds)
+        return _run(study, place, targets, journal, watch, report, study.seconds if seconds is None else seconds)
     except BaseException:
         journal.close()
         raise
@@ -132,8 +145,7 @@ def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, r
             raise InputError(
                 f"{place} holds a run that did not finish: go on with --resume, or start anew with --overwrite"
             )
-        records, _, _ = read_journal(journal)
-        ours = {record.said.get("file", "") for record in records if record.kind == "output"}
+        ours = {record.fields.get("file", "") for record in read_journal(journal) if record.kind == "output"}
     there = [path.name for path in targets if path.exists() and path.name not in ours]
     if there and not overwrite:
         more = f" and {len(there) - 3} more" if len(there) > 3 else ""
@@ -155,12 +167,10 @@ def _attributes(study: Study, names: list[str]) -> dict[str, Any]:
 
 def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -> Outcome:
     """The results are there: write the outputs that are missing, or all. InputError if they are another study's."""
-    from suboctave.analysis import load
-
     path = targets[0]
     results = load(path, allow_code=study.allow_code)
     done = isinstance(results, Results) and all(
-        step.name in results and results.details[step.name].get("key") == study.key_of(step) for step in study.steps
+        step.name in results and results.details[step.name].get("key") == study.keys[step.name] for step in study.steps
     )
     if not done:
         raise InputError(
@@ -187,7 +197,7 @@ def _run(
     targets: list[Path],
     journal: Journal,
     watch: Watch | None,
-    said: Callable[[Finished], None] | None,
+    report: Callable[[Finished], None] | None,
     seconds: float | None,
 ) -> Outcome:
     journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
@@ -208,19 +218,18 @@ def _run(
                     details[step.name] = {
                         "type": step.kind,
                         "seconds": done.seconds,
-                        "key": "" if step.name in unfinished else study.key_of(step),
+                        "key": "" if step.name in unfinished else study.keys[step.name],
                         "arguments": step.model_dump_json(exclude_defaults=True),
                     }
-                if said is not None:
-                    said(done)
+                if report is not None:
+                    report(done)
             if interruption is not None:
                 outcome.interruption = interruption
                 own = interruption.seconds is not None and not (limit is not None and limit.reached)
                 if not own:
                     break
     if results:
-        for path in targets:
-            journal.append("output", {"file": path.name}, sync=False)
+        journal.extend([("output", {"file": path.name}, None) for path in targets])
         everything = Results(results, _attributes(study, list(results)), details)
         outcome.files = list(write_outputs(study.outputs, everything, place, study.title))
     if outcome.interrupted or outcome.failed:
@@ -241,11 +250,11 @@ def _one(
     """One analysis: what came of it, and what stopped it; `whole`: what it starts from is complete, and so it may be
     kept as complete.
     """
-    key = study.key_of(step)
+    key = study.keys[step.name]
     kept = finished(journal.records, key, study.allow_code) if whole else None
     if kept is not None:
-        result, said = kept
-        return Finished(step, result, float(said.get("seconds", 0.0)), reused=True), None
+        result, attributes = kept
+        return Finished(step, result, float(attributes.get("seconds", 0.0)), reused=True), None
     missing = [name for _, name in step.needs() if name not in results]
     if missing:
         return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), None
@@ -282,3 +291,141 @@ def _one(
 
 def _silent(step: Step) -> AbstractContextManager[Any]:
     return nullcontext(None)
+
+
+# ------------------------------------------------------------------------------------------------------- the journal
+def keep(journal: Journal, name: str, key: str, result: Result, seconds: float) -> None:
+    """A finished analysis, on the disk when this returns; the branches of a diagram are there already."""
+    datasets = to_datasets(result, {"seconds": seconds})
+    place = {"name": name, "key": key}
+    parts = datasets.items() if isinstance(result, Isolas | Table) else ()
+    entries = [("part", {**place, "part": part}, dataset) for part, dataset in parts if part]
+    journal.extend([*entries, ("analysis", place, datasets[""])])
+
+
+def finished(records: Sequence[Record], key: str, allow_code: bool) -> tuple[Result, dict[str, Any]] | None:
+    """The finished analysis with this key, and the attributes of its dataset; None if there is none."""
+    own = [record for record in records if record.kind == "analysis" and record.fields["key"] == key]
+    if not own:
+        return None
+    groups: dict[str, xarray.Dataset] = {"": own[-1].dataset}
+    if groups[""].attrs.get("contents") == "diagram":
+        branches = _branches(records, key)
+        places = zip(groups[""]["parent"].values, groups[""]["origin"].values, strict=True)
+        for number, (parent, event) in enumerate(places):
+            groups[f"branch_{number}"] = branches[int(parent), int(event)].dataset
+    elif "parts" in groups[""].attrs:
+        parts = {r.fields["part"]: r for r in records if r.kind == "part" and r.fields["key"] == key}
+        groups |= {part: parts[part].dataset for part in str(groups[""].attrs["parts"]).splitlines()}
+    result, details = from_datasets(groups, allow_code)
+    assert not isinstance(result, TimeResult)
+    return result, details
+
+
+def _branches(records: Sequence[Record], key: str) -> dict[tuple[int, int], Record]:
+    return {
+        (record.fields["parent"], record.fields["event"]): record
+        for record in records
+        if record.kind == "branch" and record.fields["key"] == key
+    }
+
+
+class BranchKeeper:
+    """Keeps the branches of a diagram in the journal when they are complete, and knows those of an earlier run."""
+
+    def __init__(self, journal: Journal, step: Step, key: str, allow_code: bool) -> None:
+        self.journal, self.name, self.key, self.allow_code = journal, step.name, key, allow_code
+        self._known = _branches(journal.records, key)
+
+    def known(self, parent: int, event: int) -> Branch | None:
+        """See `suboctave.analysis.diagram.Keeper`."""
+        record = self._known.get((parent, event))
+        if record is None:
+            return None
+        branch, _ = from_datasets({"": record.dataset}, self.allow_code)
+        assert isinstance(branch, Branch)
+        return branch
+
+    def keep(self, parent: int, event: int, branch: Branch) -> None:
+        """See `suboctave.analysis.diagram.Keeper`."""
+        place = {"name": self.name, "key": self.key, "parent": parent, "event": event}
+        self.journal.append("branch", place, to_datasets(branch)[""])
+
+
+class Noting:
+    """A `progress=` that passes reports on and writes what there is so far to the journal now and then."""
+
+    def __init__(self, journal: Journal, step: Step, progress: Any) -> None:
+        self.journal, self.step, self.progress = journal, step, progress
+        self.since = perf_counter()
+        self.points = self.events = 0
+
+    def __call__(self, share: float, where: str) -> None:
+        if self.progress is not None:
+            self.progress(share, where)
+
+    def found(self, trace: Any) -> None:
+        """Called at each point of a curve with what there is of it so far."""
+        now = perf_counter()
+        events = len(trace.bifurcations)
+        if now - self.since < _OFTEN and events == self.events:
+            return
+        self.since = now
+        points, located = trace.points[self.points :], trace.bifurcations[self.events :]
+        fields = {
+            "name": self.step.name,
+            "from": self.points,
+            "omega": [point.orbit.omega for point in points],
+            "values": [dict(point.orbit.values) for point in points],
+            "coefficients": [point.orbit.coefficients.tolist() for point in points],
+            "stable": [bool(point.floquet.stable) for point in points],
+            "bifurcations": [[b.kind, b.omega, dict(b.parameters), b.amplitude] for b in located],
+        }
+        self.points, self.events = len(trace.points), events
+        self.journal.append("points", fields)
+
+
+@dataclass
+class Recovered:
+    """What a journal holds of one analysis; `events` are (kind, omega, amplitude) of one that had not finished.
+
+    branches
+        Of a diagram how many branches, of isolas how many curves; None for a single curve.
+    """
+
+    name: str
+    state: str = "begun"
+    points: int = 0
+    bifurcations: int = 0
+    events: list[tuple[str, float, float]] = field(default_factory=list)
+    branches: int | None = None
+
+
+def recovered(path: str | Path) -> list[Recovered]:
+    """What a journal holds, analysis by analysis."""
+    analyses: dict[str, Recovered] = {}
+    for record in read_journal(path):
+        name = str(record.fields.get("name", ""))
+        if record.kind == "points":
+            if not record.fields["from"]:
+                analyses[name] = Recovered(name)
+            item = analyses.setdefault(name, Recovered(name))
+            item.points += len(record.fields["omega"])
+            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.fields["bifurcations"]]
+            item.bifurcations = len(item.events)
+        elif record.kind == "part" and record.fields["part"].startswith("result"):
+            continue  # of a table
+        elif record.kind in ("branch", "part"):
+            item = analyses.setdefault(name, Recovered(name))
+            sizes = record.dataset.sizes
+            item.branches = (item.branches or 0) + 1
+            item.points += int(sizes.get("point", 0))
+            item.bifurcations += int(sizes.get("event", 0))
+        elif record.kind == "analysis":
+            if record.dataset.attrs.get("contents") in ("diagram", "isolas"):
+                analyses.setdefault(name, Recovered(name)).state = "finished"
+                continue
+            sizes = record.dataset.sizes
+            count = int(sizes.get("point", sizes.get("row", 0)))
+            analyses[name] = Recovered(name, "finished", count, int(sizes.get("event", 0)))
+    return list(analyses.values())

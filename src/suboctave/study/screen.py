@@ -7,22 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.analysis import BifurcationDiagram, Branch, Isolas, Table
-from suboctave.analysis.isola import stable_ranges
-from suboctave.analysis.isola_tables import isola_row
-from suboctave.analysis.junction import period_name
-from suboctave.analysis.results import Result
-from suboctave.analysis.tree_text import tree_text
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS
+from suboctave.curves.junction import period_name
+from suboctave.maps.isolas.isola import isola_row
+from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.stretches import stable_ranges
+from suboctave.results.branch import Branch
+from suboctave.results.diagram import BifurcationDiagram, tree_text
 from suboctave.store.columns import parameter_column
 from suboctave.store.layout import branch_dataset
-from suboctave.study.demo import event_lines
+from suboctave.store.table import Table
+from suboctave.study.results import Result
 
 if TYPE_CHECKING:
+    import xarray
     from rich.console import Console
 
 __all__ = [
     "console",
+    "event_lines",
     "print_branch",
     "print_diagram",
     "print_events",
@@ -30,6 +33,7 @@ __all__ = [
     "print_result",
     "print_table",
     "print_texts",
+    "significant",
 ]
 
 WIDTH = 80
@@ -151,7 +155,7 @@ def print_diagram(out: Console, name: str, diagram: BifurcationDiagram, note: st
 def print_isolas(out: Console, name: str, isolas: Isolas, note: str = "") -> None:
     """Isolas: the table of their ranges and ends, what happens at these in words, and what could not be settled."""
     out.print(f"\n{name}", style="bold", markup=False, end="")
-    out.print(f": over {isolas.parameter}{note}\n{isolas.said}", markup=False)
+    out.print(f": over {isolas.parameter}{note}\n{isolas.summary}", markup=False)
     parameter = isolas.parameter
     heads = ("", "period", f"{parameter} from", "to", "born at", "omega", "merges at", "omega")
     keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
@@ -221,3 +225,37 @@ def _escaped(text: str) -> str:
     from rich.markup import escape
 
     return escape(text)
+
+
+def event_lines(dataset: xarray.Dataset) -> list[tuple[str, str, str, str, str]]:
+    """The located bifurcations as text: kind, omega, max |x|, critical multiplier, residual.
+
+    One that could only be bracketed shows the half-width of its bracket in place of a residual.
+    """
+    names = ("kind", "omega", "amplitude", "multiplier", "residual", "uncertainty")
+    columns = (dataset[f"event_{name}"].to_numpy() for name in names)
+    return [
+        (
+            str(kind),
+            significant(omega, 9),
+            significant(amplitude, 7),
+            _complex_text(complex(multiplier)),
+            f"± {uncertainty:.0e}" if uncertainty else f"{residual:.0e}",
+        )
+        for kind, omega, amplitude, multiplier, residual, uncertainty in zip(*columns, strict=True)
+    ]
+
+
+def significant(value: float, digits: int) -> str:
+    """A number with so many significant digits, whatever its unit makes of it."""
+    return f"{value:#.{digits}g}".rstrip(".")
+
+
+def _complex_text(value: complex) -> str:
+    if value != value:  # not computed
+        return "-"
+    large = abs(value) >= 1e3
+    if abs(value.imag) < 5e-7 * abs(value):
+        return f"{value.real:+.6e}" if large else f"{value.real:+.6f}"
+    form = ".5e" if large else ".5f"
+    return f"{value.real:+{form}} ± {abs(value.imag):{form}}i"

@@ -1,27 +1,29 @@
-"""The [system] of a study file: read, and every mistake in it told with its line."""
+"""The [system] of a study file: read, and every mistake in it with its line.
+
+Matrices are numbers and expressions inline, or files beside the study (.npy, .npz, .mtx, .mat, .csv).
+"""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, Key, suggest
 from suboctave.model import library
 from suboctave.model.description import build_part
-from suboctave.model.mass_check import check_mass
-from suboctave.model.matrix import matrix_coefficient
+from suboctave.model.matrices import matrix_coefficient
 from suboctave.model.system import System
-from suboctave.study.lines import Path as Key
-from suboctave.study.matrices import given_matrix
 from suboctave.study.mistakes import Mistakes
 
-__all__ = ["SystemSection", "make_system", "published"]
+__all__ = ["SystemSection", "make_system", "overridden", "read_matrix"]
 
 MATRICES = ("mass", "damping", "stiffness")
+SUFFIXES = (".npy", ".npz", ".mtx", ".mat", ".csv")
 
 
 class SystemSection(BaseModel):
@@ -68,18 +70,25 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
     if section.equations is not None:
         return _from_equations(section, parts, mistakes) if len(mistakes) == before else None
     matrices = _matrices(section, folder, mistakes)
-    _check_names(section, matrices, parts, mistakes)
-    _check_mass(section, matrices, mistakes)
-    if len(mistakes) > before:
+    if "mass" not in matrices:
         return None
-    elements, loads = ([item for _, item in parts[family]] for family in ("element", "load"))
+    complete = len(mistakes) == before
+    placed = {"elements": sorted(parts["element"], key=lambda item: item[1].own_nodes), "loads": parts["load"]}
+    elements, loads = ([part for _, part in items] for items in placed.values())
     try:
-        return System(
-            *(matrices[what] for what in MATRICES), elements, loads, section.parameters, section.name, section.dof_names
-        )  # type: ignore[call-arg]
+        # in place of one that is wrong stands zero: what else is wrong is told all the same
+        mass, damping, stiffness = (matrices.get(what, 0.0) for what in MATRICES)
+        names = section.parameters, section.name, section.dof_names
+        system = System(mass, damping, stiffness, elements, loads, *names)
     except InputError as error:
-        mistakes.add(_place_of(str(error), section, parts), str(error))
+        for part in error.parts:
+            first, *rest = part.key or ("",)
+            if first in placed:
+                mistakes.add((*placed[first][int(rest[0])][0], *rest[1:]), str(part))
+            elif complete or first != "parameters":  # a part that could not be read may use the parameter
+                mistakes.add(("system", *part.key), str(part))
         return None
+    return system if complete else None
 
 
 def _published(section: SystemSection, mistakes: Mistakes) -> System | None:
@@ -137,12 +146,12 @@ def _from_equations(section: SystemSection, parts: dict[str, Any], mistakes: Mis
     try:
         return System.from_equations(section.equations or (), section.parameters, section.name)
     except InputError as error:
-        mistakes.add(_place_of(str(error), section, parts), str(error))
+        mistakes.add_error(("system",) if error.key else ("system", "equations"), error)
         return None
 
 
 def _matrices(section: SystemSection, folder: Path, mistakes: Mistakes) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    matrices: dict[str, Any] = {}
     size: int | None = None
     for what in MATRICES:
         value = getattr(section, what)
@@ -150,13 +159,13 @@ def _matrices(section: SystemSection, folder: Path, mistakes: Mistakes) -> dict[
             mistakes.add(("system", what), "is missing")
             continue
         try:
-            found[what] = matrix_coefficient(given_matrix(value, folder), size, what)
+            matrices[what] = matrix_coefficient(given_matrix(value, folder), size, what)
         except (InputError, TypeError, ValueError) as error:
             mistakes.add(("system", what), str(error))
             continue
         if what == "mass":
-            size = found[what].n
-    return found
+            size = matrices[what].n
+    return matrices
 
 
 def _parts(items: list[dict[str, Any]], family: str, mistakes: Mistakes, allow_code: bool) -> Iterator[tuple[Key, Any]]:
@@ -165,77 +174,107 @@ def _parts(items: list[dict[str, Any]], family: str, mistakes: Mistakes, allow_c
         try:
             yield place, build_part(item, family, allow_code=allow_code)
         except InputError as error:
-            text = str(error)
-            named = next((name for name in item if f"argument {name!r}" in text or f", {name}: " in text), None)
-            if named is None and ("no element" in text or "no load" in text):
-                named = "type" if "type" in item else None
-            mistakes.add(place if named is None else (*place, named), text)
+            mistakes.add_error(place, error)
 
 
-def _check_names(
-    section: SystemSection, matrices: dict[str, Any], parts: dict[str, list[tuple[Key, Any]]], mistakes: Mistakes
-) -> None:
-    """Names in expressions that are no parameters, all of them (a System stops at the first), and DOFs."""
-    known = section.parameters
-    used: set[str] = set()
+# ----------------------------------------------------------------------------------------------------------- matrices
+def given_matrix(value: Any, folder: Path) -> Any:
+    """What a study file says of a matrix, as `System` takes it.
 
-    def look(place: Key, what: str, source: Any, in_load: bool) -> None:
-        used.update(source.names)
-        for name in sorted(source.names):
-            if name == "omega" and not in_load:
-                mistakes.add(place, f"{what}: 'omega' occurs in {source}; only loads may depend on the frequency")
-            elif name != "omega" and name not in known:
-                hint = suggest(name, known) or "; no parameters are given"
-                mistakes.add(place, f"{what}: unknown parameter {name!r} in {source}{hint}")
-
-    for what, matrix in matrices.items():
-        for source in matrix.coefficients:
-            look(("system", what), what, source, False)
-    for place, element in parts["element"]:
-        for what, source in zip(element.coefficient_names, element.coefficients, strict=True):
-            look(place, f"{element.label}, {what}", source, False)
-    for place, load in parts["load"]:
-        for what, source in load.coefficients:
-            look(place, f"{load.label}, {what}", source, True)
-    if "mass" in matrices:
-        for place, part in (*parts["element"], *parts["load"]):
-            try:
-                if hasattr(part, "direction"):
-                    part.direction(matrices["mass"].n)
-            except InputError as error:
-                mistakes.add((*place, "dof"), str(error))
-    if not mistakes:
-        for name in known:
-            if name not in used:
-                mistakes.add(("system", "parameters", name), "is not used in any expression; remove or use it")
+    A number, an expression, nested lists; `{file = "M.npy", key = "M"}` (or the name of a file alone), relative to
+    `folder`; `{"expression" = matrix, ...}` for the sum of expression times matrix. Raises InputError.
+    """
+    if isinstance(value, str) and Path(value).suffix.lower() in SUFFIXES:
+        return read_matrix(folder / value, None)
+    if isinstance(value, Mapping):
+        if "file" in value:
+            extra = [name for name in value if name not in ("file", "key")]
+            if extra:
+                raise InputError(f"a matrix from a file has no key {extra[0]!r}{suggest(extra[0], ['file', 'key'])}")
+            if not isinstance(value["file"], str):
+                raise InputError(f"file is the name of a file, not {value['file']!r}")
+            return read_matrix(folder / value["file"], value.get("key"))
+        return {
+            float(factor) if _is_number(factor) else factor: given_matrix(matrix, folder)
+            for factor, matrix in value.items()
+        }
+    return value
 
 
-def _check_mass(section: SystemSection, matrices: dict[str, Any], mistakes: Mistakes) -> None:
-    """Refuse a mass that is none, as far as its parameters are known."""
-    mass = matrices.get("mass")
-    if mass is None or not mass.names <= section.parameters.keys():
-        return
+def _is_number(text: str) -> bool:
     try:
-        check_mass(mass.sparse_value(section.parameters) if mass.sparse else mass.value(section.parameters))
-    except InputError as error:
-        mistakes.add(("system", "mass"), str(error))
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
-def _place_of(text: str, section: SystemSection, parts: dict[str, list[tuple[Key, Any]]]) -> Key:
-    """The key that a message about a whole system is about, as far as its words tell."""
-    for items in parts.values():
-        for place, part in items:
-            if text.startswith(part.label):
-                return place
-    for what in (*MATRICES, "parameters"):
-        if text.startswith(what):
-            return ("system", what)
-    for name in section.parameters:
-        if f"{name!r}" in text:
-            return ("system", "parameters", name)
-    if section.equations is not None:
-        for index, equation in enumerate(section.equations):
-            if equation in text:
-                return ("system", "equations", index)
-        return ("system", "equations")
-    return ("system", "mass") if "mass" in text else ("system",)
+def read_matrix(path: Path, key: str | None) -> Any:
+    """A matrix from a file, dense or sparse; `key` names it where the file holds several. Raises InputError."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"{path.name}: matrices are read from {', '.join(SUFFIXES)} files")
+    if not path.is_file():
+        raise InputError(f"there is no file {path}{suggest(path.name, _beside(path)) if _beside(path) else ''}")
+    try:
+        matrix = _READERS[suffix](path, key)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of its reader
+        raise InputError(f"cannot read {path}: {type(error).__name__}: {str(error)[:120]}") from None
+    if not hasattr(matrix, "tocsr"):
+        matrix = np.asarray(matrix)
+        if matrix.dtype.kind not in "fiu":
+            raise InputError(f"{path}: the matrix holds {matrix.dtype}, not real numbers")
+    return matrix
+
+
+def _beside(path: Path) -> list[str]:
+    folder = path.parent
+    return [p.name for p in folder.iterdir() if p.suffix.lower() in SUFFIXES] if folder.is_dir() else []
+
+
+def _npy(path: Path, key: str | None) -> Any:
+    return np.load(path, allow_pickle=False)
+
+
+def _npz(path: Path, key: str | None) -> Any:
+    import scipy.sparse
+
+    with np.load(path, allow_pickle=False) as archive:
+        if {"format", "shape", "data"} <= set(archive.files):
+            sparse: Any = scipy.sparse.load_npz(path)
+            return sparse.tocsr()
+        return archive[_chosen(path, key, archive.files)]
+
+
+def _mtx(path: Path, key: str | None) -> Any:
+    import scipy.io
+
+    matrix = scipy.io.mmread(path)
+    return matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
+
+
+def _mat(path: Path, key: str | None) -> Any:
+    import scipy.io
+
+    content = scipy.io.loadmat(path)
+    matrix = content[_chosen(path, key, [name for name in content if not name.startswith("__")])]
+    return matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
+
+
+def _csv(path: Path, key: str | None) -> Any:
+    return np.loadtxt(path, delimiter=",", ndmin=2)
+
+
+_READERS = {".npy": _npy, ".npz": _npz, ".mtx": _mtx, ".mat": _mat, ".csv": _csv}
+
+
+def _chosen(path: Path, key: str | None, names: list[str]) -> str:
+    if key is None and len(names) == 1:
+        return names[0]
+    if key is None:
+        raise InputError(f"{path} holds {', '.join(sorted(names)) or 'nothing'}: choose one with key=")
+    if key not in names:
+        raise InputError(f"{path} holds no {key!r}{suggest(str(key), names)}")
+    return key

@@ -1,48 +1,130 @@
-"""The adaptive method for batches of trajectories: see `adaptive_code` and `adaptive_control`."""
+"""An adaptive Runge-Kutta method of order 8 for batches of trajectories, and tangent vectors that go with them.
+
+`y = (x, x')`, `x'' = M^-1 (p - C x' - K x - e F)`, with the corners of the laws frozen within a step. Every trajectory
+has its own time and its own step; what is decided between two steps is in `adaptive_control`. Tangent vectors follow
+
+    w' = Df(y, t) w,   Df from the laws with their corners frozen, as in the step itself
+
+with the stages and the step of the trajectory: what comes out is the derivative of the numerical flow. Their errors
+count for the length of the step, too: directions that the motion does not move in may be the stiff ones. At a corner
+of a continuous force the tangent flow is continuous, so nothing is added there. Beside it goes the rate of volume,
+`div f = -trace M^-1 (C + sum e_o dF_o/dx')`, whose integral is the sum of all exponents (Liouville).
+"""
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.model.element import Array
-from suboctave.timedomain.adaptive_code import adaptive_rows, adaptive_source
-from suboctave.timedomain.adaptive_control import FIELDS
-from suboctave.timedomain.generated import module_of
-from suboctave.timedomain.structure import Numbers, Structure
+from suboctave.model.elements.base import Array
+from suboctave.model.elements.batch_form import Tangent
+from suboctave.timedomain.adaptive_control import SCALARS, VECTORS
+from suboctave.timedomain.generated import Index, Rows, module_of
+from suboctave.timedomain.law_code import LawCode
+from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
+from suboctave.timedomain.python_callbacks import callback_shapes
 
-__all__ = ["AdaptiveGroup", "AdaptiveKernel"]
+__all__ = ["AdaptiveGroup", "AdaptiveMethod", "adaptive_functions"]
 
-_ROOM = 16384
+#: numbers that the rows of a group may fill: what stays in a processor's cache
+_ROOM = 2048
 _FIRST_STEP = 0.01
+#: what an error of a tangent vector counts for, beside one of the motion
+_LOOSER = 1e-3
+_DRIVER = """
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks, measure, growth):
+    rows = z.reshape(-1, {lanes})
+    if start:
+        begin(z, address)
+    for tried in range(budget):
+        attempt(z, address)
+        done = 0
+        for l in range({lanes}):
+            done += control(rows, l, at, {n}, {corners}, samples, skip, tolerance, out, peaks, measure)
+            {follow}
+        if done == {lanes}:
+            return 1
+    return 0
+"""
 
 
-class AdaptiveKernel:
-    """The compiled integrator of a structure; `lanes` trajectories run side by side."""
+def adaptive_rows(layout: Layout, lanes: int, count: int) -> Rows:
+    """The layout of the array `z` with `count` tangent vectors."""
+    n, m, k, waves, corners = layout.n, len(layout.channels), len(layout.outputs), len(layout.waves), layout.corners
+    shapes: dict[str, int | tuple[int, ...]] = {
+        **dict.fromkeys(SCALARS, 1),
+        "A": (n, n), "B": (n, n), "L": (n, waves), "E": (n, k), "c": layout.law_numbers,
+        "y": 2 * n, "trial": 2 * n, "K": (13, 2 * n), "e3": 2 * n, "e5": 2 * n, "rate": 2 * n, "F": k, "wave": waves,
+        **dict.fromkeys(("on", "g", "dg", "g1", "dg1"), corners),
+        **dict.fromkeys(("now", "past", "floor", "peak", "crest", "weight"), n),
+        **callback_shapes(layout.called_back),
+        "w": (count, 2 * n), "goal": (count, 2 * n), "W": (12, count, 2 * n), "metric": 2 * n, "log": count,
+    }  # fmt: skip
+    if count:
+        shapes |= {"dF": k, "S": (k, m, 2), "G": (m, k), "trace": 1}
+        shapes |= dict.fromkeys(("sum3", "sum5", "part3", "part5", "before", "after"), 1)
+    return Rows(lanes, shapes)
 
-    def __init__(self, structure: Structure, samples: int, tolerance: float, lanes: int | None = None) -> None:
-        self.structure, self.samples, self.tolerance = structure, samples, tolerance
-        rows = adaptive_rows(structure, 1).size
-        self.lanes = lanes or (16 if 16 * rows <= _ROOM // 8 else 8)
-        self.function: Any = module_of(adaptive_source(structure, self.lanes)).adaptive
-        self.rows = adaptive_rows(structure, self.lanes)
-        self.offsets = np.array([self.rows.begin[name] for name in FIELDS], dtype=np.int64)
+
+def adaptive_functions(layout: Layout, lanes: int, count: int) -> list[str]:
+    """The functions that integrate `lanes` trajectories of this layout, each with `count` tangent vectors."""
+    rows = adaptive_rows(layout, lanes, count)
+    follow = f"follow(rows, l, at, {layout.n}, {count}, skip, growth)" if count else ""
+    driver = _DRIVER.format(lanes=lanes, n=layout.n, corners=layout.corners, follow=follow)
+    return [_AdaptiveCode(layout, rows, count).begin(), _AdaptiveCode(layout, rows, count).attempt(), driver]
+
+
+class AdaptiveMethod:
+    """The compiled integrator of a layout, with `count` tangent vectors for each trajectory; `lanes` run side by side.
+
+    `transition`: the vectors begin as unit vectors and are left as they are: columns of the state-transition matrix.
+    Otherwise they begin as orthonormal ones in no special direction, and are kept orthonormal.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        samples: int,
+        tolerance: float,
+        lanes: int | None = None,
+        count: int = 0,
+        transition: bool = False,
+    ) -> None:
+        self.layout, self.samples, self.tolerance = layout, samples, tolerance
+        self.count, self.transition = count, transition
+        self.lanes = lanes or (16 if 16 * adaptive_rows(layout, 1, count).size <= _ROOM else 8)
+        self.function: Any = module_of(*adaptive_functions(layout, self.lanes, count)).adaptive
+        self.rows = adaptive_rows(layout, self.lanes, count)
+        self.begins = np.array([self.rows.begin[name] for name in VECTORS], dtype=np.int64)
+        size = 2 * layout.n
+        generic = np.linalg.qr(np.random.default_rng(0).normal(size=(size, size)))[0]
+        #: the tangent vectors at the start, as columns (2n, count)
+        self.first = (np.eye(size) if transition else generic)[:, :count]
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
         """The rows of the code for every set of parameters, (P, rows) each."""
         inverse = np.linalg.inv(numbers.mass)
+        outputs = inverse @ self.layout.outputs.T
+        weight, omega = np.sqrt(np.diagonal(numbers.mass, axis1=1, axis2=2)), numbers.omega[:, None]
         flat: dict[str, Array] = {
             "A": -inverse @ numbers.stiffness,
             "B": -inverse @ numbers.damping,
             "L": inverse @ numbers.loads,
-            "E": inverse @ self.structure.outputs.T,
+            "E": outputs,
             "c": numbers.laws,
-            "omega": numbers.omega,
-            "period": 2.0 * np.pi / numbers.omega,
-            "weight": np.sqrt(np.diagonal(numbers.mass, axis1=1, axis2=2)),
+            "omega": omega,
+            "period": 2.0 * np.pi / omega,
+            "weight": weight,
+            "metric": np.hstack([omega * weight, weight]),
         }
+        if self.count:
+            flat["G"] = self.layout.channels @ outputs
+            flat["trace"] = -np.trace(inverse @ numbers.damping, axis1=1, axis2=2)
         return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
 
@@ -51,61 +133,266 @@ class AdaptiveGroup:
 
     def __init__(
         self,
-        kernel: AdaptiveKernel,
+        method: AdaptiveMethod,
         numbers: dict[str, Array],
         states: Array,
         which: NDArray[np.int_],
         sizes: Array,
-        count: int,
+        total: int,
         address: int,
         alive: int,
     ) -> None:
-        """`states` (lanes, 2n), `sizes` (lanes, n), `which` (lanes,) the set of parameters; `count` samples are due.
+        """`states` (lanes, 2n), `sizes` (lanes, n), `which` (lanes,) the set of parameters; `total` samples are due.
 
         Only the first `alive` lanes move.
         """
-        self.kernel, self.address, self.fresh = kernel, address, True
-        lanes = kernel.lanes
-        self.z = np.zeros(kernel.rows.size * lanes)
+        self.method, self.address, self.fresh = method, address, True
+        lanes, rows = method.lanes, self._rows
+        self.z = np.zeros(method.rows.size * lanes)
         for name, value in numbers.items():
-            self._rows(name, value.shape[1])[:] = value[which].T
-        self._rows("y", states.shape[1])[:] = states.T
+            rows(name)[:] = value[which].T
+        rows("y")[:] = states.T
         weight = numbers["weight"][which]
         largest = np.max(sizes * weight, axis=1, keepdims=True)
-        self._rows("past", sizes.shape[1])[:] = sizes.T
-        self._rows("floor", sizes.shape[1])[:] = np.maximum(1e-3 * largest / weight, 1e-300).T
+        rows("past")[:] = sizes.T
+        rows("floor")[:] = np.maximum(1e-3 * largest / weight, 1e-300).T
         period = numbers["period"][which, 0]
-        self._rows("h", 1)[:] = self._rows("next", 1)[:] = np.minimum(_FIRST_STEP, 1.0 / kernel.samples) * period
-        self._rows("left", 1)[:, :alive] = count
-        self._rows("h", 1)[:, alive:] = 0.0
+        rows("h")[:] = rows("next")[:] = np.minimum(_FIRST_STEP, 1.0 / method.samples) * period
+        rows("left")[:, :alive] = total
+        rows("h")[:, alive:] = 0.0
+        rows("plain")[:] = float(method.transition)
+        # tangent vectors are orthonormal in the metric of the parameters
+        metric = np.ones((states.shape[1], lanes)) if method.transition else numbers["metric"][which].T
+        rows("w")[:] = (method.first.T[:, :, None] / metric).reshape(-1, lanes)
+        #: what the tangent vectors and the volume grew by, (samples kept, count + 1, lanes)
+        self.growth = np.full((0, method.count + 1, lanes), np.nan)
 
     def begin_at(self, first: Array) -> None:
         """Let every lane begin at a sample of the period, (lanes,), instead of at phase 0."""
-        self._rows("sample", 1)[0] = first
-        self._rows("t", 1)[0] = first / self.kernel.samples * self._rows("period", 1)[0]
+        self._rows("sample")[0] = first
+        self._rows("t")[0] = first / self.method.samples * self._rows("period")[0]
 
-    def _rows(self, name: str, count: int) -> Array:
-        begin, lanes = self.kernel.rows.begin[name], self.kernel.lanes
-        return self.z[begin * lanes : (begin + count) * lanes].reshape(count, lanes)
+    def _rows(self, name: str) -> Array:
+        rows = self.method.rows
+        begin, count = rows.begin[name], int(np.prod(rows.shapes[name]))
+        return self.z[begin * rows.lanes : (begin + count) * rows.lanes].reshape(count, rows.lanes)
 
     def advance(self, budget: int, skip: int, out: Array, peaks: Array | None) -> bool:
         """Try `budget` steps of each; samples after the first `skip` go to `out`. Whether all are there."""
-        kernel = self.kernel
-        done = kernel.function(
-            self.z, kernel.offsets, budget, self.fresh, kernel.samples, skip, kernel.tolerance, self.address, out,
-            peaks if peaks is not None else np.zeros((0, 0, 0)), peaks is not None,
+        method = self.method
+        done = method.function(
+            self.z, method.begins, budget, self.fresh, method.samples, skip, method.tolerance, self.address, out,
+            peaks if peaks is not None else np.zeros((0, 0, 0)), peaks is not None, self.growth,
         )  # fmt: skip
         self.fresh = False
         return bool(done)
 
     def left(self) -> float:
         """Samples that are still due, of all together."""
-        return float(self._rows("left", 1).sum())
+        return float(self._rows("left").sum())
 
     def states(self) -> Array:
         """Where they are, (lanes, 2n)."""
-        return self._rows("y", 2 * self.kernel.structure.n).T.copy()
+        return self._rows("y").T.copy()
 
     def failed(self) -> NDArray[np.bool_]:
         """Which of them came to an end: their steps became too short, or their numbers too large."""
-        return self._rows("failed", 1)[0] > 0.0
+        return self._rows("failed")[0] > 0.0
+
+    def tangents(self) -> Array:
+        """The tangent vectors as columns, (lanes, 2n, count)."""
+        size, count = 2 * self.method.layout.n, self.method.count
+        return self._rows("w").reshape(count, size, -1).transpose(2, 1, 0).copy()
+
+
+class _AdaptiveCode(LawCode):
+    """Writes `begin` and `attempt`."""
+
+    def __init__(self, layout: Layout, rows: Rows, count: int) -> None:
+        super().__init__(layout, rows)
+        self.count = count
+        #: derivatives of the forces that are not zero: output, channel, by its rate
+        self.slopes: list[tuple[int, int, bool]] = []
+
+    def begin(self) -> str:
+        """The first stage and the flags, at the state itself."""
+        n, z, code = self.n, self.z, self.code
+        with code.block(f"for i in range({2 * n}):"):
+            code.each(f"{z('trial', 'i')} = {z('y', 'i')}", f"{z('K', 12, 'i')} = 0.0")
+        code.each(f"{z('theta')} = {z('omega')} * {z('t')}")
+        for at_corner in ("False", "{} > 0.0"):
+            self._corners()
+            for i in range(self.layout.corners):
+                margin = z("g1", i)
+                beyond = f"{margin} > 0.0 or ({margin} == 0.0 and {at_corner.format(z('dg1', i))})"
+                code.each(f"{z('on', i)} = 1.0 if {beyond} else 0.0")
+            if at_corner == "False":
+                self._rate(slopes=False)
+                with code.block(f"for i in range({2 * n}):"):
+                    code.each(f"{z('K', 0, 'i')} = {z('rate', 'i')}", f"{z('K', 12, 'i')} = {z('rate', 'i')}")
+        for i in range(self.layout.corners):
+            code.each(f"{z('g', i)} = {z('g1', i)}", f"{z('dg', i)} = {z('dg1', i)}")
+        return code.function("begin(z, address)")
+
+    def attempt(self) -> str:
+        """All stages of a step of length h from y, the error estimates, and the corners at its end.
+
+        The first stage is the last one of the step before, but where a corner has been turned since: what was missed
+        of it, times the jump in slope, would be an error of first order in the rate.
+        """
+        n, z, code = self.n, self.z, self.code
+        code.raw(f"first = {0 if self.count else 1}")
+        with code.block(f"for l in range({z.lanes}):"):
+            code.raw(f"if {z('stale')} > 0.0:", "    first = 0")
+        if self.count:
+            code.each(f"{z('used')} = {z('h')}", f"{z('volume_rate')} = 0.0")
+        with code.block("for s in range(first, 13):"):
+            self._stage("trial", "y", "K", 2 * n)
+            if self.count:
+                self._stage("goal", "w", "W", 2 * n * self.count)
+            code.raw("node = NODES[s]")
+            code.each(f"{z('theta')} = {z('omega')} * ({z('t')} + node * {z('h')})")
+            self._rate(slopes=bool(self.count))
+            with code.block("if s == 0:"):
+                with code.block(f"for i in range({2 * n}):"):
+                    code.each(f"{z('K', 0, 'i')} = {z('rate', 'i')} if {z('stale')} > 0.0 else {z('K', 0, 'i')}")
+                code.each(f"{z('stale')} = 0.0")
+            with code.block("else:"), code.block(f"for i in range({2 * n}):"):
+                code.each(f"{z('K', 's', 'i')} = {z('rate', 'i')}")
+            if self.count:
+                with code.block("if s < 12:"):
+                    self._tangents()
+        with code.block(f"for i in range({2 * n}):"):
+            self._errors(13, z("e3", "i"), z("e5", "i"), z("K", "j", "i"))
+        if self.count:
+            self._tangent_errors()
+        self._corners()
+        return code.function("attempt(z, address)")
+
+    def _stage(self, goal: str, origin: str, rates: str, size: int) -> None:
+        """`goal = origin + h sum_j a_sj rates_j` in stage s, over so many rows."""
+        z, code = self.z, self.code
+        with code.block(f"for i in range({size}):"):
+            code.each(f"{z(goal, 'i')} = 0.0")
+            with code.block("for j in range(s):"):
+                code.raw("a = STAGES[s, j]")
+                with code.block("if a != 0.0:"):
+                    code.each(f"{z(goal, 'i')} += a * {z(rates, f'j * {size} + i')}")
+            code.each(f"{z(goal, 'i')} = {z(origin, 'i')} + {z('h')} * {z(goal, 'i')}")
+
+    def _errors(self, stages: int, third: str, fifth: str, rate: str) -> None:
+        """The two estimates of the error, over the step length."""
+        code = self.code
+        code.each(f"{third} = 0.0", f"{fifth} = 0.0")
+        with code.block(f"for j in range({stages}):"):
+            code.raw("a, b = ERROR_3[j], ERROR_5[j]")
+            code.each(f"{third} += a * {rate}", f"{fifth} += b * {rate}")
+
+    def _channels(self) -> list[str]:
+        """Lines that read the phase and the channels at the trial state."""
+        lines = [f"theta = {self.z('theta')}"]
+        for j in range(self.m):
+            for kind, first in (("q", 0), ("r", self.n)):
+                reading = self.along(j, functools.partial(self._trial, first))
+                lines.append(f"{kind}{j} = {reading}")
+        return lines
+
+    def _trial(self, first: int, i: int) -> str:
+        return self.z("trial", first + i)
+
+    def _corners(self) -> None:
+        """Margins of the corners and their rates, at the trial state and its rate in the last stage."""
+        z, code = self.z, self.code
+        if not self.layout.corners:
+            return
+        code.each(*self._channels())
+        code.each(*(f"a{j} = {self.along(j, lambda i: z('K', 12, self.n + i))}" for j in range(self.m)))
+        code.each(f"omega = {z('omega')}")
+        for placed in self.layout.laws:
+            for i in range(placed.form.corners):
+                lines, margin, rate = placed.form.corner(i, self.names(placed))
+                corner = placed.corner + i
+                code.each(*lines, f"{z('g1', corner)} = {margin}", f"{z('dg1', corner)} = {rate}")
+
+    def _rate(self, slopes: bool) -> None:
+        """The rate of the trial state, and the slopes of the forces."""
+        n, z, code = self.n, self.z, self.code
+
+        def frozen(placed: PlacedLaw) -> Tangent:
+            return placed.form.frozen(self.names(placed), slopes)
+
+        self.read(self._channels())
+        forces, derivatives = self.forces(frozen)
+        code.each(*(f"{z('F', o)} = {force}" for o, force in enumerate(forces)))
+        if slopes:
+            self.slopes = list(derivatives)
+            code.each(*(f"{self._slope(*which)} = {text}" for which, text in derivatives.items()))
+        for harmonic in sorted({harmonic for harmonic, _ in self.layout.waves if harmonic}):
+            code.each(f"s{harmonic}, c{harmonic} = sine_cosine({float(harmonic)} * {z('theta')})")
+        waves = [f"s{h}" if sine else f"c{h}" if h else "1.0" for h, sine in self.layout.waves]
+        code.each(*(f"{z('wave', w)} = {wave}" for w, wave in enumerate(waves)))
+
+        def loads(i: Index) -> str:
+            return " + ".join(f"{z('L', i, w)} * {z('wave', w)}" for w in range(len(waves))) or "0.0"
+
+        def velocity(i: Index) -> str:
+            return z("trial", n + i if isinstance(i, int) else f"{n} + {i}")
+
+        def acceleration(i: Index) -> str:
+            return z("rate", n + i if isinstance(i, int) else f"{n} + {i}")
+
+        code.rows("i", n, lambda i: code.each(f"{z('rate', i)} = {velocity(i)}"))
+        self.row_sums(acceleration, loads, lambda j: z("trial", j), velocity, "F")
+
+    def _slope(self, o: int, j: int, by_rate: bool) -> str:
+        return self.z("S", o, j, int(by_rate))
+
+    def _tangents(self) -> None:
+        """Rates of the tangent vectors in stage s, and the rate of volume."""
+        n, k, z, code = self.n, self.k, self.z, self.code
+        damping = "".join(f" - {self._slope(o, j, True)} * {z('G', j, o)}" for o, j, rate in self.slopes if rate)
+        code.each(f"{z('volume_rate')} += STAGES[12, s] * ({z('trace')}{damping})")
+
+        def vector(i: Index) -> str:
+            return z("goal", "c", i)
+
+        def its_rate(i: Index) -> str:
+            return z("goal", "c", n + i if isinstance(i, int) else f"{n} + {i}")
+
+        with code.block(f"for c in range({self.count}):"):
+            for o in range(k):
+                terms = [
+                    f"{self._slope(o, j, rate)} * ({self.along(j, its_rate if rate else vector)})"
+                    for output, j, rate in self.slopes
+                    if output == o
+                ]
+                code.each(f"{z('dF', o)} = {' + '.join(terms) or '0.0'}")
+            code.rows("i", n, lambda i: code.each(f"{z('W', 's', 'c', i)} = {its_rate(i)}"))
+            self.row_sums(
+                lambda i: z("W", "s", "c", n + i if isinstance(i, int) else f"{n} + {i}"),
+                lambda _: "0.0",
+                *(vector, its_rate, "dF"),
+            )
+
+    def _tangent_errors(self) -> None:
+        """The error of the tangent vectors, each relative to its length, in units of the motion's tolerance."""
+        n, z, code = self.n, self.z, self.code
+        size, weight = 2 * n, z("metric", "i")
+        code.each(f"{z('extra')} = 0.0")
+        with code.block(f"for c in range({self.count}):"):
+            code.each(*(f"{z(name)} = 0.0" for name in ("sum3", "sum5", "before", "after")))
+            with code.block(f"for i in range({size}):"):
+                self._errors(12, z("part3"), z("part5"), z("W", "j", "c", "i"))
+                parts = {
+                    "sum3": z("part3"),
+                    "sum5": z("part5"),
+                    "before": z("w", "c", "i"),
+                    "after": z("goal", "c", "i"),
+                }
+                code.each(*(f"{z(name)} += ({weight} * {part}) ** 2" for name, part in parts.items()))
+            code.each(
+                f"length = {z('before')} if {z('before')} > {z('after')} else {z('after')}",
+                f"mean = ({z('sum5')} + 0.01 * {z('sum3')}) * {size} * length",
+                f"error = {_LOOSER} * {z('h')} * {z('sum5')} / sqrt(mean if mean > 0.0 else 1.0)",
+                f"{z('extra')} = error if error > {z('extra')} else {z('extra')}",
+            )

@@ -6,6 +6,11 @@ until it lands there; then the flag of the corner is turned. A trial that stops 
 other. A force that is continuous has no jump at the corner, so that landing within `e` leaves an error of order e^2,
 provided that the next step begins with a rate of its own: the last stage before has the old flag, and is wrong by e.
 
+Tangent vectors are made orthonormal after every accepted step (Gram and Schmidt): the lengths that they lose are the
+factors of an upper triangular matrix, whose logarithms, summed over a long time and divided by it, are the Lyapunov
+exponents (Benettin et al., Meccanica 15, 1980). Once in a period would do for those that matter; after every step it
+costs little and keeps directions that decay by hundreds of orders of magnitude within a period.
+
 Step lengths follow Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5.
 """
 
@@ -14,10 +19,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from scipy.integrate import DOP853
 
-__all__ = ["ERROR_3", "ERROR_5", "FIELDS", "NODES", "STAGES", "control"]
+from suboctave.compiled import kernel
+
+__all__ = ["ERROR_3", "ERROR_5", "NODES", "SCALARS", "STAGES", "VECTORS", "control", "follow"]
 
 #: the method of Dormand and Prince of order 8; the last row is the state at the end of the step
 STAGES = np.zeros((13, 12))
@@ -25,17 +31,24 @@ STAGES[:12], STAGES[12] = DOP853.A, DOP853.B
 NODES = np.append(DOP853.C, 1.0)
 ERROR_3, ERROR_5 = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.E5)
 
-#: rows that `control` reads and writes, in the order of the offsets that it is given
-FIELDS = (
-    "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "h", "next", "t", "period",
-    "omega", "sample", "slot", "left", "tries", "stuck", "failed", "peak", "calm", "weight",
-    "crest", "turning", "spent", "accepted", "extra", "stale",
+#: the first rows of all, one number each
+SCALARS = (
+    "h", "next", "t", "period", "omega", "theta", "sample", "slot", "left", "tries", "stuck", "failed", "calm",
+    "turning", "spent", "accepted", "extra", "stale", "used", "volume_rate", "volume", "seen", "plain",
 )  # fmt: skip
 (
-    _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _H, _NEXT, _T, _PERIOD, _OMEGA, _SAMPLE,
-    _SLOT, _LEFT, _TRIES, _STUCK, _FAILED, _PEAK, _CALM, _WEIGHT, _CREST,
-    _TURNING, _SPENT, _ACCEPTED, _EXTRA, _STALE,
-) = range(len(FIELDS))  # fmt: skip
+    _H, _NEXT, _T, _PERIOD, _OMEGA, _, _SAMPLE, _SLOT, _LEFT, _TRIES, _STUCK, _FAILED, _CALM,
+    _TURNING, _SPENT, _ACCEPTED, _EXTRA, _STALE, _USED, _VOLUME_RATE, _VOLUME, _SEEN, _PLAIN,
+) = range(len(SCALARS))  # fmt: skip
+#: names of several rows, in the order of the array that says where they begin
+VECTORS = (
+    "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "peak", "weight", "crest",
+    "w", "goal", "metric", "log",
+)  # fmt: skip
+(
+    _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _PEAK, _WEIGHT, _CREST,
+    _W, _GOAL, _METRIC, _LOG,
+) = range(len(VECTORS))  # fmt: skip
 _SHRINK, _GROW, _SAFETY = 0.3, 6.0, 0.9
 #: a corner is reached when it is this share of a period away, or after so many trials
 _LANDED, _TRIALS = 1e-10, 12
@@ -51,7 +64,7 @@ _NEAR = 0.1
 _HIGH = 0.9
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _first_root(m0, d0, m1, d1):
     """Where Hermite's cubic on [0, 1] turns negative for the first time, it or its minimum; -1.0 if it does not."""
     a, b = 2.0 * (m0 - m1) + d0 + d1, 3.0 * (m1 - m0) - 2.0 * d0 - d1
@@ -85,9 +98,11 @@ def _first_root(m0, d0, m1, d1):
     return 0.5 * (low + top)
 
 
-@njit(cache=True, error_model="numpy")
-def _top(x0, v0, a0, x1, v1, a1, h):
-    """Where the velocity changes sign within a step, as a share of it, and the displacement there, by a quintic."""
+@kernel(error_model="numpy")
+def _turn(c, at, n, i, h):
+    """Where velocity i changes sign in the step tried, as a share of it, and |displacement| there, by a quintic."""
+    y, k, trial = at[_Y] + i, at[_K] + n + i, at[_TRIAL] + i
+    x0, v0, a0, x1, v1, a1 = c[y], c[y + n], c[k], c[trial], c[trial + n], c[k + 24 * n]
     d = x1 - x0
     c2 = 0.5 * a0 * h * h
     p = d - h * v0 - c2
@@ -105,198 +120,253 @@ def _top(x0, v0, a0, x1, v1, a1, h):
     return low, abs(((((c5 * low + c4) * low + c3) * low + c2) * low + h * v0) * low + x0)
 
 
-@njit(cache=True, error_model="numpy")
-def _turn(z, at, l, lanes, n, i, h):
-    """`_top` for degree of freedom i in the step that was tried."""
-    y, k, trial = at[_Y] + i, at[_K] + n + i, at[_TRIAL] + i
-    return _top(
-        z[y * lanes + l],
-        z[(y + n) * lanes + l],
-        z[k * lanes + l],
-        z[trial * lanes + l],
-        z[(trial + n) * lanes + l],
-        z[(k + 24 * n) * lanes + l],
-        h,
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def _error(z, at, l, lanes, n):
+@kernel(error_model="numpy")
+def _error(c, at, n):
     """The error of the step over what is allowed, in units of the tolerance."""
     e3 = e5 = 0.0
-    omega = z[at[_OMEGA] * lanes + l]
+    omega = c[_OMEGA]
     for i in range(2 * n):
         dof = i if i < n else i - n
-        size = max(z[(at[_NOW] + dof) * lanes + l], z[(at[_PAST] + dof) * lanes + l], z[(at[_FLOOR] + dof) * lanes + l])
-        trial = abs(z[(at[_TRIAL] + i) * lanes + l])
+        size = max(c[at[_NOW] + dof], c[at[_PAST] + dof], c[at[_FLOOR] + dof])
+        trial = abs(c[at[_TRIAL] + i])
         if i >= n:
             size *= omega
         size = max(size, trial)
-        e3 += (z[(at[_E3] + i) * lanes + l] / size) ** 2
-        e5 += (z[(at[_E5] + i) * lanes + l] / size) ** 2
+        e3 += (c[at[_E3] + i] / size) ** 2
+        e5 += (c[at[_E5] + i] / size) ** 2
     if e3 == 0.0 and e5 == 0.0:
         return 0.0
-    return abs(z[at[_H] * lanes + l]) * e5 / math.sqrt((e5 + 0.01 * e3) * 2 * n)
+    return abs(c[_H]) * e5 / math.sqrt((e5 + 0.01 * e3) * 2 * n)
 
 
-@njit(cache=True, error_model="numpy")
-def _measure(z, at, l, lanes, n):
-    """Lengths for the tolerance of the next period."""
-    largest = 0.0
-    for i in range(n):
-        size = z[(at[_NOW] + i) * lanes + l]
-        z[(at[_PAST] + i) * lanes + l] = size
-        z[(at[_NOW] + i) * lanes + l] = 0.0
-        largest = max(largest, size * z[(at[_WEIGHT] + i) * lanes + l])
-    for i in range(n):
-        z[(at[_FLOOR] + i) * lanes + l] = max(_SMALLEST_SHARE * largest / z[(at[_WEIGHT] + i) * lanes + l], 1e-300)
-
-
-@njit(cache=True, error_model="numpy")
-def _fail(z, at, l, lanes, n):
-    z[at[_FAILED] * lanes + l] = 1.0
-    z[at[_LEFT] * lanes + l] = 0.0
-    z[at[_H] * lanes + l] = 0.0
+@kernel(error_model="numpy")
+def _fail(c, at, n):
+    c[_FAILED] = 1.0
+    c[_LEFT] = 0.0
+    c[_H] = 0.0
     for i in range(2 * n):
-        z[(at[_Y] + i) * lanes + l] = np.nan
+        c[at[_Y] + i] = np.nan
 
 
-@njit(cache=True, error_model="numpy")
-def control(z, at, l, lanes, n, corners, samples, skip, tolerance, out, peaks, measure):
-    """Judge the trial step of lane l and choose the next one. Returns 1 when the trajectory is complete."""
-    z[at[_ACCEPTED] * lanes + l] = 0.0
-    if z[at[_LEFT] * lanes + l] <= 0.0:
-        return 1
-    h, period = z[at[_H] * lanes + l], z[at[_PERIOD] * lanes + l]
-    z[at[_SPENT] * lanes + l] += 1.0
-    if z[at[_SPENT] * lanes + l] > _MOST:
-        _fail(z, at, l, lanes, n)
-        return 1
-    t = z[at[_T] * lanes + l]
-    error = max(_error(z, at, l, lanes, n), z[at[_EXTRA] * lanes + l]) / tolerance
-    if not error <= 1.0:
-        share = _SHRINK if not error < 1e30 else max(_SHRINK, _SAFETY * error**-0.125)
-        h *= share
-        if h < _SHORTEST * period:
-            _fail(z, at, l, lanes, n)
-            return 1
-        z[at[_H] * lanes + l] = h
-        z[at[_NEXT] * lanes + l] = h
-        z[at[_CALM] * lanes + l] = 0.0
-        z[at[_TRIES] * lanes + l] = 0.0
-        return 0
-    # the first corner that is met
+@kernel(error_model="numpy")
+def _corner(c, at, corners, h, period):
+    """The corner at which the trial step has landed, -1 if none; -2 if the step must be tried again."""
     first, which, landed = 2.0, -1, -1
     for i in range(corners):
-        sign = 2.0 * z[(at[_ON] + i) * lanes + l] - 1.0
-        m1, d1 = sign * z[(at[_G1] + i) * lanes + l], sign * z[(at[_DG1] + i) * lanes + l]
-        if m1 < 0.0 and (-m1 <= _LANDED * period * abs(d1) or z[at[_TRIES] * lanes + l] >= _TRIALS):
+        sign = 2.0 * c[at[_ON] + i] - 1.0
+        m1, d1 = sign * c[at[_G1] + i], sign * c[at[_DG1] + i]
+        if m1 < 0.0 and (-m1 <= _LANDED * period * abs(d1) or c[_TRIES] >= _TRIALS):
             landed = i
             continue
-        m0, d0 = sign * z[(at[_G] + i) * lanes + l], sign * z[(at[_DG] + i) * lanes + l]
+        m0, d0 = sign * c[at[_G] + i], sign * c[at[_DG] + i]
         if m1 >= 0.0 and d1 >= 0.0 and d0 >= 0.0:
             continue
         x = _first_root(m0, h * d0, m1, h * d1)
         if x >= 0.0 and x < first:
             first, which = x, i
-    if which >= 0 and z[at[_STUCK] * lanes + l] <= 2.0 * corners + 2.0:
-        tries = z[at[_TRIES] * lanes + l]
+    if which >= 0 and c[_STUCK] <= 2.0 * corners + 2.0:
+        tries = c[_TRIES]
         if first == 0.0:
             # over the corner at once: its flag was on the wrong side
-            z[(at[_ON] + which) * lanes + l] = 1.0 - z[(at[_ON] + which) * lanes + l]
-            z[at[_STALE] * lanes + l] = 1.0
-            z[at[_STUCK] * lanes + l] += 1.0
-            return 0
+            c[at[_ON] + which] = 1.0 - c[at[_ON] + which]
+            c[_STALE] = 1.0
+            c[_STUCK] += 1.0
+            return -2
         # a little beyond: the margin is judged by its sign, and a step that stops short is accepted
         share = first * (1.0 + 1e-12)
         if share < 0.999999 and tries < _TRIALS:
-            z[at[_H] * lanes + l] = max(h * share, _SHORTEST * period)
-            z[at[_TRIES] * lanes + l] = tries + 1.0
-            return 0
-        if z[(at[_G1] + which) * lanes + l] * (2.0 * z[(at[_ON] + which) * lanes + l] - 1.0) < 0.0:
+            c[_H] = max(h * share, _SHORTEST * period)
+            c[_TRIES] = tries + 1.0
+            return -2
+        if c[at[_G1] + which] * (2.0 * c[at[_ON] + which] - 1.0) < 0.0:
             landed = which
-    if measure and z[at[_TURNING] * lanes + l] == 0.0:
-        # the largest displacement is looked at from the end of a step: one is cut there, once
-        share = 1.0
-        for i in range(n):
-            v0, v1 = z[(at[_Y] + n + i) * lanes + l], z[(at[_TRIAL] + n + i) * lanes + l]
-            if v0 * v1 < 0.0:
-                x, top = _turn(z, at, l, lanes, n, i, h)
-                high = max(z[(at[_PEAK] + i) * lanes + l], _HIGH * z[(at[_CREST] + i) * lanes + l])
-                if top >= high and 0.001 < x < share:
-                    share = x
-        if share < 0.999:
-            z[at[_H] * lanes + l] = h * share
-            z[at[_TURNING] * lanes + l] = 1.0
-            return 0
-    z[at[_ACCEPTED] * lanes + l] = 1.0
-    z[at[_TURNING] * lanes + l] = 0.0
-    z[at[_TRIES] * lanes + l] = 0.0
-    z[at[_STUCK] * lanes + l] = 0.0
-    omega = z[at[_OMEGA] * lanes + l]
+    return landed
+
+
+@kernel(error_model="numpy")
+def _crest(c, at, n, h):
+    """Whether the step is cut where a displacement is largest: that is read at the ends of steps."""
+    share = 1.0
     for i in range(n):
-        x1, v1 = z[(at[_TRIAL] + i) * lanes + l], z[(at[_TRIAL] + n + i) * lanes + l]
+        v0, v1 = c[at[_Y] + n + i], c[at[_TRIAL] + n + i]
+        if v0 * v1 < 0.0:
+            x, top = _turn(c, at, n, i, h)
+            high = max(c[at[_PEAK] + i], _HIGH * c[at[_CREST] + i])
+            if top >= high and 0.001 < x < share:
+                share = x
+    if share < 0.999:
+        c[_H] = h * share
+        c[_TURNING] = 1.0
+        return True
+    return False
+
+
+@kernel(error_model="numpy")
+def _accept(c, at, n, corners, h, landed, measure):
+    """Take the trial step; the corner that it landed at and all that lie behind are turned."""
+    c[_ACCEPTED] = 1.0
+    c[_TURNING] = 0.0
+    c[_TRIES] = 0.0
+    c[_STUCK] = 0.0
+    omega = c[_OMEGA]
+    for i in range(n):
+        x1, v1 = c[at[_TRIAL] + i], c[at[_TRIAL] + n + i]
         if measure:
             top = abs(x1)
-            if z[(at[_Y] + n + i) * lanes + l] * v1 < 0.0:
-                top = max(top, _turn(z, at, l, lanes, n, i, h)[1])
-            z[(at[_PEAK] + i) * lanes + l] = max(z[(at[_PEAK] + i) * lanes + l], top)
-        z[(at[_NOW] + i) * lanes + l] = max(z[(at[_NOW] + i) * lanes + l], abs(x1), abs(v1) / omega)
+            if c[at[_Y] + n + i] * v1 < 0.0:
+                top = max(top, _turn(c, at, n, i, h)[1])
+            c[at[_PEAK] + i] = max(c[at[_PEAK] + i], top)
+        c[at[_NOW] + i] = max(c[at[_NOW] + i], abs(x1), abs(v1) / omega)
     for i in range(2 * n):
-        z[(at[_Y] + i) * lanes + l] = z[(at[_TRIAL] + i) * lanes + l]
-        z[(at[_K] + i) * lanes + l] = z[(at[_K] + 24 * n + i) * lanes + l]
+        c[at[_Y] + i] = c[at[_TRIAL] + i]
+        c[at[_K] + i] = c[at[_K] + 24 * n + i]
     for i in range(corners):
-        z[(at[_G] + i) * lanes + l] = z[(at[_G1] + i) * lanes + l]
-        z[(at[_DG] + i) * lanes + l] = z[(at[_DG1] + i) * lanes + l]
-    # all corners that lie behind are turned
+        c[at[_G] + i] = c[at[_G1] + i]
+        c[at[_DG] + i] = c[at[_DG1] + i]
     for i in range(corners):
-        if i == landed or (2.0 * z[(at[_ON] + i) * lanes + l] - 1.0) * z[(at[_G] + i) * lanes + l] < 0.0:
-            z[(at[_ON] + i) * lanes + l] = 1.0 - z[(at[_ON] + i) * lanes + l]
-            z[at[_STALE] * lanes + l] = 1.0
-    grow = _GROW if error < 1e-7 else min(_GROW, _SAFETY * error**-0.125)
-    if z[at[_CALM] * lanes + l] == 0.0:
-        grow = min(grow, 1.0)
-    z[at[_CALM] * lanes + l] = 1.0
-    # a step that was cut short says little about the length that the method could take
-    following = max(h * grow, z[at[_NEXT] * lanes + l]) if h < z[at[_NEXT] * lanes + l] else h * grow
-    z[at[_NEXT] * lanes + l] = following
-    # the next instant that is asked for
-    sample = z[at[_SAMPLE] * lanes + l]
+        if i == landed or (2.0 * c[at[_ON] + i] - 1.0) * c[at[_G] + i] < 0.0:
+            c[at[_ON] + i] = 1.0 - c[at[_ON] + i]
+            c[_STALE] = 1.0
+
+
+@kernel(error_model="numpy")
+def _arrive(c, l, at, n, samples, skip, h, out, peaks, measure):
+    """Move on by h, write the state at a sample; the length of the next step. Returns 1 after the last sample."""
+    following = c[_NEXT]
+    t, period, sample = c[_T], c[_PERIOD], c[_SAMPLE]
     target = period * (sample + 1.0) / samples
     t += h
     if target - t <= 1e-12 * period:
         t = target
         sample += 1.0
-        left = z[at[_LEFT] * lanes + l] - 1.0
-        z[at[_LEFT] * lanes + l] = left
-        z[at[_SPENT] * lanes + l] = 0.0
-        slot = int(z[at[_SLOT] * lanes + l])
-        z[at[_SLOT] * lanes + l] = slot + 1.0
+        left = c[_LEFT] - 1.0
+        c[_LEFT] = left
+        c[_SPENT] = 0.0
+        slot = int(c[_SLOT])
+        c[_SLOT] = slot + 1.0
         if slot >= skip:
             for i in range(2 * n):
-                out[slot - skip, i, l] = z[(at[_Y] + i) * lanes + l]
+                out[slot - skip, i, l] = c[at[_Y] + i]
             if measure:
                 for i in range(n):
-                    peaks[slot - skip, i, l] = z[(at[_PEAK] + i) * lanes + l]
+                    peaks[slot - skip, i, l] = c[at[_PEAK] + i]
         if measure:
             for i in range(n):
-                z[(at[_CREST] + i) * lanes + l] = z[(at[_PEAK] + i) * lanes + l]
-                z[(at[_PEAK] + i) * lanes + l] = 0.0
+                c[at[_CREST] + i] = c[at[_PEAK] + i]
+                c[at[_PEAK] + i] = 0.0
         if sample >= samples:
             sample = 0.0
             t = 0.0
-            _measure(z, at, l, lanes, n)
-        z[at[_SAMPLE] * lanes + l] = sample
+            # lengths for the tolerance of the next period
+            largest = 0.0
+            for i in range(n):
+                c[at[_PAST] + i] = c[at[_NOW] + i]
+                c[at[_NOW] + i] = 0.0
+                largest = max(largest, c[at[_PAST] + i] * c[at[_WEIGHT] + i])
+            for i in range(n):
+                c[at[_FLOOR] + i] = max(_SMALLEST_SHARE * largest / c[at[_WEIGHT] + i], 1e-300)
+        c[_SAMPLE] = sample
         target = period * (sample + 1.0) / samples
         if left <= 0.0:
-            z[at[_T] * lanes + l] = t
-            z[at[_H] * lanes + l] = 0.0
+            c[_T] = t
+            c[_H] = 0.0
             return 1
-    z[at[_T] * lanes + l] = t
+    c[_T] = t
     remaining = target - t
     if following >= remaining:
         following = remaining
     elif following > 0.5 * remaining:
         following = 0.5 * remaining
-    z[at[_H] * lanes + l] = following
+    c[_H] = following
     return 0
+
+
+@kernel(error_model="numpy")
+def control(z, l, at, n, corners, samples, skip, tolerance, out, peaks, measure):
+    """Judge the trial step of lane l and choose the next one. Returns 1 when the trajectory is complete.
+
+    z
+        All rows (R, W).
+    at
+        Where the `VECTORS` begin, of n degrees of freedom and so many corners.
+    samples, skip
+        Instants per period at which the state is written to `out`, after the first `skip`; with `measure` to `peaks`
+        the largest displacements since the instant before.
+    """
+    c = z[:, l]
+    c[_ACCEPTED] = 0.0
+    if c[_LEFT] <= 0.0:
+        return 1
+    h, period = c[_H], c[_PERIOD]
+    c[_SPENT] += 1.0
+    if c[_SPENT] > _MOST:
+        _fail(c, at, n)
+        return 1
+    error = max(_error(c, at, n), c[_EXTRA]) / tolerance
+    if not error <= 1.0:
+        share = _SHRINK if not error < 1e30 else max(_SHRINK, _SAFETY * error**-0.125)
+        h *= share
+        if h < _SHORTEST * period:
+            _fail(c, at, n)
+            return 1
+        c[_H] = h
+        c[_NEXT] = h
+        c[_CALM] = 0.0
+        c[_TRIES] = 0.0
+        return 0
+    landed = _corner(c, at, corners, h, period)
+    if landed == -2 or (measure and c[_TURNING] == 0.0 and _crest(c, at, n, h)):
+        return 0
+    _accept(c, at, n, corners, h, landed, measure)
+    grow = _GROW if error < 1e-7 else min(_GROW, _SAFETY * error**-0.125)
+    if c[_CALM] == 0.0:
+        grow = min(grow, 1.0)
+    c[_CALM] = 1.0
+    # a step that was cut short says little about the length that the method could take
+    c[_NEXT] = max(h * grow, c[_NEXT]) if h < c[_NEXT] else h * grow
+    return _arrive(c, l, at, n, samples, skip, h, out, peaks, measure)
+
+
+@kernel(error_model="numpy")
+def _orthonormal(c, at, size, count):
+    """Gram and Schmidt's method in the metric of the motion; the logarithms of lost lengths are summed."""
+    metric = at[_METRIC]
+    for j in range(count):
+        vector = at[_W] + j * size
+        for other in range(at[_W], vector, size):
+            dot = 0.0
+            for i in range(size):
+                dot += c[metric + i] ** 2 * c[other + i] * c[vector + i]
+            for i in range(size):
+                c[vector + i] -= dot * c[other + i]
+        length = 0.0
+        for i in range(size):
+            length += (c[metric + i] * c[vector + i]) ** 2
+        length = math.sqrt(length)
+        c[at[_LOG] + j] += math.log(length)
+        for i in range(size):
+            c[vector + i] /= length
+
+
+@kernel(error_model="numpy")
+def follow(z, l, at, n, count, skip, growth):
+    """Take over the `count` tangent vectors of lane l if its step was accepted; at a sample write their `growth`."""
+    c = z[:, l]
+    if c[_ACCEPTED] == 0.0:
+        return
+    size = 2 * n
+    for i in range(size * count):
+        c[at[_W] + i] = c[at[_GOAL] + i]
+    c[_VOLUME] += c[_USED] * c[_VOLUME_RATE]
+    if c[_PLAIN] == 0.0:
+        _orthonormal(c, at, size, count)
+    slot = int(c[_SLOT])
+    if slot > c[_SEEN]:
+        c[_SEEN] = slot
+        if slot > skip:
+            for j in range(count):
+                growth[slot - 1 - skip, j, l] = c[at[_LOG] + j]
+            growth[slot - 1 - skip, count, l] = c[_VOLUME]
+        for j in range(count):
+            c[at[_LOG] + j] = 0.0
+        c[_VOLUME] = 0.0

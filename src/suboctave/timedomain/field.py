@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.model import System
-from suboctave.model.coupled import CoupledElement
-from suboctave.model.sampling import CornerSampling, PiecewiseLinear, SharpSampling
+from suboctave.model.elements.base import BaseElement
+from suboctave.model.elements.batch_form import switches
+from suboctave.model.elements.coupled import as_coupled
 
 __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
@@ -118,31 +118,17 @@ class Field:
         self.mass, self.damping, self.stiffness = (np.asarray(a, dtype=float) for a in system.matrices(self.values))
         self.inverse_mass = np.linalg.inv(self.mass)
         self.loads = _loads(system, self.values, self.omega)
-        self.smooth: list[tuple[Any, Array, Array]] = []
-        self.coupled: list[tuple[CoupledElement, Array]] = []
+        #: laws that are evaluated, with their coefficients: all but those that are a sum of pieces
+        self.smooth: list[tuple[BaseElement, Array]] = []
         self.switches: list[Switch] = []
         for index, element in enumerate(system.elements):
-            self._sort_in(index, element)
+            c = element.coefficient_values(self.values)
+            direction = as_coupled(element).inputs(self.n)[0]
+            places = switches(element.sampling(c), c)
+            self.switches += [Switch(index, direction, *place) for place in places]
+            if not places or places[0][2] is None:
+                self.smooth.append((element, c))
         self.rescale(np.ones(self.n) if lengths is None else lengths)
-
-    def _sort_in(self, index: int, element: Any) -> None:
-        direction = np.asarray(element.direction(self.n), dtype=float)
-        c = np.asarray(element.coefficient_values(self.values), dtype=float)
-        sampling = element.sampling(c)
-        if isinstance(element, CoupledElement):
-            self.coupled.append((element, c))
-            if isinstance(sampling, CornerSampling):
-                first = element.inputs(self.n)[0]
-                self.switches += [Switch(index, first, float(point), 1, None) for point in sampling.points]
-            return
-        if isinstance(sampling, PiecewiseLinear):
-            for piece in sampling.pieces:
-                switch = Switch(index, direction, float(c[piece.gap]), int(piece.side), float(c[piece.stiffness]))
-                self.switches.append(switch)
-            return
-        self.smooth.append((element, direction, c))
-        if isinstance(sampling, SharpSampling | CornerSampling):
-            self.switches += [Switch(index, direction, float(point), 1, None) for point in sampling.points]
 
     # ---------------------------------------------------------------------------------------------- scales
     def rescale(self, lengths: Array) -> None:
@@ -157,21 +143,16 @@ class Field:
         self._linear[n:, n:] = -velocity_per_force @ (self.damping * self.lengths * reference)
         push = self.loads.direction @ velocity_per_force.T
         self._push = np.hstack([np.zeros_like(push), push])
-        directions = np.array([d for _, d, _ in self.smooth]).reshape(-1, n)
-        zero = np.zeros_like(directions)
-        self._reads = np.vstack(
-            [np.hstack([directions * self.lengths, zero]), np.hstack([zero, directions * self.lengths * reference])]
-        )
-        self._acts = np.hstack([zero, -directions @ velocity_per_force.T])
-        self._coupled = []
-        for element, c in self.coupled:
-            inputs = element.inputs(n)
+        self._laws: list[tuple[Callable[..., tuple[Array, Array]], Array, Array, Array]] = []
+        for element, c in self.smooth:
+            law = as_coupled(element)
+            inputs = law.inputs(n)
             zero = np.zeros_like(inputs)
             read = np.hstack([inputs * self.lengths, zero])
             if element.depends_on_velocity:
                 read = np.vstack([read, np.hstack([zero, inputs * self.lengths * reference])])
             act = np.concatenate([np.zeros(n), -velocity_per_force @ element.direction(n)])
-            self._coupled.append((element.tangent, c, np.ascontiguousarray(read.T), act))
+            self._laws.append((law.tangent, c, np.ascontiguousarray(read.T), act))
 
         along = np.array([s.side * s.direction for s in self.switches]).reshape(-1, n)
         gap = np.array([s.side * s.gap for s in self.switches])
@@ -203,13 +184,10 @@ class Field:
     def right_hand_side(self, active: NDArray[np.bool_], slope: bool = False) -> RightHandSide:
         """The rate of the stacked rows per unit of `tau`, contacts frozen as in `active` (one flag per switch)."""
         matrix, constant = self._matrices(active)
-        m, count = 2 * self.n, len(self.smooth)
-        reads, acts = np.ascontiguousarray(self._reads.T), self._acts
-        elements = [(element.tangent, c) for element, _, c in self.smooth]
+        m, laws = 2 * self.n, self._laws
         loads, amplitude, push = self.loads, self.loads.amplitude, self._push
         harmonic, phase = loads.harmonic, loads.phase
         relative = self.reference / self.omega
-        coupled = self._coupled
 
         def rate(tau: float, y: Array) -> Array:
             rows = y.reshape(-1, m)
@@ -218,17 +196,7 @@ class Field:
             angle = harmonic * tau + phase
             cosine = np.cos(angle)
             first += constant + (amplitude * cosine) @ push
-            if count:
-                uv = rows @ reads
-                weight = np.empty((rows.shape[0], count))
-                for i, (tangent, c) in enumerate(elements):
-                    f, f_u, f_v = tangent(uv[:1, i], uv[:1, count + i], c)
-                    weight[:, i] = uv[:, i] * f_u
-                    if f_v is not None:
-                        weight[:, i] += uv[:, count + i] * f_v
-                    weight[0, i] = f[0]
-                out += weight @ acts
-            for law, c, read, act in coupled:
+            for law, c, read, act in laws:
                 q = rows @ read
                 f, f_q = law(q[0][:, None], np.array([tau]), c)
                 force = q @ f_q[:, 0]

@@ -1,8 +1,10 @@
-"""Generated code in files of its own, so that what Numba makes of it is kept between processes.
+"""Code for many trajectories side by side: text in which inner loops run over lanes, and modules made of it.
 
-A file is named by a digest of its content and of everything that its meaning depends on: the same text is never
-compiled twice, and never taken for another. It is written beside its place and renamed, so that several processes may
-do so at once; where nothing can be written, a directory of this process serves.
+All numbers of W trajectories lie in one array of rows of W numbers. The place of every row and every size is a constant
+of the text, so that the compiler makes vector instructions of the loops over lanes. A module is kept in a file, and
+with it what Numba makes of it: it is named by a digest of its content and of everything that its meaning depends on, so
+that the same text is never compiled twice, and never taken for another. The file is written beside its place and
+renamed: several processes may do so at once; where nothing can be written, a directory of this process serves.
 
 The directory is `$SUBOCTAVE_CACHE`, else `suboctave` in the user's directory for caches.
 """
@@ -16,27 +18,149 @@ import os
 import sys
 import tempfile
 import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import accumulate
+from math import prod
 from pathlib import Path
 from types import ModuleType
 
+from suboctave.atomic import replace_file
 from suboctave.version import __version__
 
-__all__ = ["module_of"]
+__all__ = ["Index", "Lanes", "Rows", "module_of"]
 
-_lock = threading.Lock()
+#: the index of a row: a number, or the name of the loop's variable that holds it
+Index = int | str
+#: loops over as many rows or fewer are written out
+_MOST_UNROLLED = 4
+
+_HEADER = '''"""Generated: do not edit."""
+
+from math import pi
+
+import numpy as np
+from numba import njit
+
+from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control, follow
+from suboctave.timedomain.lane_functions import absolute, arccos, arcsin, arctan, arctan_log, call_back, cos, cosh, exp
+from suboctave.timedomain.lane_functions import heaviside, log, maximum, sign, sin, sine_cosine, sinh, sqrt, tan, tanh
+'''
+_DECORATOR = '@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})'
+
+
+class Rows:
+    """Where everything lies: under each name an array of rows of W numbers, of the shape given."""
+
+    def __init__(self, lanes: int, shapes: Mapping[str, int | tuple[int, ...]]) -> None:
+        self.lanes = lanes
+        self.shapes = {name: shape if isinstance(shape, tuple) else (shape,) for name, shape in shapes.items()}
+        ends = list(accumulate((prod(shape) for shape in self.shapes.values()), initial=0))
+        #: the first row of each name
+        self.begin = dict(zip(self.shapes, ends[:-1], strict=True))
+        self.size = ends[-1]
+
+    def __call__(self, name: str, *index: Index) -> str:
+        """The number in the lane l of one row; without an index that of the first.
+
+        One index counts all rows of the name, whatever their shape.
+        """
+        row: Index = 0
+        for length, i in zip(self.shapes[name][-len(index) :], index, strict=False):
+            if isinstance(row, int) and isinstance(i, int):
+                row = row * length + i
+            else:
+                row = f"{i}" if row == 0 else f"({row}) * {length} + {i}"
+        if isinstance(row, int):
+            return f"z[{(self.begin[name] + row) * self.lanes} + l]"
+        return f"z[({self.begin[name]} + {row}) * {self.lanes} + l]"
+
+
+class Lanes:
+    """Lines of code; statements on lanes that follow each other share one loop."""
+
+    def __init__(self, lanes: int) -> None:
+        self.lanes = lanes
+        self._lines: list[str] = []
+        self._indent = 1
+        self._pending: list[str] = []
+
+    def each(self, *lines: str) -> None:
+        """Statements for every lane l."""
+        self._pending += lines
+
+    def raw(self, *lines: str) -> None:
+        """Statements outside of the loop over lanes."""
+        self._flush()
+        self._lines += ["    " * self._indent + line for line in lines]
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """What is written meanwhile stands indented below this line."""
+        self.raw(head)
+        self._indent += 1
+        before = len(self._lines)
+        yield
+        self._flush()
+        if len(self._lines) == before:
+            self.raw("pass")
+        self._indent -= 1
+
+    def rows(self, variable: str, count: Index, body: Callable[[Index], None], first: Index = 0) -> None:
+        """`body` for rows `first` to `count`: written out if they are few, else in a loop over this variable."""
+        if isinstance(count, int) and isinstance(first, int) and count <= _MOST_UNROLLED:
+            for i in range(first, count):
+                body(i)
+        else:
+            with self.block(f"for {variable} in range({first}, {count}):"):
+                body(variable)
+
+    def sums(
+        self,
+        count: int,
+        goal: Callable[[Index], str],
+        start: Callable[[Index], str],
+        terms: Sequence[tuple[int, str, Callable[[Index, Index], str]]],
+    ) -> None:
+        """`goal(i) = start(i) +- sum_j term(i, j) +- ...`, each sum given by its length, its sign and its term."""
+
+        def written_out(i: Index) -> None:
+            parts = [f" {sign} {term(i, j)}" for size, sign, term in terms for j in range(size)]
+            self.each(f"{goal(i)} = {start(i)}{''.join(parts)}")
+
+        def in_loops(i: Index) -> None:
+            self.each(f"{goal(i)} = {start(i)}")
+            for size, sign, term in terms:
+                if size:
+                    with self.block(f"for o in range({size}):"):
+                        self.each(f"{goal(i)} {sign}= {term(i, 'o')}")
+
+        self.rows("i", count, written_out if count <= _MOST_UNROLLED else in_loops)
+
+    def function(self, head: str) -> str:
+        """All of it, as a compiled function."""
+        self._flush()
+        text = "\n".join(self._lines)
+        return f"\n\n{_DECORATOR}\ndef {head}:\n{text}\n"
+
+    def _flush(self) -> None:
+        if self._pending:
+            pending, self._pending = self._pending, []
+            self.raw(f"for l in range({self.lanes}):")
+            self._lines += ["    " * (self._indent + 1) + line for line in pending]
 
 
 @functools.cache
 def _directory() -> Path:
     """Where generated files are kept; made if it is not there."""
     given = os.environ.get("SUBOCTAVE_CACHE")
-    if given:
-        place = Path(given)
-    elif sys.platform == "win32":
-        place = Path(os.environ.get("LOCALAPPDATA", Path.home())) / "suboctave"
-    else:
-        place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "suboctave"
     try:
+        if given:
+            place = Path(given)
+        elif sys.platform == "win32":
+            place = Path(os.environ.get("LOCALAPPDATA", Path.home())) / "suboctave"
+        else:
+            place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "suboctave"
         place.mkdir(parents=True, exist_ok=True, mode=0o700)
         with tempfile.TemporaryFile(dir=place):
             pass
@@ -50,13 +174,16 @@ def _ground() -> bytes:
     """What the meaning of every generated text depends on: versions, and the functions that it calls."""
     import numba
 
-    names = ("elementary.py", "adaptive_control.py", "tangent_control.py")
-    called = [Path(__file__).with_name(name).read_bytes() for name in names]
+    called = [Path(__file__).with_name(name).read_bytes() for name in ("lane_functions.py", "adaptive_control.py")]
     return b"\0".join([__version__.encode(), numba.__version__.encode(), *called])
 
 
-def module_of(source: str) -> ModuleType:
-    """The module with this text; its compiled functions are found again by later processes."""
+_lock = threading.Lock()
+
+
+def module_of(*functions: str) -> ModuleType:
+    """The module with these functions; what they are compiled to is loaded by later processes."""
+    source = _HEADER + "".join(functions)
     digest = hashlib.sha256(_ground() + b"\0" + source.encode()).hexdigest()[:32]
     name = f"suboctave_generated_{digest}"
     with _lock:
@@ -64,10 +191,7 @@ def module_of(source: str) -> ModuleType:
             return sys.modules[name]
         path = _directory() / f"{name}.py"
         if not path.exists() or path.read_text(encoding="utf-8") != source:
-            handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(source)
-            os.replace(temporary, path)
+            replace_file(path, lambda place: place.write_text(source, encoding="utf-8"))
         spec = importlib.util.spec_from_file_location(name, path)
         assert spec is not None
         assert spec.loader is not None

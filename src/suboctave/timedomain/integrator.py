@@ -9,17 +9,20 @@ The force is continuous at a gap, so the state-transition matrix goes through wi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import DOP853, DenseOutput
-from scipy.optimize import brentq
 
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import check_time
 from suboctave.timedomain.field import Array, Field
+
+if TYPE_CHECKING:
+    from scipy.integrate import DOP853, DenseOutput
 
 __all__ = ["Crossing", "Passage", "Step", "advance"]
 
@@ -67,7 +70,12 @@ class Passage:
 def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> DOP853:
     if first is not None:
         first = min(first, end - begin)
-    return DOP853(rhs, begin, y, end, rtol=rtol, atol=atol, first_step=first)
+    return scipy.integrate.DOP853(rhs, begin, y, end, rtol=rtol, atol=atol, first_step=first)
+
+
+def _zero(function: Callable[[float], float], a: float, b: float) -> float:
+    """The zero of a function that changes sign between a and b, to rounding."""
+    return float(scipy.optimize.brentq(function, a, b, xtol=_EPS * max(abs(b), b - a)))
 
 
 def _step(solver: DOP853, model: Field) -> None:
@@ -129,9 +137,9 @@ class _Watch:
         for i in near:
             if self._repeats[i] >= _CHATTER and self._last[i] == solver.t_old:
                 continue
-            found = self._root(int(i), times, margins[i], rates[i], interpolant)
-            if found is not None and (best is None or found < best[0]):
-                best = found, int(i)
+            root = self._root(int(i), times, margins[i], rates[i], interpolant)
+            if root is not None and (best is None or root < best[0]):
+                best = root, int(i)
         return best
 
     def _root(self, i: int, times: Array, margin: Array, rate: Array, interpolant: DenseOutput) -> float | None:
@@ -148,17 +156,17 @@ class _Watch:
             if margin[k + 1] < 0.0:
                 if margin[k] <= 0.0 and k == 0:  # leaves from the gap itself: outwards first, or the wrong way at once
                     if rate[0] > 0.0 > rate[1]:
-                        top = brentq(speed, a, b, xtol=1e-15 * max(abs(b), b - a))
+                        top = _zero(speed, a, b)
                         if distance(top) > 0.0:
-                            return float(brentq(distance, top, b, xtol=_EPS * max(abs(b), b - a)))
+                            return _zero(distance, top, b)
                     return a
                 if distance(a) <= 0.0:
                     return a
-                return float(brentq(distance, a, b, xtol=_EPS * max(abs(b), b - a))) if distance(b) < 0.0 else b
+                return _zero(distance, a, b) if distance(b) < 0.0 else b
             if rate[k] < 0.0 < rate[k + 1]:
-                low = float(brentq(speed, a, b, xtol=_EPS * max(abs(b), b - a)))
+                low = _zero(speed, a, b)
                 if distance(low) < 0.0:
-                    return float(brentq(distance, a, low, xtol=_EPS * max(abs(b), b - a))) if distance(a) > 0.0 else a
+                    return _zero(distance, a, low) if distance(a) > 0.0 else a
         return None
 
     def land(self, rhs: Any, solver: DOP853, tau: float, switch: int, rtol: float, atol: float) -> tuple[float, Array]:

@@ -203,18 +203,18 @@ def _drive(
 ) -> tuple[CurvePoint, float, int]:
     """The bifurcation on the curve: by secants from the start; if they lead nowhere, between two scanned points."""
     try:
-        found = _secants(curve, kind, start, None, max_step, max_iterations)
+        located = _secants(curve, kind, start, None, max_step, max_iterations)
     except _Spent:
         raise
     except ConvergenceError:  # a step too far
-        found = None
-    if found is not None:
-        return found
+        located = None
+    if located is not None:
+        return located
     pair = _scan(curve, kind, start, max_step, max_iterations, np.inf if reach is None else reach)
     if pair is not None:
-        found = _secants(curve, kind, pair[1], pair[0], max_step, max_iterations)
-        if found is not None:
-            return found
+        located = _secants(curve, kind, pair[1], pair[0], max_step, max_iterations)
+        if located is not None:
+            return located
     place = (
         f"no {kind} found along the curve of periodic motions from omega = {start.u[-1] * curve.model.reference:.9g}"
     )

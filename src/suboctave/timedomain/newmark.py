@@ -1,4 +1,20 @@
-"""Newmark's method for batches of trajectories: see `newmark_code` for the equations."""
+"""Newmark's method for batches of trajectories.
+
+Constant average acceleration (beta = 1/4, gamma = 1/2), which is the trapezoidal rule: with S = 4/h^2 M + 2/h C + K,
+
+    dx = S^-1 [-2 K x + 4/h M v + p_0 + p_1 - e (F_0 + F_1)],   v_1 = 2/h dx - v
+
+(the acceleration is eliminated by the equation of motion at the step's begin). Elements feel dx through their channels
+only, so that Newton's method has as many unknowns as there are channels, y = d.dx, with F_1 = F(q + y, 2/h y - r):
+
+    y + G F_1 = d.(...),   G = d S^-1 e
+
+It starts from the acceleration extrapolated over the last two steps and ends when its last correction falls below a
+tolerance relative to the motion; the force kept is linear over that correction, so that the step balances exactly.
+
+All numbers of W trajectories lie side by side, and inner loops run over them: the compiler makes vector instructions of
+those. A trajectory takes part in an iteration only while it needs it, so that its result does not depend on the others.
+"""
 
 from __future__ import annotations
 
@@ -7,46 +23,64 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.model.element import Array
-from suboctave.timedomain.generated import module_of
-from suboctave.timedomain.newmark_code import newmark_source, rows_of
-from suboctave.timedomain.structure import Numbers, Structure
+from suboctave.model.elements.base import Array
+from suboctave.model.elements.batch_form import Tangent
+from suboctave.timedomain.generated import Index, Rows, module_of
+from suboctave.timedomain.law_code import LawCode
+from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
+from suboctave.timedomain.python_callbacks import callback_shapes
 
-__all__ = ["NewmarkGroup", "NewmarkKernel"]
+__all__ = ["NewmarkGroup", "NewmarkMethod", "newmark_function"]
 
-#: rows of numbers that many trajectories side by side may fill
-_ROOM = 16384
+#: numbers that the rows of a group may fill: what stays in a processor's cache
+_ROOM = 2048
+_MOST_ITERATIONS = 30
 
 
-class NewmarkKernel:
-    """The compiled integrator of a structure; `lanes` trajectories run side by side."""
+def newmark_rows(layout: Layout, lanes: int) -> Rows:
+    """The layout of the array `z`."""
+    n, m, k, waves = layout.n, len(layout.channels), len(layout.outputs), len(layout.waves)
+    shapes: dict[str, int | tuple[int, ...]] = {
+        # numbers
+        "A": (n, n), "B": (n, n), "L": (n, waves), "E": (n, k), "G": (m, k), "c": layout.law_numbers,
+        **dict.fromkeys(("h", "rate", "time"), 1),
+        # the motion, and what is remembered of it
+        "x": n, "v": n, "F": k, "q": m, "r": m, "foreseen": m, "last": m, "bad": 1, "peak": n,
+        # within a step
+        "lin": n, "before": n, "goal": m, "size": m, "y": m, "again": 1, "J": (k, m), "D": (m, m), "R": m,
+        **callback_shapes(layout.called_back),
+    }  # fmt: skip
+    return Rows(lanes, shapes)
 
-    def __init__(self, structure: Structure, steps: int, tolerance: float, lanes: int | None = None) -> None:
-        self.structure, self.steps, self.tolerance = structure, steps, tolerance
-        rows = rows_of(structure, 1).size
-        self.lanes = lanes or next((lanes for lanes in (32, 16) if lanes * rows <= _ROOM // 8), 8)
-        self.function: Any = module_of(newmark_source(structure, self.lanes)).newmark
-        self.waves = structure.wave_table(steps)
-        self.rows = rows_of(structure, self.lanes)
+
+class NewmarkMethod:
+    """The compiled integrator of a layout; `lanes` trajectories run side by side."""
+
+    def __init__(self, layout: Layout, steps: int, tolerance: float, lanes: int | None = None) -> None:
+        self.layout, self.steps, self.tolerance = layout, steps, tolerance
+        rows = newmark_rows(layout, 1).size
+        self.lanes = lanes or next((lanes for lanes in (32, 16) if lanes * rows <= _ROOM), 8)
+        self.function: Any = module_of(newmark_function(layout, self.lanes)).newmark
+        self.waves = layout.wave_table(steps)
+        self.rows = newmark_rows(layout, self.lanes)
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
         """The rows of the code for every set of parameters, (P, rows) each."""
-        n, h = self.structure.n, 2.0 * np.pi / (numbers.omega * self.steps)
+        h = 2.0 * np.pi / (numbers.omega * self.steps)
         h1 = h[:, None, None]
-        d, e = self.structure.channels, self.structure.outputs.T
         inverse = np.linalg.inv(4.0 / h1**2 * numbers.mass + 2.0 / h1 * numbers.damping + numbers.stiffness)
+        outputs = inverse @ self.layout.outputs.T
         flat: dict[str, Array] = {
             "A": -2.0 * inverse @ numbers.stiffness,
             "B": inverse @ (4.0 / h1 * numbers.mass),
             "L": inverse @ numbers.loads,
-            "E": inverse @ e,
-            "G": d @ (inverse @ e),
+            "E": outputs,
+            "G": self.layout.channels @ outputs,
             "c": numbers.laws,
             "h": h,
             "rate": 2.0 / h,
             "time": 1.0 / numbers.omega,
         }
-        assert n == self.structure.n
         return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
 
@@ -54,25 +88,25 @@ class NewmarkGroup:
     """`lanes` trajectories on their way."""
 
     def __init__(
-        self, kernel: NewmarkKernel, numbers: dict[str, Array], states: Array, which: NDArray[np.int_], address: int
+        self, method: NewmarkMethod, numbers: dict[str, Array], states: Array, which: NDArray[np.int_], address: int
     ) -> None:
         """`states` (lanes, 2n); `which` (lanes,) the set of parameters of each."""
-        self.kernel, self.address, self.fresh = kernel, address, True
-        n, lanes = kernel.structure.n, kernel.lanes
-        self.z = np.zeros(kernel.rows.size * lanes)
+        self.method, self.address, self.fresh = method, address, True
+        n, lanes = method.layout.n, method.lanes
+        self.z = np.zeros(method.rows.size * lanes)
         for name, value in {**numbers, "x": states[:, :n], "v": states[:, n:]}.items():
             self._rows(name, value.shape[1])[:] = (value[which] if name in numbers else value).T
 
     def _rows(self, name: str, count: int) -> Array:
-        begin, lanes = self.kernel.rows.begin[name], self.kernel.lanes
+        begin, lanes = self.method.rows.begin[name], self.method.lanes
         return self.z[begin * lanes : (begin + count) * lanes].reshape(count, lanes)
 
     def advance(self, begin: int, end: int, stride: int, skip: int, out: Array, peaks: Array | None) -> int:
         """Steps `begin` to `end`; every `stride`-th state after step `skip` goes to `out`: how many did."""
-        kernel = self.kernel
+        method = self.method
         measure = peaks is not None
-        used = kernel.function(
-            self.z, kernel.waves, begin, end, stride, skip, measure, self.fresh, kernel.tolerance, self.address, out,
+        used = method.function(
+            self.z, method.waves, begin, end, stride, skip, measure, self.fresh, method.tolerance, self.address, out,
             peaks if peaks is not None else np.zeros((0, 0, 0)),
         )  # fmt: skip
         self.fresh = False
@@ -80,9 +114,191 @@ class NewmarkGroup:
 
     def states(self) -> Array:
         """Where they are, (lanes, 2n)."""
-        n = self.kernel.structure.n
+        n = self.method.layout.n
         return np.concatenate([self._rows("x", n), self._rows("v", n)]).T.copy()
 
     def unsettled(self) -> Array:
         """Steps of each whose equations were not solved to the tolerance."""
         return self._rows("bad", 1)[0].copy()
+
+
+def newmark_function(layout: Layout, lanes: int) -> str:
+    """The function that integrates `lanes` trajectories of this layout."""
+    return _NewmarkCode(layout, newmark_rows(layout, lanes)).function()
+
+
+class _NewmarkCode(LawCode):
+    """Writes the function."""
+
+    def function(self) -> str:
+        """Steps `begin` to `end` of all lanes."""
+        code, z = self.code, self.z
+        code.raw("points = waves.shape[0]", "slot = 0", "theta = 0.0")
+        if self.m:
+            with code.block("if fresh:"):
+                code.raw("theta = 2.0 * pi * (begin % points) / points")
+                code.each(*(f"{z('q', j)} = {self._dot(j, 'x')}" for j in range(self.m)))
+                code.each(*(f"{z('r', j)} = {self._dot(j, 'v')}" for j in range(self.m)))
+                code.each(*(f"{z('y', j)} = 0.0" for j in range(self.m)))
+                forces, _ = self._laws("{r}")
+                code.each(*(f"{z('F', o)} = {force}" for o, force in enumerate(forces)))
+        with code.block("for step in range(begin, end):"):
+            code.raw("k0 = step % points", "k1 = (step + 1) % points")
+            waves = range(len(self.layout.waves))
+            code.raw(*(f"s{w} = waves[k0, {w}] + waves[k1, {w}]" for w in waves))
+            code.raw("theta = 2.0 * pi * k1 / points")
+            self._linear()
+            if self.m:
+                self._newton()
+            self._advance()
+            self._record()
+        code.raw("return slot")
+        return code.function(
+            "newmark(z, waves, begin, end, stride, skip, measure, fresh, tolerance, address, out, peaks)"
+        )
+
+    def _dot(self, j: int, name: str) -> str:
+        """Channel j of a vector with n rows."""
+        return self.along(j, lambda i: self.z(name, i))
+
+    def _linear(self) -> None:
+        """The increment without the forces at the end of the step, and what Newton's method starts from."""
+        z, code = self.z, self.code
+
+        def loads(i: Index) -> str:
+            return " + ".join(f"{z('L', i, w)} * s{w}" for w in range(len(self.layout.waves))) or "0.0"
+
+        self.row_sums(lambda i: z("lin", i), loads, lambda j: z("x", j), lambda j: z("v", j), "F")
+        for j in range(self.m):
+            factors = enumerate(np.abs(self.layout.channels[j]).tolist())
+            reach = [f"{d!r} * (abs({z('x', i)}) + {z('time')} * abs({z('v', i)}))" for i, d in factors if d]
+            code.each(
+                f"{z('goal', j)} = {self._dot(j, 'lin')}",
+                f"{z('size', j)} = tolerance * ({' + '.join(reach) or '0.0'})",
+                f"{z('y', j)} = {z('h')} * {z('r', j)} + {z('foreseen', j)}",
+            )
+
+    def _newton(self) -> None:
+        code, z, m, k = self.code, self.z, self.m, self.k
+        code.each(f"{z('again')} = 1.0")
+        code.raw("count = 1", "iteration = 0")
+        with code.block(f"while count > 0 and iteration < {_MOST_ITERATIONS}:"):
+            code.raw("count = 0", "iteration += 1")
+            forces, slopes = self._laws("{rate} * {y} - {r}")
+            code.each(*(f"f{o} = {force}" for o, force in enumerate(forces)))
+            for o in range(k):
+                for j in range(m):
+                    terms = [slopes[o, j, False]] if (o, j, False) in slopes else []
+                    terms += [f"{z('rate')} * ({slopes[o, j, True]})"] if (o, j, True) in slopes else []
+                    code.each(f"{z('J', o, j)} = {' + '.join(terms) or '0.0'}")
+            # those that have arrived keep their force; the others take this one, and what the correction adds to it
+            code.each(*(f"{z('F', o)} = f{o} if {z('again')} > 0.5 else {z('F', o)}" for o in range(k)))
+            self._solve()
+            keep = f"{z('again')} > 0.5"
+            code.each(*(f"{z('R', j)} = {z('R', j)} if {keep} else 0.0" for j in range(m)))
+            code.each(*(f"{z('y', j)} += {z('R', j)}" for j in range(m)))
+            for o in range(k):
+                change = " + ".join(f"{z('J', o, j)} * {z('R', j)}" for j in range(m))
+                code.each(f"{z('F', o)} += {change}")
+            code.each(f"more = {keep}", "far = False")
+            code.each(*(f"far = far | (abs({z('R', j)}) > {z('size', j)})" for j in range(m)))
+            code.each(f"{z('again')} = 1.0 if more & far else 0.0", f"count += 1 if {z('again')} > 0.5 else 0")
+        with code.block("if count > 0:"):
+            code.each(f"{z('bad')} += {z('again')}")
+
+    def _laws(self, rate: str) -> tuple[list[str], dict[tuple[int, int, bool], str]]:
+        """Forces of all laws and their slopes at the guess y, with the channels' rates given by this text."""
+        z, channels = self.z, []
+        for j in range(self.m):
+            own = rate.format(rate=z("rate"), y=z("y", j), r=z("r", j))
+            channels += [f"q{j} = {z('q', j)} + {z('y', j)}", f"r{j} = {own}"]
+        self.read(channels)
+
+        def tangent(placed: PlacedLaw) -> Tangent:
+            return placed.form.tangent(self.names(placed))
+
+        return self.forces(tangent)
+
+    def _solve(self) -> None:
+        """R: one correction of y by Newton's method. The matrix is near the identity for short steps: no pivots."""
+        m, k, z, code = self.m, self.k, self.z, self.code
+        code.sums(
+            m,
+            lambda j: z("R", j),
+            lambda j: f"{z('goal', j)} - {z('y', j)}",
+            [(k, "-", lambda j, o: f"{z('G', j, o)} * {z('F', o)}")],
+        )
+
+        def row(j: Index) -> None:
+            def entry(i: Index) -> str:
+                return (
+                    f"{float(i == j)}" if isinstance(i, int) and isinstance(j, int) else f"1.0 if {i} == {j} else 0.0"
+                )
+
+            product = [(k, "+", lambda i, o: f"{z('G', j, o)} * {z('J', o, i)}")]
+            code.sums(m, lambda i: z("D", j, i), entry, product)
+
+        def eliminate(p: Index) -> None:
+            def below(j: Index) -> None:
+                share = z("D", j, p)
+                code.each(f"{share} = {share} / {z('D', p, p)}", f"{z('R', j)} -= {share} * {z('R', p)}")
+                code.rows("i", m, lambda i: code.each(f"{z('D', j, i)} -= {share} * {z('D', p, i)}"), _after(p))
+
+            code.rows("j", m, below, _after(p))
+
+        code.rows("j", m, row)
+        code.rows("p", m, eliminate)
+        for j in range(m - 1, -1, -1):
+            rest = "".join(f" - {z('D', j, i)} * {z('R', i)}" for i in range(j + 1, m))
+            code.each(f"{z('R', j)} = ({z('R', j)}{rest}) / {z('D', j, j)}")
+
+    def _advance(self) -> None:
+        z, code = self.z, self.code
+        forces = [(self.k, "-", lambda i, o: f"{z('E', i, o)} * {z('F', o)}")]
+        code.sums(self.n, lambda i: z("lin", i), lambda i: z("lin", i), forces)
+        code.rows(
+            "i",
+            self.n,
+            lambda i: code.each(
+                f"{z('before', i)} = {z('v', i)}",
+                f"{z('x', i)} += {z('lin', i)}",
+                f"{z('v', i)} = {z('rate')} * {z('lin', i)} - {z('v', i)}",
+            ),
+        )
+        for j in range(self.m):
+            code.each(
+                f"rate{j} = {self._dot(j, 'v')}",
+                f"turn{j} = 0.5 * {z('h')} * (rate{j} - {z('r', j)})",
+                f"{z('foreseen', j)} = 2.0 * turn{j} - {z('last', j)}",
+                f"{z('last', j)} = turn{j}",
+                f"{z('r', j)} = rate{j}",
+                f"{z('q', j)} = {self._dot(j, 'x')}",
+            )
+
+    def _record(self) -> None:
+        n, z, code = self.n, self.z, self.code
+        x, v, before, peak = (z(name, "i") for name in ("x", "v", "before", "peak"))
+        with code.block("if measure:"), code.block(f"for i in range({n}):"):
+            code.each(
+                # the velocity is linear within a step
+                f"turns = {v} * {before} < 0.0",
+                f"half = 0.5 * {z('h')}",
+                f"share = {before} / (({before} - {v}) if turns else 1.0)",
+                f"top = abs({x} - half * ({before} + {v}) + half * {before} * share)",
+                f"now = abs({x})",
+                "top = top if turns & (top > now) else now",
+                f"{peak} = top if top > {peak} else {peak}",
+            )
+        with code.block("if (step + 1) % stride == 0:"):
+            with code.block("if step + 1 > skip:"):
+                with code.block(f"for i in range({n}):"):
+                    code.each(f"out[slot, i, l] = {x}", f"out[slot, {n} + i, l] = {v}")
+                    with code.block("if measure:"):
+                        code.each(f"peaks[slot, i, l] = {peak}")
+                code.raw("slot += 1")
+            with code.block("if measure:"), code.block(f"for i in range({n}):"):
+                code.each(f"{peak} = 0.0")
+
+
+def _after(p: Index) -> Index:
+    return p + 1 if isinstance(p, int) else f"{p} + 1"

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
 from suboctave.interruption import pass_on
-from suboctave.model.element import Array
+from suboctave.model.elements.base import Array
 from suboctave.model.system import System
-from suboctave.timedomain.batch import Flow
+from suboctave.timedomain.flow import Flow
 
 __all__ = ["Trap", "traps_about"]
 

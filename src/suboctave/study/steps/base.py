@@ -1,7 +1,7 @@
 """What a step of a study is: one analysis with its arguments, as a table of the study file.
 
-A new kind of step is one file in this folder with one class derived from `Step`; it is found by itself. The class names
-its `kind` and its arguments as fields, says in `check` what is wrong before any work, and computes in `run`.
+A new kind of step is a class derived from `Step` in a file of this folder; it registers itself. The class names its
+`kind` and its arguments as fields, says in `check` what is wrong before any work, and computes in `run`.
 """
 
 from __future__ import annotations
@@ -13,15 +13,19 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from suboctave.analysis import BifurcationDiagram, Branch, Isola, Isolas
 from suboctave.analysis.diagram import Keeper
-from suboctave.analysis.results import Result
 from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
+from suboctave.maps.isolas.isola import Isola
+from suboctave.maps.isolas.result import Isolas
 from suboctave.model.system import System
+from suboctave.results.branch import Branch
+from suboctave.results.diagram import BifurcationDiagram
+from suboctave.study.results import Result
 
 __all__ = [
     "STEPS",
+    "CheckContext",
     "Context",
     "Curve",
     "Known",
@@ -29,7 +33,6 @@ __all__ = [
     "Named",
     "Range",
     "Step",
-    "Surroundings",
     "as_curve",
     "check_branch",
     "check_motion",
@@ -59,7 +62,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class CheckContext:
     """What is known before a study runs: the system as this step sees it, and the kinds of the steps before it.
 
     `known` has an entry for each of these steps that follows a curve and is in order.
@@ -75,7 +78,7 @@ class Surroundings:
 class Context:
     """What a step finds when it runs: its system, the results of the steps before it, somebody to report to.
 
-    `keeper` keeps the branches of a diagram as they are found.
+    `keeper` keeps the branches of a diagram when they are complete.
     """
 
     system: System
@@ -120,11 +123,11 @@ class Step(BaseModel):
         """The analyses whose results it starts from: the key that names each, and the name."""
         return []
 
-    def check(self, around: Surroundings) -> Iterator[Complaint]:
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
         """What is wrong with the arguments, before any work."""
         yield from ()
 
-    def known(self, around: Surroundings) -> Known | None:
+    def known(self, around: CheckContext) -> Known | None:
         """What is known of its motions before it runs; None where that is nothing, or they are none."""
         return None
 
@@ -142,11 +145,11 @@ def as_table(names: Sequence[str], kinds: Sequence[Any], rows: Sequence[Sequence
 
 
 def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:
-    """The complaint of a call that refuses its input, if it does."""
+    """The complaint of a call that refuses its input, if it does, at a key of the table (empty: the whole table)."""
     try:
         call()
     except InputError as error:
-        yield (key,), str(error)
+        yield ((key,) if key else ()), str(error)
 
 
 # ------------------------------------------------------------------------------------------------- motions of a branch
@@ -166,7 +169,7 @@ class Curve(BaseModel):
     at: float | None = None
 
     @property
-    def said(self) -> str:
+    def words(self) -> str:
         """How messages and titles name it."""
         if self.label is not None:
             return f"{self.analysis}, branch {self.label!r}"
@@ -206,7 +209,7 @@ def key_of_curve(given: str | Curve, key: str) -> tuple[str | int, ...]:
     return (key,) if isinstance(given, str) else (key, "analysis")
 
 
-def check_motion(motion: Motion, key: tuple[str | int, ...], around: Surroundings) -> Iterator[Complaint]:
+def check_motion(motion: Motion, key: tuple[str | int, ...], around: CheckContext) -> Iterator[Complaint]:
     """What is wrong with the choice of a motion, as far as that is known before the branch is."""
     ways = [motion.point is not None, motion.bifurcation is not None, motion.nearest is not None]
     if sum(ways) > 1:
@@ -220,7 +223,7 @@ def check_motion(motion: Motion, key: tuple[str | int, ...], around: Surrounding
             yield (*key, "nearest", name), f"neither omega, amplitude nor a parameter{suggest(name, known)}"
 
 
-def check_branch(curve: Curve, key: tuple[str | int, ...], around: Surroundings) -> Iterator[Complaint]:
+def check_branch(curve: Curve, key: tuple[str | int, ...], around: CheckContext) -> Iterator[Complaint]:
     """Refuse an analysis that is not there, not before this one, or gives no branch, and a choice that says too little.
 
     `key` is that of the name of the analysis.
@@ -302,17 +305,17 @@ def chosen(motion: Motion, results: Mapping[str, Result]) -> Any:
         isola = _isola(motion, result)
         end = isola.born if motion.bifurcation == "isola_centre" else isola.merges
         if end is None:
-            raise InputError(f"{motion.said} has no {motion.bifurcation}: {'; '.join(isola.reasons)}")
+            raise InputError(f"{motion.words} has no {motion.bifurcation}: {'; '.join(isola.reasons)}")
         return end
     branch = chosen_branch(motion, results)
-    said = repr(motion.analysis) if motion.said == motion.analysis else motion.said
+    words = repr(motion.analysis) if motion.words == motion.analysis else motion.words
     if motion.bifurcation is not None:
-        found = branch.bifurcations[motion.bifurcation]
-        if not -len(found) <= motion.index < len(found):
-            count = "no" if not found else f"only {len(found)}"
+        met = branch.bifurcations[motion.bifurcation]
+        if not -len(met) <= motion.index < len(met):
+            count = "no" if not met else f"only {len(met)}"
             kind = motion.bifurcation
-            raise InputError(f"{said} has {count} {kind}, so that there is none with index {motion.index}")
-        return found[motion.index]
+            raise InputError(f"{words} has {count} {kind}, so that there is none with index {motion.index}")
+        return met[motion.index]
     if motion.nearest is not None:
         distance = np.zeros(len(branch))
         for name, value in motion.nearest.items():
@@ -321,5 +324,5 @@ def chosen(motion: Motion, results: Mapping[str, Result]) -> Any:
         return branch.points[int(np.argmin(distance))]
     point = -1 if motion.point is None else motion.point
     if not -len(branch) <= point < len(branch):
-        raise InputError(f"{said} has {len(branch)} points, so that there is no point {point}")
+        raise InputError(f"{words} has {len(branch)} points, so that there is no point {point}")
     return branch.points[point]

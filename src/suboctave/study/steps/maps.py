@@ -1,85 +1,217 @@
-"""What the steps that map a plane of parameters have in common: the first plane, and the options of the verbs."""
+"""The steps over a design parameter: isolas, the region of two parameters in which they exist, regimes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, ClassVar
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, field_validator
 
-from suboctave.analysis.checks import check_bounds, check_parameter, check_range, check_system, make_settings
-from suboctave.study.options import as_harmonics, as_newton, as_stability, as_stepping
-from suboctave.study.steps.base import Complaint, Context, Range, Step, Surroundings, tried
+from suboctave.errors import ConvergenceError, suggest
+from suboctave.maps.isolas.map import isola_map
+from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.isolas.verb import find_isolas
+from suboctave.maps.regimes.verb import regime_map
+from suboctave.model.inputs import check_bounds, check_parameter
+from suboctave.store.table import Table
+from suboctave.study.options import as_seeds
+from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, tried
+from suboctave.study.steps.curves import FollowingStep, check_sweep
 
-__all__ = ["MapStep", "check_design"]
 
-
-class MapStep(Step):
+class DesignStep(FollowingStep):
     """A range of omega, a design parameter with its bounds, and the options of the verbs that follow curves."""
 
     omega: Range
     parameter: str
     bounds: Range
     max_curves: int = Field(default=64, ge=1)
-    harmonics: Any = None
-    max_step: float | None = None
-    observe: int | None = None
-    newton: dict[str, Any] | None = None
-    stepping: dict[str, Any] | None = None
-    stability: Any = None
 
-    @field_validator("newton", "stepping", "harmonics", "stability")
-    @classmethod
-    def _read(cls, given: Any, info: ValidationInfo) -> Any:
-        _READ[str(info.field_name)](given)
-        return given
-
-    def check(self, around: Surroundings) -> Iterator[Complaint]:
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
         """See `Step.check`."""
-        wrong = list(tried("omega", lambda: check_range("omega", self.omega, positive=True)))
-        yield from wrong
+        yield from super().check(around)
         yield from check_design(self.parameter, self.bounds, ("parameter", "bounds"), around)
         if self.parameter in self.parameters:
             yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
-        yield from tried("", lambda: check_system(around.system, () if wrong else tuple(self.omega)))
-        for key, value in self._settings().items():
-            given: dict[str, Any] = dict.fromkeys(("max_step", "observe", "newton", "stepping", "stability"))
-            given[key] = value
-            yield from tried(key, partial(make_settings, around.system, events=(), **given))
-
-    def _settings(self) -> dict[str, Any]:
-        return {
-            "max_step": self.max_step,
-            "observe": self.observe,
-            "newton": as_newton(self.newton),
-            "stepping": as_stepping(self.stepping),
-            "stability": as_stability(self.stability),
-        }
+        yield from check_sweep(self.omega, around)
 
     def options(self, context: Context) -> dict[str, Any]:
         """The arguments of the verb that were given."""
-        given = {**self._settings(), "harmonics": as_harmonics(self.harmonics), "progress": context.progress}
-        return {name: value for name, value in given.items() if value is not None} | {"max_curves": self.max_curves}
+        return super().options(context) | {"max_curves": self.max_curves}
 
     @property
     def ranges(self) -> tuple[tuple[float, float], str, tuple[float, float]]:
         """omega, the design parameter, its bounds."""
         return (self.omega[0], self.omega[1]), self.parameter, (self.bounds[0], self.bounds[1])
 
+    def _check_values(self, values: int | list[float], key: str = "values") -> Iterator[Complaint]:
+        """Values of the design parameter: how many, or which."""
+        low, high = sorted(self.bounds)
+        if isinstance(values, int):
+            if values < 2:
+                yield (key,), f"must be at least 2, or values of {self.parameter} themselves, not {values}"
+            return
+        for i, value in enumerate(values):
+            if not low <= value <= high:
+                yield (key, i), f"{value:g} lies outside the bounds ({low:g}, {high:g})"
 
-def check_design(name: str, bounds: list[float], keys: tuple[str, str], around: Surroundings) -> Iterator[Complaint]:
+
+def check_design(name: str, bounds: list[float], keys: tuple[str, str], around: CheckContext) -> Iterator[Complaint]:
     """What is wrong with a design parameter and its bounds."""
     if name == "omega":
-        yield (keys[0],), "is a parameter of the system: omega varies anyway"
+        hint = suggest("", around.system.parameters)
+        yield (keys[0],), f"is the design parameter, beside omega: omega varies anyway{hint}"
         return
     unknown = list(tried(keys[0], lambda: check_parameter(around.system, name)))
     yield from unknown or tried(keys[1], lambda: check_bounds(around.system, name, bounds))
 
 
-_READ: dict[str, Callable[[Any], Any]] = {
-    "newton": as_newton,
-    "stepping": as_stepping,
-    "harmonics": as_harmonics,
-    "stability": as_stability,
-}
+class FindIsolas(DesignStep):
+    """`so.find_isolas`; `at` are values of the parameter at which the closed branches are followed and kept."""
+
+    kind: ClassVar[str] = "find_isolas"
+    gives_isolas: ClassVar[bool] = True
+
+    values: int | list[float] = 5
+    depth: int = Field(default=1, ge=0)
+    levels: list[float] | None = None
+    search: list[int] | None = None
+    seeds: dict[str, Any] | None = None
+    at: list[float] = Field(default_factory=list)
+
+    @field_validator("seeds")
+    @classmethod
+    def _read_seeds(cls, given: Any) -> Any:
+        as_seeds(given)
+        return given
+
+    @property
+    def plane(self) -> tuple[str, str] | None:
+        """See `Step.plane`."""
+        return "omega", self.parameter
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        """See `Step.check`."""
+        yield from super().check(around)
+        if isinstance(self.values, list) and not self.values:
+            yield ("values",), f"must be how many, or values of {self.parameter}, at least one"
+        yield from self._check_values(self.values)
+        yield from self._check_values(self.at, "at")
+        for i, order in enumerate(self.search or ()):
+            if order < 2:
+                yield ("search", i), f"is a period of at least 2 periods of the load, not {order}"
+        for i, level in enumerate(self.levels or ()):
+            if level <= 0.0:
+                yield ("levels", i), f"is a level of the loads in units of their own, positive, not {level:g}"
+            if level == 1.0:
+                yield ("levels", i), "is that of the loads themselves, at which responses are followed anyway"
+
+    def run(self, context: Context) -> Isolas:
+        """See `Step.run`."""
+        options = self.options(context) | {"values": self.values, "depth": self.depth}
+        for name in ("levels", "search"):
+            if getattr(self, name) is not None:
+                options[name] = tuple(getattr(self, name))
+        if self.seeds is not None:
+            options["seeds"] = as_seeds(self.seeds)
+        return self._with_branches(find_isolas(context.system, *self.ranges, **options), context.progress)
+
+    def _with_branches(self, isolas: Isolas, progress: Any) -> Isolas:
+        """The closed branches at the values asked for are followed; what fails is noted."""
+        notes = []
+        for isola in isolas:
+            for value in self.at:
+                if isolas.interrupted or value not in isola:
+                    continue
+                try:
+                    branch = isola.at(value, progress=progress)
+                except ConvergenceError as failure:
+                    notes.append(f"the closed branch at {self.parameter} = {value:g}: {failure}")
+                    continue
+                if branch.interruption is not None:
+                    missing = f"{branch.interruption}: the closed branches asked for are not all here"
+                    return isolas.noting([missing, *notes], branch.interruption)
+        for value in self.at:
+            if not any(value in isola for isola in isolas):
+                notes.append(f"no isola was found at {self.parameter} = {value:g}")
+        return isolas.noting(notes)
+
+
+class IsolaRegions(DesignStep):
+    """`so.find_isolas` over `parameter`, then `so.isola_map` over `second`, as a table (`IsolaMap.to_table`)."""
+
+    kind: ClassVar[str] = "isola_map"
+
+    second: str
+    second_bounds: Range
+    values: int | list[float] = 5
+    depth: int = Field(default=1, ge=0)
+    probes: int = Field(default=3, ge=0)
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        """See `Step.check`."""
+        yield from super().check(around)
+        wrong = list(check_design(self.second, self.second_bounds, ("second", "second_bounds"), around))
+        yield from wrong
+        if self.second == self.parameter:
+            yield ("second",), f"must be another parameter than {self.parameter}"
+        elif not wrong:
+            low, high = sorted(self.second_bounds)
+            here = around.system.parameters[self.second]
+            if not low <= here <= high:
+                yield ("second_bounds",), f"must hold the system's own {self.second} = {here:g}"
+        yield from self._check_values(self.values)
+
+    def run(self, context: Context) -> Table:
+        """See `Step.run`."""
+        options = self.options(context)
+        isolas = find_isolas(context.system, *self.ranges, values=self.values, depth=self.depth, **options)
+        if not isolas or isolas.interrupted:
+            title = "; ".join([isolas.summary, *(f"note: {note}" for note in isolas.notes if isolas.interrupted)])
+            return Table({}, title, stopped=isolas.interruption)
+        bounds = self.second_bounds[0], self.second_bounds[1]
+        regions = isola_map(isolas, self.second, bounds, probes=self.probes, progress=context.progress)
+        table = regions.to_table()
+        title = "; ".join([table.title, *(f"note: {note}" for note in regions.notes)])
+        return Table(table.columns, title, regions)
+
+
+class Regimes(DesignStep):
+    """`so.regime_map` as a table (`RegimeMap.to_table`); with `check` the title says what time integration found."""
+
+    kind: ClassVar[str] = "regime_map"
+
+    depth: int = Field(default=2, ge=0)
+    values: int = Field(default=5, ge=1)
+    resolution: float = Field(default=1e-4, gt=0.0, lt=0.5)
+    search: list[int] = Field(default_factory=list)
+    max_slices: int = Field(default=64, ge=1)
+    check_points: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0)
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        """See `Step.check`."""
+        yield from super().check(around)
+        for i, order in enumerate(self.search):
+            if order < 1:
+                yield ("search", i), f"is a period in periods of the load, at least 1, not {order}"
+
+    def run(self, context: Context) -> Table:
+        """See `Step.run`."""
+        regimes = regime_map(
+            context.system,
+            *self.ranges,
+            depth=self.depth,
+            values=self.values,
+            resolution=self.resolution,
+            search=tuple(self.search),
+            max_slices=self.max_slices,
+            **self.options(context),
+        )
+        table = regimes.to_table()
+        title = [table.title, *(f"note: {note}" for note in regimes.notes)]
+        if self.check_points and not regimes.interrupted:
+            checked = regimes.check(self.check_points, self.seed, progress=context.progress)
+            rate = 100.0 * checked.rate
+            title.insert(1, f"{rate:.1f} % of {len(checked.landings)} trajectories in time agree")
+        return Table(table.columns, "; ".join(title), regimes)

@@ -1,0 +1,185 @@
+"""Options of the verbs that follow curves: declared once, checked, and inherited from a bifurcation.
+
+`TypedDict`s declare them for the verbs (`suboctave.options`); `settings_of` checks them and gives the `Settings` that a
+curve is followed with; `options_of` is what a result keeps of these, and `Inherited` reads that again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Annotated, Any, TypeVar, cast
+
+import numpy as np
+
+from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.continuation import Event, NewtonOptions, SteppingOptions
+from suboctave.curves.discretisation import Harmonics
+from suboctave.curves.events.formulation import FORMULATIONS, Formulation, formulation_of, written
+from suboctave.curves.trace import Settings
+from suboctave.errors import InputError, is_number, shortened
+from suboctave.floquet import StabilityMethod, method_of
+from suboctave.floquet.methods import METHODS
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.model.system import System
+from suboctave.options import RunOptions
+
+__all__ = ["CurveOptions", "Inherited", "SearchOptions", "TrackOptions", "handed_on", "options_of", "settings_of"]
+
+
+class SearchOptions(RunOptions, total=False):
+    """Options of all verbs that follow curves, searches over a design parameter among them."""
+
+    max_step: Annotated[
+        float | None,
+        "Largest distance between neighbours in scaled arclength (short for `stepping=SteppingOptions(max_step=...)`).",
+    ]
+    observe: Annotated[int | None, "DOF whose amplitude is reported; default the first loaded one."]
+    newton: Annotated[NewtonOptions | None, "Tolerances and iterations of Newton's method."]
+    stepping: Annotated[SteppingOptions | None, "Step lengths, and the largest number of points."]
+    stability: Annotated[
+        StabilityMethod | str | None,
+        "How the multipliers of points and bifurcations are computed: `Monodromy()`, `Hill()`, `KoopmanHill()`, or "
+        'their names "monodromy", "hill", "koopman-hill". Default: the monodromy matrix, and where a verdict is open '
+        "the others as witnesses (`Arbitration()`). Where the method is not applicable the monodromy matrix stands in, "
+        "and the branch says so.",
+    ]
+
+
+class TrackOptions(SearchOptions, total=False):
+    """Options of verbs that locate bifurcations by a formulation of the user's choice."""
+
+    formulation: Annotated[
+        Formulation | str | None,
+        'By which system bifurcations are located: "bordered" (default), "extended", or "alcorta2019", the published '
+        "formulation of period doublings with its own test functions; or `BorderedSystem()`, `ExtendedSystem()`, "
+        '`Alcorta2019(test="multiplier")`, where test may be "determinant". All find the same bifurcations, the last '
+        "only those that its test shows: what it misses is in the branch's warnings.",
+    ]
+
+
+class CurveOptions(TrackOptions, total=False):
+    """Options of verbs that follow a branch of periodic motions."""
+
+    events: Annotated[Sequence[Event] | None, "User's events, located along the branch."]
+
+
+Options = TypeVar("Options", bound=SearchOptions)
+
+
+def handed_on(options: Options) -> Options:
+    """The options of a search that are those of each of its curves: all but progress and time limit."""
+    return cast("Options", {name: value for name, value in options.items() if name not in RunOptions.__annotations__})
+
+
+def settings_of(system: System, options: Mapping[str, Any]) -> Settings:
+    """The options of a verb, checked; raises InputError."""
+    stepping = _instance(options, "stepping", SteppingOptions)
+    max_step = options.get("max_step")
+    if max_step is not None:
+        if not (is_number(max_step) and max_step > 0.0):
+            raise InputError(f"max_step must be a positive number, not {shortened(max_step)}")
+        if max_step <= stepping.min_step:
+            raise InputError(f"max_step={max_step:g} is below the smallest step that is taken, {stepping.min_step:g}")
+        stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
+    given = options.get("observe")
+    dof = system.observed_dof if given is None else given
+    if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
+        raise InputError(f"observe={shortened(dof)} is out of range: the system has {system.n} DOFs, numbered from 0")
+    return Settings(
+        _instance(options, "newton", NewtonOptions),
+        stepping,
+        method_of(options.get("stability")),
+        _events(options.get("events")),
+        int(dof),
+        formulation_of(options.get("formulation")),
+    )
+
+
+def _events(given: Any) -> tuple[Event, ...]:
+    events = () if given is None else given
+    events = tuple(events) if isinstance(events, Iterable) and not isinstance(events, Event) else (events,)
+    for event in events:
+        if not isinstance(event, Event):
+            raise InputError(f"events must be Event objects, got {shortened(event)}")
+    if len({e.name for e in events}) < len(events):
+        raise InputError("two events have the same name")
+    for event in events:
+        if event.name in KINDS:
+            raise InputError(f"an event cannot be called {event.name!r}: that is the name of a kind of bifurcation")
+    return events
+
+
+Kind = TypeVar("Kind")
+
+
+def _instance(options: Mapping[str, Any], name: str, kind: type[Kind]) -> Kind:
+    given = options.get(name)
+    if given is not None and not isinstance(given, kind):
+        raise InputError(f"{name} must be a {kind.__name__}, not {type(given).__name__}")
+    return kind() if given is None else given
+
+
+# ------------------------------------------------------------------------------------------------ what a result keeps
+def options_of(settings: Settings, harmonics: Harmonics, bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    """How a branch was computed."""
+    method = settings.stability
+    return {
+        "bounds": dict(bounds),
+        "harmonics": asdict(harmonics) if isinstance(harmonics, AdaptiveHarmonics) else harmonics,
+        "newton": asdict(settings.newton),
+        "stepping": asdict(settings.stepping),
+        # by the name that gives it again, or in full
+        "stability": method.name if METHODS.get(method.name) == method else repr(method),
+        "formulation": written(settings.formulation),
+        "observe": settings.observe,
+    }
+
+
+class Inherited:
+    """How a bifurcation was computed: range, harmonics and options, as far as they are known."""
+
+    def __init__(self, item: Bifurcation) -> None:
+        self.item = item
+        self.known: Mapping[str, Any] = item.context or {}
+
+    def range(self, name: str) -> tuple[float, float] | None:
+        """The range of a free parameter, None where it is not known."""
+        known = self.known.get("bounds", {}).get(name)
+        return None if known is None else (known[0], known[1])
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """The range of a free parameter; InputError where it is not known."""
+        known = self.range(name)
+        if known is None:
+            raise InputError(f"this {self.item.kind} does not know its range: give bounds=(from, to) of {name}")
+        return known
+
+    @property
+    def observe(self) -> int | None:
+        """The DOF whose amplitude is reported, None where it is not known."""
+        return self.known.get("observe")
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """Rule or number, as the motion was computed."""
+        orbit = self.item.orbit
+        return orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
+
+    def under(self, options: CurveOptions) -> CurveOptions:
+        """Options that are given, and where they are not those of the bifurcation."""
+        given = {name: value for name, value in options.items() if value is not None}
+        inherited: dict[str, Any] = {"observe": self.observe}
+        for name, kind in (("newton", NewtonOptions), ("stepping", SteppingOptions)):
+            if name not in given and self.known.get(name) is not None:
+                inherited[name] = kind(**self.known[name])
+        for name, names in (("stability", METHODS), ("formulation", FORMULATIONS)):
+            if name not in given:
+                inherited[name] = self._by_name(name, names)
+        return cast("CurveOptions", inherited | given)
+
+    def _by_name(self, option: str, names: Container[str]) -> str | None:
+        known = self.known.get(option)
+        if known is None or known in names:
+            return known
+        raise InputError(f"this {self.item.kind} was found with {option}={known}, which has options: give it again")

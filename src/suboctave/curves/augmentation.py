@@ -1,0 +1,112 @@
+"""What singles a motion out among those of a system: scalar equations beside R = 0, and the unknowns they bring.
+
+An augmentation has one equation more than extra unknowns, so that two free parameters leave a curve; the empty one
+(`kinds.response`) leaves one with a single free parameter. Each kind of curve is a file in `kinds`.
+
+Bordering vectors are frozen within Newton's method, which then solves fixed smooth equations, and renewed at every
+accepted point, from where they are the null vectors themselves.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from suboctave.bifurcation.bordered import Bordered
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.perturbation import form_rates
+
+
+class Equations(ABC):
+    """The scalar equations at one motion, dimensionless."""
+
+    state: BalanceState
+    #: what is added to R, shape (dimension,), and its derivative by the extra unknown; None for nothing
+    addition: Array | None = None
+    column: Array | None = None
+
+    @property
+    def own(self) -> Equations:
+        """Those of the bifurcation alone, without that of an extremum."""
+        return self
+
+    @property
+    @abstractmethod
+    def values(self) -> Array:
+        """Values, shape (q + 1,), q the number of extra unknowns."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> Array:
+        """Derivatives by coefficients, extra unknowns and the free parameters, shape (q + 1, dimension + q + 2)."""
+
+    @abstractmethod
+    def renewed(self) -> Augmentation:
+        """The augmentation with bordering vectors of this motion."""
+
+    def takes_over(self, other: Equations) -> bool:
+        """Whether these keep the derivatives of the same equations at a motion that is a rounding away."""
+        return False
+
+
+class Augmentation(ABC):
+    """Which scalar equations; fixed within a step."""
+
+    #: the parameter that has an extremum along curves of these bifurcations (`extremum`), empty where none need have
+    turning: str = ""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Kind of bifurcation."""
+
+    @property
+    def extras(self) -> int:
+        """Number of extra unknowns."""
+        return 0
+
+    @property
+    def own(self) -> Augmentation:
+        """That of the bifurcation alone, without the equation of an extremum."""
+        return self
+
+    @abstractmethod
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> Equations:
+        """Evaluate at a motion, values of the extra unknowns, and the names of the free parameters."""
+
+    def multiplier(self, rate: float, extra: Array) -> complex | None:
+        """The multiplier that lies on the unit circle at a solution, None if none need; rate: the base frequency."""
+        return None
+
+    def spans(self, rate: float) -> Array:
+        """Natural sizes of the extra unknowns, shape (q,); rate: the base frequency."""
+        return np.ones(self.extras)
+
+    def resized(self, basis: HarmonicBasis, size: int) -> Augmentation:
+        """The same in a basis with other harmonics."""
+        return self
+
+    def shifted(self, extra: Array, angle: float) -> Array:
+        """Extra unknowns of the motion shifted in time, `x(tau + angle)`."""
+        return extra
+
+    def unwrapped(self, extra: Array, near: Array) -> Array:
+        """Extra unknowns, periodic ones moved by whole periods next to others."""
+        return extra
+
+    def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
+        """Extra unknowns in a basis with other harmonics."""
+        return extra
+
+
+def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
+    """The gradient of g, the parameters' part apart: most of it is the same whatever the parameters are."""
+    named = tuple(name for name in names if name != "omega")
+    rates = form_rates(b.state, b.kind, b.left, b.right, named, b.kappa)
+    by_x, plain, by_kappa = b.gradient(("omega",))
+    return by_x, plain | {name: -rate for name, rate in rates.items()}, by_kappa
+
+
+__all__ = ["Augmentation", "Equations", "gradient_of"]

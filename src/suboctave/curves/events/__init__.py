@@ -1,0 +1,1 @@
+"""Events along curves: how bifurcations and grazings are noticed between neighbours, and located."""

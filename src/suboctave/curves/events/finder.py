@@ -1,0 +1,178 @@
+"""From a change of a test function between two neighbours to a located bifurcation.
+
+First the bordered system from an interpolated start; where it does not converge into the step, the step is bisected
+on the test function and the solver tries again from a nearer point. If it never converges (at a grazing contact the
+equations are not smooth enough), the bracket of the test's change is all that is known: what it means is for others to
+say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.point import CurvePoint, between, point_between
+from suboctave.continuation.problem import Array
+from suboctave.curves.events.locate import Guess, Singular
+from suboctave.curves.events.monitors import BifurcationKind, Sample
+from suboctave.errors import ConvergenceError
+
+#: fractions of a step by which rounding may carry a solution beyond its ends
+_SLACK = 1e-7
+#: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics
+_BEFORE = 1e-2
+#: corrections of a place on a step, at most, and one that settles it, as a share of the step
+_ROUNDS, _SETTLED = 20, 1e-12
+
+
+@dataclass(frozen=True)
+class Located:
+    """A bifurcation between two neighbours: solved (`solution`), or only the change of its test bracketed (`bracket`,
+    its second end `sample`, with its width).
+    """
+
+    kind: BifurcationKind
+    fraction: float
+    sample: Sample
+    solution: Singular | None
+    width: float
+    bracket: tuple[Sample, Sample] | None = None
+
+
+def locate(
+    kind: BifurcationKind,
+    a: Sample,
+    b: Sample,
+    newton: NewtonOptions,
+    make_sample: Callable[[CurvePoint], Sample],
+    make_guess: Callable[[Array, CurvePoint, float], Guess],
+    bisections: int = 34,
+    begins: bool = False,
+) -> Located | None:
+    """Locate a bifurcation of a kind whose test changed between two neighbours.
+
+    Parameters
+    ----------
+    make_sample
+        Turns a solved curve point into a sample.
+    make_guess
+        Turns a vector u in the discretisation of a curve point, and kappa, into a start of the bordered system.
+    bisections
+        Halvings after which the bracket is taken for the answer.
+    begins
+        Whether the curve begins with the first neighbour: what lies right before it then belongs to no other step.
+
+    Returns
+    -------
+    None if the change of the test turns out to be no bifurcation of this kind.
+    """
+    low, high = 0.0, 1.0
+    at_low, at_high = a, b
+    for depth in range(bisections):
+        share = kind.fraction(at_low, at_high)
+        nearer = at_low if share < 0.5 else at_high
+        if depth % 3 == 0:
+            # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
+            found = _try(kind, at_low, at_high, share, nearer, make_guess)
+            # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
+            # here
+            if found is not None:
+                place = low + found[1] * (high - low)
+                if -(_BEFORE if begins else _SLACK) <= place <= 1.0 + _SLACK:
+                    return Located(kind, min(1.0, max(place, 0.0)), nearer, found[0], 0.0)
+        middle = None
+        for part in (0.5, 0.4, 0.65):
+            try:
+                at = low + part * (high - low)
+                middle = make_sample(point_between(a.point, b.point, at, newton, exactly=True))
+                break
+            except ConvergenceError:
+                continue
+        if middle is None:
+            break
+        if kind.changed(at_low, middle):
+            high, at_high = at, middle
+        elif kind.changed(middle, at_high):
+            low, at_low = at, middle
+        else:
+            return None
+    names = abs(at_high.point.parameter - at_low.point.parameter)
+    return Located(kind, 0.5 * (low + high), at_high, None, 0.5 * names, (at_low, at_high))
+
+
+def _try(
+    kind: BifurcationKind,
+    low: Sample,
+    high: Sample,
+    share: float,
+    nearer: Sample,
+    make_guess: Callable[[Array, CurvePoint, float], Guess],
+) -> tuple[Singular, float] | None:
+    """A solution between two samples and where, from a start at a share of the way; None if there is none."""
+    try:
+        guess = make_guess(between(low.point, high.point, share), high.point, kind.kappa(nearer))
+        found = kind.solve(guess)
+    except ConvergenceError:
+        return None
+    if not kind.genuine(found, guess):
+        return None
+    fraction = position(low.point, high.point, _unknowns(found, guess))
+    if fraction is None or not -0.05 <= fraction <= 1.05:
+        return None
+    return found, fraction
+
+
+def locate_near(
+    kind: BifurcationKind,
+    sample: Sample,
+    reach: float,
+    make_guess: Callable[[Array, CurvePoint, float], Guess],
+) -> Located | None:
+    """A bifurcation within `reach` (scaled arclength) of a sample, on its curve: for tests that change in one place
+    because the discretisation does.
+    """
+    point = sample.point
+    try:
+        guess = make_guess(point.u, point, kind.kappa(sample))
+        found = kind.solve(guess)
+    except ConvergenceError:
+        return None
+    if not kind.genuine(found, guess):
+        return None
+    way = point.weights * (_unknowns(found, guess) - point.u)
+    along = point.weights * point.tangent
+    ahead = float(way @ along) / length(along)
+    aside = math.sqrt(max(0.0, float(way @ way) - ahead**2))
+    if abs(ahead) > reach or aside > 0.1 * abs(ahead) + 1e-7:
+        return None
+    return Located(kind, 0.0, sample, found, 0.0)
+
+
+def _unknowns(found: Singular, guess: Guess) -> Array:
+    value = found.state.omega if guess.name == "omega" else found.state.values[guess.name]
+    return np.append(found.state.unknowns, value)
+
+
+def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
+    """Where between two neighbours a point u (in the discretisation of b) lies on the curve, or None if it lies
+    elsewhere.
+    """
+    ua = b.curve.transfer(a.u, a.curve)
+    chord = b.weights * (b.u - ua)
+    size = length(chord)
+    if size == 0.0:
+        return None
+    fraction = float((b.weights * (u - ua)) @ chord) / size**2
+    for _ in range(_ROUNDS):
+        # the interpolating cubic runs at uneven speed along the chord
+        rest = float((b.weights * (u - between(a, b, fraction))) @ chord) / size**2
+        fraction += rest
+        if abs(rest) < _SETTLED:
+            break
+    away = length(b.weights * (u - between(a, b, min(1.0, max(0.0, fraction)))))
+    return fraction if away <= 0.1 * size + 1e-7 else None

@@ -1,0 +1,255 @@
+"""Whether a bifurcation lies in the layer behind a grazing, where a contact is too young to be smooth.
+
+Behind a grazing at s = 0 (s: way along the curve) the force of the young contact changes R_X, and with it every test
+function g, like the square root of s:
+
+    g(s) = g_0 + c sqrt(s) + O(s).
+
+Where that term carries g through zero, the bifurcation is one of the non-smooth system: it owes its place to the
+contact that begins, and the critical multiplier crosses the circle in a sliver of the parameter. Newton's method for
+such a g, `s <- 2 sqrt(s s_0) - s` with s_0 the zero, converges from every start between the grazing and 4 s_0 and
+leaves the layer from any other: so it begins right behind the grazing (`behind_grazing`). The layer ends where the stop
+turns the motion by itself: half the duration t of the contact is no longer small beside the stop's own time, `t
+sqrt(k/m) = 1`, k its stiffness and m the mass that it meets.
+
+With elastic stops the multipliers are continuous all the same: the force is continuous at a gap, so that no saltation
+matrix stands between contact and flight (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+Springer 2004). They jump in the limit of a rigid stop only. A layer thinner than the engine's smallest step is a jump
+to whoever follows the curve, and called so (`Bifurcation.discontinuous`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.bordered import at_values, bordered, residual_scale
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import gap_extrema
+from suboctave.continuation.linear import Factor
+from suboctave.continuation.newton import correct
+from suboctave.curves.events.grazings import Grazing, Touch
+from suboctave.curves.events.locate import NEWTON, Guess, Singular
+from suboctave.curves.events.monitors import BifurcationKind
+from suboctave.curves.motion import MotionEvaluation
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.truncation import motion_size
+from suboctave.model.elements.smoothness import PiecewiseLinear
+
+#: exponent of the test function's path from the grazing below which it counts as a square root (1/2; smooth: 1)
+_SQUARE_ROOT = 0.75
+#: largest force of a young contact, in units of the inertia force that turns the motion at the gap: (t sqrt(k/m))^2 / 2
+_YOUNG = 0.05
+#: excursion across the gap, in units of the motion, up to which grazings are looked for
+_NEAR = 0.05
+#: way from a grazing to a bifurcation that is started from there, in scaled arclength, at most
+_REACH = 0.01
+#: the same for one that is bracketed only
+_BRACKETED = 1e-3
+#: ways behind the grazing at which Newton's method starts
+_STARTS = (1e-10, 1e-8, 1e-6, 1e-4)
+
+
+def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingContact | None:
+    """The grazing in whose layer a located bifurcation lies, None for a smooth one; `guess`: its start."""
+    if found.vectors is None:
+        return None
+    best: GrazingContact | None = None
+    for touch, grazing, distance in _grazings_near(found.state, guess, young=True):
+        if best is not None and distance >= best.distance:
+            continue
+        if _exponent(kind, found, grazing, guess) < _SQUARE_ROOT:
+            best = replace(touch.contact(grazing, guess.name), change="", distance=distance)
+    return best
+
+
+def grazing_beside(guess: Guess) -> GrazingContact | None:
+    """The grazing at a motion where a bifurcation could only be bracketed, if there is one that near."""
+    near = _beside(guess, _BRACKETED)
+    if not near:
+        return None
+    touch, grazing, distance = near[0]
+    return replace(touch.contact(grazing, guess.name), change="", distance=distance)
+
+
+def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
+    """A bifurcation in the layer behind a grazing near the guess, started from that grazing; None if there is none."""
+    for touch, grazing, _ in _beside(guess, _REACH):
+        for start in _starts(touch, grazing, guess):
+            try:
+                found = kind.solve(start)
+            except ConvergenceError:
+                continue
+            way = float(np.linalg.norm(_chord(grazing.state, found.state, guess)))
+            if kind.genuine(found, start) and way <= _REACH:
+                return found
+    return None
+
+
+def solve_or_behind(kind: BifurcationKind, guess: Guess) -> Singular:
+    """Solve from a guess, or from the grazing beside it where Newton's method fails; raises ConvergenceError."""
+    try:
+        return kind.solve(guess)
+    except ConvergenceError:
+        found = behind_grazing(kind, guess)
+        if found is None:
+            raise
+        return found
+
+
+def unresolved(
+    kind: BifurcationKind, guess: Guess, contact: GrazingContact, coarser: tuple[int, float] | None = None
+) -> float:
+    """What the neglected harmonics may do to the place of a bifurcation behind a grazing, in the free parameter.
+
+    A short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H: the place with fewer
+    harmonics tells it. A bifurcation that is not found with two thirds of them is known up to the thickness of the
+    layer. `coarser`: a number of harmonics with which it was found before, and where.
+    """
+    basis = guess.balance.basis
+    if coarser is not None and 0.5 * basis.harmonics <= coarser[0] <= 0.75 * basis.harmonics:
+        fewer, value = coarser
+    else:
+        other = HarmonicBasis(2 * basis.harmonics // 3, basis.nu)
+        fewer, x = other.harmonics, basis.resized(guess.x, other)
+        balance = guess.balance.with_basis(other).settle(x, guess.omega, guess.values)
+        try:
+            state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
+        except ConvergenceError:
+            return abs(guess.parameter - contact.parameter)
+        value = state.omega if guess.name == "omega" else state.values[guess.name]
+    return abs(value - guess.parameter) / (basis.harmonics / fewer - 1.0)
+
+
+def behind_their_grazings(found: list[tuple[float, Bifurcation]]) -> list[Bifurcation]:
+    """What was located in a step, each with its place on the way from 0 to 1, in the order met.
+
+    Where a bifurcation and the grazing that brings it about lie too close to tell, the contact tells the side.
+    """
+    result = []
+    for place, item in found:
+        fraction, contact = place, item.contact
+        grazings = [
+            (at, other, other.contact)
+            for at, other in found
+            if contact is not None and item.kind not in CONTACT_KINDS and other.kind in CONTACT_KINDS
+            if other.contact is not None and other.contact.element == contact.element and abs(at - place) < 0.1
+        ]
+        if grazings:
+            at, grazing, its = min(grazings, key=lambda entry: abs(entry[0] - place))
+            # the contact exists after it begins and before it ceases
+            side = 1.0 if its.change.startswith("begins") else -1.0
+            if (place - at) * side <= 0.0:
+                fraction, item = at + side * 1e-12, replace(item, arclength=grazing.arclength)
+        result.append((fraction, item))
+    return [item for _, item in sorted(result, key=lambda pair: pair[0])]
+
+
+def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
+    """Grazings up to some way off, the nearest first."""
+    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= limit]
+    return sorted(near, key=lambda item: item[2])
+
+
+def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
+    """Points along the curve's tangent at a grazing, on the side on which the contact is young."""
+    state = grazing.state
+    weights = _weights(state, guess)
+    dimension = state.balance.dimension
+    rows = residual_scale(state) / max(state.force_scale(), np.finfo(float).tiny)
+    matrix = np.zeros((dimension + 1, dimension + 1), order="F")
+    matrix[:-1, :-1] = state.jacobian * rows[:, None] / weights[:-1]
+    matrix[:-1, -1] = state.residual_by(guess.name) * rows / weights[-1]
+    rise = touch.rise(grazing, guess.name) / weights
+    matrix[-1] = rise / np.linalg.norm(rise)
+    factor = Factor.of(matrix, overwrite=True)
+    if factor.singular:
+        return
+    # along it the extremum rises through the gap at a rate of one: an excursion is a maximum above, a minimum below
+    unit = np.zeros(dimension + 1)
+    unit[-1] = 1.0
+    tangent = factor.solve(unit)
+    tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
+    for way in _STARTS:
+        u = _vector(state, guess) + way * tangent / weights
+        omega, values = at_values(state.values, guess.name, float(u[-1]), state.omega)
+        yield replace(guess, balance=state.balance, x=state.balance.shaped(u[:-1]), omega=omega, values=values)
+
+
+def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
+    """Grazings of exact contacts beside a motion, with the way there; `young`: only of contacts that are, and young."""
+    mass = state.linear.equation_of_motion()[0]
+    for gap in gap_extrema(state):
+        local = state.local(gap.element)
+        kind = local.kind
+        if not isinstance(kind, PiecewiseLinear):
+            continue
+        direction = state.linear.retain(local.element.direction(state.balance.system.n))
+        expanded = state.linear.expand(direction)
+        mobility = float(expanded @ np.linalg.solve(mass, expanded))
+        stiffness = abs(float(local.coefficients[kind.pieces[gap.index].stiffness]))
+        size = float(np.abs(gap.value).max(initial=0.0))
+        for tau, value, curve in zip(gap.tau, gap.value, gap.curve, strict=True):
+            beyond = value - gap.level
+            if curve == 0.0 or abs(beyond) > _NEAR * size:
+                continue
+            force = stiffness * mobility * abs(beyond / curve) / state.rate**2
+            if young and (beyond * curve > 0.0 or force > _YOUNG):
+                continue
+            touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
+            try:
+                here = replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values)
+                grazing = touch.solve(here, state)
+            except ConvergenceError:
+                continue
+            yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, state, guess)))
+
+
+def _weights(state: BalanceState, guess: Guess) -> Array:
+    """Scaled arclength: coefficients in units of the motion, the free parameter in units of its range."""
+    weight = state.balance.column_weights
+    return np.append(weight / max(motion_size(state), np.finfo(float).tiny), 1.0 / guess.span)
+
+
+def _vector(state: BalanceState, guess: Guess) -> Array:
+    return np.append(state.unknowns, state.omega if guess.name == "omega" else state.values[guess.name])
+
+
+def _chord(a: BalanceState, b: BalanceState, guess: Guess) -> Array:
+    """From one motion to another, scaled."""
+    return _weights(b, guess) * (_vector(b, guess) - _vector(a, guess))
+
+
+def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: Guess) -> float:
+    """Exponent p of `|g - g_0| ~ s^p` between the grazing and the bifurcation, from a point at a quarter of the way."""
+    assert found.vectors is not None
+    chord = _chord(grazing.state, found.state, guess)
+    length = float(np.linalg.norm(chord))
+    if length < 1e-9:
+        return 0.5
+    weights = _weights(found.state, guess)
+    start = 0.75 * _vector(grazing.state, guess) + 0.25 * _vector(found.state, guess)
+
+    state = found.state
+    omega, values = at_values(state.values, guess.name, float(start[-1]), state.omega)
+    begin = replace(guess, balance=state.balance, x=state.balance.shaped(start[:-1]), omega=omega, values=values)
+    try:
+        problem = begin.problem()
+        scale = problem.weights(start, 0.0)
+        row = weights * chord / scale
+        solved = correct(problem, start, row / float(np.linalg.norm(row)), scale, NEWTON).evaluation
+    except ConvergenceError:
+        return 0.5
+    assert isinstance(solved, MotionEvaluation)
+    # at the bifurcation itself g vanishes
+    g = [bordered(s, kind.operator, found.vectors, found.kappa).g for s in (grazing.state, solved.state)]
+    near, far = abs(g[1] - g[0]), abs(g[0])
+    if near == 0.0 or far == 0.0:
+        return 1.0
+    return math.log(far / near) / math.log(4.0)

@@ -1,0 +1,171 @@
+"""A bifurcation located: the equations of its curve in two parameters, of which one is held.
+
+As many equations as unknowns are left, which `continuation.newton` solves from a guess, with the bordering vectors of
+the guess's neighbourhood. Unknowns are weighted as along curves, so that convergence means the same in any units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.bifurcation.bordered import NullVectors, null_vectors
+from suboctave.continuation import kernels
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
+from suboctave.curves.kinds.response import PLAIN
+from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.errors import ConvergenceError
+from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.perturbation import Kind
+from suboctave.lazy import lazy
+
+#: corrections of half a motion or half a range at most, the last one of 1e-9 of them
+NEWTON = NewtonOptions(tolerance=1e-10, correction=1e-9, iterations=12, longest=0.5, rounding=True)
+#: unfolding, in units of the forces that balance, above which a located point is no branch point: a hundred times what
+#: rounding makes of a branch point that a symmetry forces. One of beta parts the branches of a pitchfork by beta^(1/3)
+_UNFOLDING = 1e-13
+#: corrections, at most, made after convergence
+_POLISHED = 3
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter,
+    kappa; null vectors of the operator nearby, where they are known (with any number of harmonics); size of the motions
+    in the neighbourhood, where it may pass rest.
+    """
+
+    balance: HarmonicBalance
+    x: Array
+    omega: float
+    values: Mapping[str, float]
+    name: str
+    span: float
+    kappa: float = 0.0
+    vectors: NullVectors | None = None
+    size: float = 0.0
+
+    def state(self) -> BalanceState:
+        """The equations at the guess."""
+        return self.balance.at(self.x, self.omega, self.values)
+
+    @property
+    def parameter(self) -> float:
+        """Value of the free parameter."""
+        return self.omega if self.name == "omega" else self.values[self.name]
+
+    def problem(self, augmentation: Augmentation = PLAIN, force: float = 0.0) -> MotionProblem:
+        """The motions in the free parameter that an augmentation singles out; force: unit of its equations."""
+        own = self.balance.values
+        return MotionProblem(
+            self.balance,
+            (self.name,),
+            (self.span,),
+            self.omega,
+            augmentation=augmentation,
+            reference=self.size,
+            force=force or self.omega**2,
+            held={} if self.values is own else {n: v for n, v in self.values.items() if v != own[n]},
+        )
+
+
+@dataclass(frozen=True)
+class Singular:
+    """A located motion: state, null vectors of its singular operator (None if it has none), kappa, and the
+    dimensionless residual of the whole system.
+    """
+
+    state: BalanceState
+    vectors: NullVectors | None
+    kappa: float
+    residual: float
+    iterations: int
+
+    @property
+    def balance_residual(self) -> float:
+        """Residual of the equations of motion alone, in units of the forces that balance."""
+        return min(self.residual, self.state.residual_size() / max(self.state.force_scale(), _TINY))
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Its multipliers."""
+        return floquet_multipliers(self.state)
+
+
+def solve(guess: Guess, begin: BalanceState, augmentation: Augmentation, extra: Array) -> tuple[MotionEvaluation, int]:
+    """Solve the equations of an augmentation in (X, extra, the guess's free parameter); begin: the equations there.
+
+    Returns
+    -------
+    The equations at the solution, and the number of corrections.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not converge from the guess.
+    """
+    problem = guess.problem(augmentation, begin.force_scale())
+    u = problem.join(guess.x, guess.parameter, extra)
+    solved = correct(problem, u, None, problem.weights(u, 0.0), NEWTON)
+    evaluation = solved.evaluation
+    # of corrections beyond what was asked for, which move the last digits, the least residual is taken
+    u, further = solved.u, evaluation
+    for _ in range(_POLISHED):
+        step = solved.factor.solve(further.residual)
+        if not np.isfinite(step).all():
+            break
+        u, _size = kernels.moved(u, step, solved.weights, 1.0)
+        further = problem.evaluate(u)
+        if further.error < evaluation.error:
+            evaluation = further
+    assert isinstance(evaluation, MotionEvaluation)
+    return evaluation, solved.iterations
+
+
+def locate_singular(guess: Guess, kind: Kind) -> Singular:
+    """Locate a motion at which J_kappa is singular, kappa = 0, w0/2, or free (starting from `guess.kappa`).
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method does not converge from the guess.
+    """
+    begin = guess.state()
+    extra = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(0)
+    vectors = guess.vectors
+    if vectors is None:
+        vectors = null_vectors(begin, kind, guess.kappa)
+    else:
+        vectors = vectors.resized(guess.balance.basis, guess.balance.size, kind)
+    found, iterations = solve(guess, begin, SingularOperator(kind, vectors, guess.omega**2), extra)
+    equations = found.equations
+    assert isinstance(equations, SingularEquations)
+    return Singular(found.state, equations.bordered.vectors, equations.kappa, found.error, iterations)
+
+
+def locate_branch_point(guess: Guess) -> Singular:
+    """Locate a branch point in the free parameter.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method fails, or converges to a point whose unfolding is not zero: an imperfect (broken) branch
+        point.
+    """
+    begin = guess.state()
+    found, iterations = solve(guess, begin, BranchPointUnfolded.of(begin, guess.name), np.zeros(1))
+    equations = found.equations
+    assert isinstance(equations, BranchPointEquations)
+    if abs(equations.beta) > _UNFOLDING:
+        raise ConvergenceError(
+            f"no branch point: its unfolding is {equations.beta:.1e} (a broken symmetry leaves a ghost here)"
+        )
+    return Singular(found.state, equations.bordered.vectors, 0.0, found.error, iterations)

@@ -1,0 +1,297 @@
+"""What each kind of bifurcation is: its test function, where to start, and the system that locates it.
+
+A new kind is one class here (or in a file of its own) with four answers: how often it may have happened between two
+neighbours, where in between, how to solve for it, and whether a solution is one.
+
+- LP: the component of the tangent along the free parameter changes sign;
+- BP: the bordered determinant `det [R_X R_omega; t]` changes sign, the branch going straight on;
+- PD: det J_half changes sign;
+- NS: the number of multipliers outside the unit circle changes by pairs that no LP, BP or PD accounts for. Two real
+  multipliers with product one (a neutral saddle) never cross the circle and are not counted.
+"""
+
+from __future__ import annotations
+
+import cmath
+import weakref
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from suboctave.bifurcation import measures
+from suboctave.bifurcation.bordered import null_vectors, transversality
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
+from suboctave.continuation.point import CurvePoint
+from suboctave.curves.events.formulation import BORDERED, Formulation
+from suboctave.curves.events.locate import Guess, Singular, locate_branch_point
+from suboctave.errors import ConvergenceError
+from suboctave.floquet import FloquetResult, Monodromy, StabilityMethod
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.perturbation import Kind
+from suboctave.lazy import lazy
+
+_MONODROMY = Monodromy()
+#: transversality of a limit point, at least. Newton's method leaves one located on a branch point by mistake within
+#: 1e-9 of it, where it is as much; at a peak it is the damping ratio
+_TRANSVERSAL = 1e-7
+
+
+class Sample:
+    """A point of a response curve with what the tests ask of it; `place` is its arclength."""
+
+    def __init__(self, point: CurvePoint, state: BalanceState, method: StabilityMethod = _MONODROMY) -> None:
+        self.point = point
+        self.state = state
+        self.method = method
+        self.place = point.arclength
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Multipliers and their errors."""
+        return self.method.along(self.state)
+
+    @lazy
+    def verdict(self) -> FloquetResult:
+        """Multipliers whose errors cover what det J_0 and det J_half say of them."""
+        if self.at_rest:
+            return self.floquet
+        return measures.in_doubt(self.floquet, self.point.orientation * self.slope, self.half_sign)
+
+    @lazy
+    def at_rest(self) -> bool:
+        """Whether the motion counts as rest, where its curve can tell."""
+        return bool(getattr(self.point.evaluation, "at_rest", False))
+
+    @lazy
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle, real ones on the side on which det J_0 and det J_half have
+        them: the count and the tests of LP, BP and PD then change together.
+        """
+        count = self.floquet.unstable
+        if not self.at_rest:
+            for which, _ in measures.contradicted(self.floquet, self.point.orientation * self.slope, self.half_sign):
+                count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
+        return count
+
+    @lazy
+    def signs(self) -> tuple[bool, bool, bool]:
+        """What the tests of BP, LP and PD look at."""
+        return self.point.orientation > 0.0, self.slope > 0.0, self.half_sign > 0.0
+
+    @lazy
+    def half_sign(self) -> float:
+        """Sign of det J_half."""
+        return measures.half_sign(self.state)
+
+    @lazy
+    def gaps(self) -> tuple[GapExtrema, ...]:
+        """The elements' gaps with the extrema of the motion there."""
+        return gap_extrema(self.state)
+
+    @lazy
+    def slope(self) -> float:
+        """Component of the tangent along the free parameter."""
+        return float(self.point.tangent[self.point.curve.parameter])
+
+    @lazy
+    def measures(self) -> Array:
+        """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
+        point = self.point
+        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet.multipliers)
+
+
+class BifurcationKind(ABC):
+    """One kind of bifurcation of periodic motions, and the formulation by which it is solved for."""
+
+    name: str
+    operator: Kind
+    formulation: Formulation = BORDERED
+
+    def __init__(self, formulation: Formulation = BORDERED) -> None:
+        self.formulation = formulation
+
+    @abstractmethod
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """True if the test function differs in sign between two neighbours."""
+
+    @abstractmethod
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """A guess of where in between, 0 at a and 1 at b."""
+
+    def kappa(self, sample: Sample) -> float:
+        """Start for the frequency of the perturbation."""
+        return 0.0
+
+    def solve(self, guess: Guess) -> Singular:
+        """Solve the bifurcation's system from a guess."""
+        return self.formulation.locate(guess, self.operator)
+
+    def genuine(self, found: Singular, guess: Guess) -> bool:
+        """Whether a solution of the system really is of this kind."""
+        return True
+
+    def critical(self, found: Singular) -> complex | None:
+        """The multiplier that lies on the unit circle at a solution, None if none need."""
+        return {Kind.INTEGER: 1.0 + 0.0j, Kind.HALF: -1.0 + 0.0j}[self.operator]
+
+    def contact(self, found: Singular, name: str) -> GrazingContact | None:
+        """The contact that grazes at a solution, where the kind is that; `name` is the free parameter's."""
+        return None
+
+
+class LimitPoint(BifurcationKind):
+    """LP: the branch turns back in its free parameter; a multiplier is +1."""
+
+    name = "LP"
+    operator = Kind.INTEGER
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """See `BifurcationKind.changed`."""
+        return (a.slope > 0.0) != (b.slope > 0.0)
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        return _zero(a.slope, b.slope)
+
+    def genuine(self, found: Singular, guess: Guess) -> bool:
+        """At a branch point R_X is singular, too, but R_p lies in its range."""
+        vectors = found.vectors or null_vectors(found.state, Kind.INTEGER)
+        return transversality(found.state, vectors, guess.name) > _TRANSVERSAL
+
+
+class BranchPoint(BifurcationKind):
+    """BP: two branches cross; a multiplier is +1."""
+
+    name = "BP"
+    operator = Kind.INTEGER
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """See `BifurcationKind.changed`."""
+        return (a.point.orientation > 0.0) != (b.point.orientation > 0.0)
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        return _zero(_nearest(a, 1.0), _nearest(b, 1.0))
+
+    def solve(self, guess: Guess) -> Singular:
+        """See `BifurcationKind.solve`."""
+        return locate_branch_point(guess)
+
+
+class PeriodDoubling(BifurcationKind):
+    """PD: motions of twice the period branch off; a multiplier is -1."""
+
+    name = "PD"
+    operator = Kind.HALF
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """See `BifurcationKind.changed`."""
+        return (a.half_sign > 0.0) != (b.half_sign > 0.0)
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        return _zero(_nearest(a, -1.0), _nearest(b, -1.0))
+
+
+class NeimarkSacker(BifurcationKind):
+    """NS: a torus branches off; a complex pair of multipliers crosses the unit circle."""
+
+    name = "NS"
+    operator = Kind.FREE
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        """Count of unstable multipliers changed by more than LP, BP and PD account for."""
+        return any(kind.name == "NS" for kind in changes(a, b))
+
+    def beyond(self, a: Sample, b: Sample, accounted: int) -> bool:
+        """Whether a pair crosses the circle, `accounted` changes of the count being explained by others."""
+        return abs(a.unstable - b.unstable) >= accounted + 2 and self._pair(a, b) is not None
+
+    @staticmethod
+    def _pair(a: Sample, b: Sample) -> tuple[complex, complex] | None:
+        """The complex pair of multipliers that crosses: its members at a and b."""
+        outside, inside = (a, b) if a.unstable > b.unstable else (b, a)
+        candidates = [mu for mu in outside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) > 1.0]
+        partners = [mu for mu in inside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) <= 1.0]
+        if not (candidates and partners):
+            return None
+        out, partner = min(((m, p) for m in candidates for p in partners), key=lambda pair: abs(pair[0] - pair[1]))
+        with np.errstate(divide="ignore"):
+            products = [float(np.log(np.abs(sample.floquet.multipliers)).sum()) for sample in (a, b)]
+        if max(map(abs, products)) < measures.UNDAMPED:
+            # pairs stay on the circle and rounding alone carries them across; one point alone may lie where a pair does
+            return None
+        return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        """See `BifurcationKind.fraction`."""
+        pair = self._pair(a, b)
+        return 0.5 if pair is None else _zero(abs(pair[0]) - 1.0, abs(pair[1]) - 1.0)
+
+    def kappa(self, sample: Sample) -> float:
+        """From the complex multiplier closest to the unit circle: `mu = exp(i kappa T)`."""
+        pairs = [mu for mu in sample.floquet.multipliers if mu.imag > 1e-9 * abs(mu)]
+        if not pairs:
+            raise ConvergenceError("no complex pair of multipliers here")
+        mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
+        return float(np.angle(mu)) * sample.state.rate / (2.0 * np.pi)
+
+    def genuine(self, found: Singular, guess: Guess) -> bool:
+        """At kappa = 0 or w0/2 every LP and PD solves the system as well: those are none."""
+        share = found.kappa / found.state.rate
+        return 1e-3 < share < 0.5 - 1e-3
+
+    def critical(self, found: Singular) -> complex:
+        """`exp(i kappa T)`."""
+        return cmath.exp(2j * cmath.pi * found.kappa / found.state.rate)
+
+
+BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER = (
+    BranchPoint(),
+    LimitPoint(),
+    PeriodDoubling(),
+    NeimarkSacker(),
+)
+#: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork
+ALL_KINDS: tuple[BifurcationKind, ...] = (BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER)
+
+
+def solved_by(formulation: Formulation) -> dict[str, BifurcationKind]:
+    """The kinds by name, to be solved for by a formulation; a branch point is always solved for in the same way."""
+    if formulation == BORDERED:
+        return {kind.name: kind for kind in ALL_KINDS}
+    kinds = (BRANCH_POINT, LimitPoint(formulation), PeriodDoubling(formulation), NeimarkSacker(formulation))
+    return {kind.name: kind for kind in kinds}
+
+
+def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
+    """The kinds whose tests have changed between two neighbours, in the order in which they are looked for."""
+    if a.signs == b.signs and abs(a.unstable - b.unstable) < 2:
+        return ()
+    # several ask this of the same two
+    known = b.__dict__.get("_changes")
+    if known is not None and known[0]() is a:
+        return known[1]
+    found: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
+    # one multiplier passes +1 at a limit point or a branch point, or at both in one
+    accounted = len(found) - (len(found) > 1 and found[1] is LIMIT_POINT)
+    if NEIMARK_SACKER.beyond(a, b, accounted):
+        found.append(NEIMARK_SACKER)
+    result = b.__dict__["_changes"] = (weakref.ref(a), tuple(found))
+    return result[1]
+
+
+def _zero(a: float, b: float) -> float:
+    """Zero of the line through (0, a), (1, b), kept inside the interval; the middle if there is none."""
+    if a * b >= 0.0 or not np.isfinite(a * b):
+        return 0.5
+    return min(0.98, max(0.02, a / (a - b)))
+
+
+def _nearest(sample: Sample, target: float) -> float:
+    """Distance of the real multiplier nearest to a target from it, signed; nan if there is none."""
+    mu = sample.floquet.multipliers
+    real = mu[np.abs(mu.imag) < 1e-7 * np.abs(mu)].real
+    return float(real[np.argmin(np.abs(real - target))] - target) if real.size else float("nan")

@@ -1,0 +1,427 @@
+"""Following a response curve: points, stability, located bifurcations and events, until it ends."""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Callable
+
+import numpy as np
+
+from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.measures import fold
+from suboctave.continuation import CurvePoint, Event, March
+from suboctave.continuation.ending import Ending
+from suboctave.continuation.events import locate_zero
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import Arrival
+from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point, point_between
+from suboctave.curves.count import CountCheck
+from suboctave.curves.doublings import DoublingWatch
+from suboctave.curves.events.finder import Located, locate, locate_near
+from suboctave.curves.events.grazings import locate_grazings, touches
+from suboctave.curves.events.layer import behind_their_grazings
+from suboctave.curves.events.monitors import BRANCH_POINT, PERIOD_DOUBLING, BifurcationKind, Sample, changes, solved_by
+from suboctave.curves.guard import Crossing, Passage, StepGuard
+from suboctave.curves.hidden import REASON, HiddenDoublings, pair_in
+from suboctave.curves.identity import relation
+from suboctave.curves.junction import UNSEEN, Meeting, meeting
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.points import BranchPoint
+from suboctave.curves.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
+from suboctave.curves.trace import Doubt, Settings, Trace
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.interruption import Interruption
+
+#: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
+_NOTHING = 1e-12
+_NOT_FOUND = {
+    "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
+    "LP": "the branch turns back, but its limit point could not be located",
+    "PD": "a multiplier passes -1, but no period doubling could be located",
+    "NS": "a pair of multipliers passes the unit circle, but no Neimark-Sacker point could be located",
+}
+
+
+def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> Trace:
+    """Follow a response curve from a solved start; KeyboardInterrupt ends it politely."""
+    return _Follower(start, direction, bounds, settings).run()
+
+
+class _Follower:
+    def __init__(self, start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> None:
+        self.settings = settings
+        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear, self._arrived)
+        self.trace = Trace()
+        self.previous: Sample | None = None
+        self._candidate: Sample | None = None
+        self._guard = StepGuard(self._between, self._crossing)
+        self._crossings: list[Crossing] = []
+        self._again: tuple[Sample, MotionProblem, Sample] | None = None
+        self._count = CountCheck()
+        self._hidden = HiddenDoublings()
+        #: bifurcations that only more harmonics than the step's have shown
+        self._shown: list[Bifurcation] = []
+        self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
+        self._turned: Bifurcation | None = None
+        self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
+        self._kinds = solved_by(settings.formulation)
+        #: looks for period doublings in place of det J_half, where the formulation has tests of its own
+        self._watch: DoublingWatch | None = None
+        if settings.formulation.doubling_test is not None:
+            self._watch = DoublingWatch(settings.formulation.doubling_test, self._kinds["PD"], self._located)
+        #: somebody who keeps what has been found (`progress.reporting`)
+        self._found: Callable[[Trace], None] | None = None
+        if settings.report is not None:
+            self._found = getattr(settings.report.report, "found", None)
+
+    def run(self) -> Trace:
+        trace = self.trace
+        try:
+            if self.settings.report is not None:
+                self.settings.report.begins()
+            # in a fresh installation the first verdict on stability waits for its kernels to be compiled
+            self._report(self.march.start)
+            for point in self.march:
+                self._accept(point)
+                if self._turned is not None and self.settings.half:
+                    break
+            trace.closed = self.march.closed
+            trace.ends(self.march.ending)
+            trace.arrives = self._arrival()
+        except KeyboardInterrupt as cause:
+            if self.previous is None:
+                self.previous = start = self._sample(self.march.start)
+                trace.points.append(BranchPoint(orbit_of(start), start.floquet, 0.0, start.point.iterations))
+            # of the step that was under way nothing counts
+            trace.cut(trace.points[-1].arclength)
+            where = self.previous.point.curve.where(self.previous.point.u)
+            trace.ends(Ending.stopped(Interruption.of(cause), where))
+        self._say_missed(everything=True)
+        trace.audit = self._guard.audit
+        if self._turned is not None and self.settings.half:
+            trace.end_at(self._turned)
+        if trace.closed:
+            _drop_seam(trace.bifurcations)
+            _drop_seam(trace.events)
+        return trace
+
+    def _sample(self, point: CurvePoint) -> Sample:
+        candidate = self._candidate
+        if candidate is not None and candidate.point is point:
+            return candidate
+        assert isinstance(point.evaluation, MotionEvaluation)
+        return Sample(point, point.evaluation.state, self.settings.stability)
+
+    def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
+        """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
+        met = meeting(a, b, self.settings.newton)
+        self._meeting = None if met is None else (a, b, met)
+        if met is not None:
+            return True
+        self._candidate = new = self._sample(b)
+        if self.previous is None or self.previous.at_rest or new.at_rest:
+            return True
+        return not self._guard.refuses(self._solved_again(self.previous, new), new)
+
+    def _arrived(self, a: CurvePoint, b: CurvePoint) -> Arrival | None:
+        """How the curve ends between two neighbours, if it meets another one there."""
+        known = self._meeting
+        return known[2].arrival if known is not None and known[0] is a and known[1] is b else None
+
+    def _arrival(self) -> Bifurcation | None:
+        """The bifurcation of another curve that this one ends at."""
+        if self._meeting is None or not self.trace.points:
+            return None
+        met, arclength = self._meeting[2], self.trace.points[-1].arclength
+        if self.march.ending is not met.arrival.ending:
+            return None
+        if met.doubt:
+            self.trace.warnings.append(f"{met.doubt}: {UNSEEN}")
+        return solved_bifurcation(
+            PERIOD_DOUBLING, met.solution, met.parent, self.settings.observe, self.trace.warnings, arclength
+        )
+
+    def _solved_again(self, sample: Sample, next_one: Sample) -> Sample:
+        """A sample in the discretisation of the step that leaves it: where harmonics change, the motion moves a little
+        and test functions with it.
+        """
+        point, curve = sample.point, next_one.point.curve
+        assert isinstance(curve, MotionProblem)
+        if point.curve is curve:
+            return sample
+        known = self._again
+        if known is None or known[0] is not sample or known[1] is not curve:
+            weights = next_one.point.weights
+            along = curve.transfer(point.tangent, point.curve)
+            row = weights * along / length(weights * along)
+            try:
+                solved = correct(curve, curve.transfer(point.u, point.curve), row, weights, self.settings.newton)
+                again = self._sample(make_point(solved, curve, along, point.arclength))
+            except ConvergenceError:
+                again = sample
+            self._again = known = (sample, curve, again)
+        return known[2]
+
+    def _between(self, a: Sample, b: Sample, fraction: float, exactly: bool) -> Sample:
+        """The motion at a fraction of the way between two neighbours."""
+        return self._sample(point_between(a.point, b.point, fraction, self.settings.newton, exactly))
+
+    def _crossing(self, a: Sample, b: Sample) -> Crossing | None:
+        """The branch point between two samples of different orientation, if its system can be solved."""
+        known = next((crossing for crossing in self._crossings if crossing.between(a, b)), None)
+        if known is not None:
+            return known
+        located = self._located(BRANCH_POINT, a, b)
+        if located is None or located.solution is None:
+            return None
+        place = a.place + located.fraction * (b.place - a.place)
+        if not turns_at(located, a, b):
+            return Crossing(place, located, None)
+        return Crossing(place, located, fold(self.settings.stability.along(located.solution.state).multipliers))
+
+    def _accept(self, point: CurvePoint) -> None:
+        sample = self._sample(point)
+        passed, passage = [sample], None
+        if self.previous is not None:
+            if self.previous.at_rest or sample.at_rest:
+                self._guard.forget()
+                self._hidden.forget()
+                if self._watch is not None:
+                    self._watch.forget()
+            else:
+                again = self._solved_again(self.previous, sample)
+                if again is not self.previous:
+                    self._search_here(self.previous, again)
+                    self.previous = again
+                passage = self._guard.passage(again, sample)
+                passed, self._crossings = passage.samples, passage.crossings
+        for new in passed:
+            if self.previous is not None:
+                self._search(self.previous, new)
+            where = new.point
+            self.trace.points.append(BranchPoint(orbit_of(new), new.verdict, where.arclength, where.iterations))
+            self.previous = new
+        self._crossings = []
+        if passage is not None:
+            self._look_behind(passage)
+        self._report(point)
+        if self._found is not None:
+            self._found(self.trace)
+
+    def _report(self, point: CurvePoint) -> None:
+        if self.settings.report is None:
+            return
+        curve, trace = point.curve, self.trace
+        assert isinstance(curve, MotionProblem)
+        basis, located = curve.balance.basis, sum(b.kind not in CONTACT_KINDS for b in trace.bifurcations)
+        where = curve.where(point.u)
+        self.settings.report.at(point.parameter, where, len(trace.points), located, basis.harmonics // basis.nu)
+
+    def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation | None:
+        sentences: list[str] = []
+        item = bifurcation_at(located, a, b, self.settings.observe, sentences)
+        if item is not None:
+            self.trace.doubts += [Doubt(item.orbit, text) for text in sentences]
+        return item
+
+    def _look_behind(self, passage: Passage) -> None:
+        """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
+        for stretch in self._hidden.passed(passage.inside):
+            found = [] if self._watch else pair_in(stretch, self.settings.newton, self._sample)
+            items = [item for entry in found if (item := self._bifurcation(*entry)) is not None]
+            for item in items:
+                if self._insert(item):
+                    self._count.noted(item)
+            if len(items) < 2:
+                self._guard.doubt(stretch.before, stretch.behind, REASON)
+        self.trace.open += [
+            BranchPoint(orbit_of(s), s.floquet, s.point.arclength, s.point.iterations)
+            for s in passage.inside[1:-1]
+            if not s.floquet.decided
+        ]
+
+    def _search_here(self, old: Sample, again: Sample) -> None:
+        """Events that lie behind a point in one discretisation and before it in the next."""
+        kinds = [*self._changes(old, again), *touches(old, again)[0]]
+        if self._watch is not None:
+            self._watch.moved(old, again)
+        if not kinds:
+            return
+        points = self.trace.points
+        reach = points[-1].arclength - points[-2].arclength if len(points) > 1 else self.settings.stepping.initial_step
+        turned = False
+        for kind in kinds:
+            if kind.name == "LP" and turned:
+                continue
+            located = locate_near(kind, again, reach, guess_at)
+            item = None if located is None else self._bifurcation(located, again, again)
+            if located is not None and item is not None:
+                turned = turned or (kind is BRANCH_POINT and turns_at(located, again, again))
+                if not any(same_event(item, known) for known in self.trace.bifurcations[-4:]):
+                    self.trace.bifurcations.append(item)
+                    self._count.noted(item)
+                    continue
+            self._guard.doubt(old, again, f"{kind.name} may have happened twice within what more harmonics change")
+
+    def _search(self, a: Sample, b: Sample) -> None:
+        found: list[tuple[float, Bifurcation]] = []
+        missing: list[str] = []
+        turned: Bifurcation | None = None
+        # at rest the equations have a corner where a contact is closed: nothing bifurcates there
+        resting = a.at_rest or b.at_rest
+        for kind in () if resting else self._changes(a, b):
+            if kind.name == "LP" and turned is not None:
+                self._turned = turned
+                continue
+            crossing = self._crossing(a, b) if kind is BRANCH_POINT else None
+            located = crossing.within(a, b) if crossing is not None else self._located(kind, a, b)
+            item = None if located is None else self._bifurcation(located, a, b)
+            if located is None or item is None:
+                # several real multipliers may pass for a pair: the count tells
+                if located is not None or kind.name != "NS":
+                    missing.append(kind.name)
+                continue
+            found.append((located.fraction, item))
+            if crossing is not None and crossing.turns:
+                # at a pitchfork the bifurcating branch turns back exactly at the branch point
+                turned = item
+        if "BP" in missing and "LP" in missing:
+            # across a jump between branches the slope means nothing
+            missing.remove("LP")
+        if missing:
+            self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
+        unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
+        complaint = self._count.complaint(b, [item.kind for _, item in found] + missing + unseen)
+        if not resting and self._guard.grazes(a, b):
+            for touched in locate_grazings(a, b, self.settings.newton, self._sample, guess_at):
+                item = self._bifurcation(touched, a, b)
+                if item is not None:
+                    found.append((touched.fraction, item))
+        if complaint is not None:
+            self._guard.doubt(*complaint)
+        if found:
+            met = self.trace.bifurcations[-4:]
+            fresh = [pair for pair in found if not any(same_event(pair[1], other) for other in met)]
+            for _, item in found:
+                again = next((other for other in met if same_event(item, other)), None)
+                # of a hidden pair that more harmonics have shown one may lie ahead again
+                if again is not None and item.kind not in CONTACT_KINDS and again not in self._shown:
+                    self._guard.doubt(a, b, f"a second {item.kind} may lie beside that which is listed")
+            self.trace.bifurcations += behind_their_grazings(fresh)
+        if self._watch is not None and not resting:
+            for located, p, q in self._watch.passed(a, b):
+                item = self._bifurcation(located, p, q)
+                if item is None:
+                    self._guard.doubt(p, q, _NOT_FOUND["PD"])
+                else:
+                    self._insert(item)
+            self._say_missed()
+        for event in self.settings.events:
+            crossed = self._event(event, a, b)
+            if crossed is not None:
+                self.trace.events.append(crossed)
+
+    def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
+        """The kinds to look for between two samples, as they are to be solved for."""
+        found = [self._kinds[kind.name] for kind in changes(a, b)]
+        return found if self._watch is None else [kind for kind in found if kind.name != "PD"]
+
+    def _insert(self, item: Bifurcation) -> bool:
+        """Put a bifurcation into its place on the branch unless it is there already."""
+        known = any(same_event(item, other) for other in self.trace.bifurcations[-4:])
+        if not known:
+            self._shown.append(item)
+            insort(self.trace.bifurcations, item, key=lambda other: other.arclength)
+        return not known
+
+    def _say_missed(self, everything: bool = False) -> None:
+        """What the published test function of period doublings has passed without notice."""
+        for p, q, reason in self._watch.missed(everything) if self._watch is not None else ():
+            self._guard.doubt(p, q, reason)
+
+    def _located(self, kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
+        """A bifurcation between two neighbours; a branch point only if its system was solved."""
+        known = self._last_located
+        if known is not None and known[0] is kind and known[1] is a and known[2] is b:
+            return known[3]
+        must_solve = kind is BRANCH_POINT
+        begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
+        found = locate(kind, a, b, self.settings.newton, self._sample, guess_at, 9 if must_solve else 34, begins)
+        if must_solve and found is not None and found.solution is None:
+            found = None
+        self._last_located = (kind, a, b, found)
+        return found
+
+    def _event_value(self, event: Event, sample: Sample) -> float:
+        orbit = orbit_of(sample)
+        try:
+            value = event.function(orbit)
+        except Exception as failure:
+            where = sample.point.curve.where(sample.point.u)
+            failure.add_note(f"raised by the function of the event {event.name!r} at {where}")
+            raise
+        try:
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            number = float("nan")
+        if not np.isfinite(number):
+            where = sample.point.curve.where(sample.point.u)
+            raise InputError(f"event {event.name!r} returned {value!r} at {where}; it must return a finite number")
+        return number
+
+    def _event(self, event: Event, a: Sample, b: Sample) -> Bifurcation | None:
+        value_a, value_b = (self._event_value(event, sample) for sample in (a, b))
+        if not (value_a == 0.0 and a.point.arclength == 0.0) and not value_a * value_b < 0.0 and value_b != 0.0:
+            return None
+        try:
+            point = locate_zero(
+                a.point,
+                b.point,
+                value_a,
+                value_b,
+                lambda p: self._event_value(event, self._sample(p)),
+                self.settings.newton,
+            )
+        except ConvergenceError as failure:
+            self.trace.warnings.append(f"event {event.name!r}: {failure}")
+            return None
+        sample = self._sample(point)
+        orbit = orbit_of(sample)
+        curve = point.curve
+        assert isinstance(curve, MotionProblem)
+        return Bifurcation(
+            event.name,
+            orbit,
+            sample.floquet,
+            orbit.residual,
+            orbit.amplitude(self.settings.observe),
+            curve.name,
+            arclength=point.arclength,
+        )
+
+
+def same_event(a: Bifurcation, b: Bifurcation) -> bool:
+    """Whether two located bifurcations are one, met twice."""
+    name = a.parameter_name
+    if a.kind != b.kind or (a.kind == "grazing" and _element(a) != _element(b)):
+        return False
+    same_place = np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9)
+    if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
+        return False
+    # the mirror image of a motion has its amplitude; at rest there is nothing to compare
+    return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
+
+
+def _element(item: Bifurcation) -> int | None:
+    return None if item.contact is None else item.contact.element
+
+
+def _drop_seam(items: list[Bifurcation]) -> None:
+    """What lies on the seam of a closed curve is met at both ends: keep the first."""
+    # several contacts may graze at once
+    while len(items) > 1 and any(same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
+        items.pop()
+
+
+__all__ = ["follow", "same_event"]

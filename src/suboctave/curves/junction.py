@@ -1,0 +1,283 @@
+"""Where a branch of sub-harmonic motions leaves or meets the branch that it bifurcates from.
+
+In a basis of an even number nu of load periods, a motion of half that period has harmonics of even order only. A branch
+meets such a parent at a period doubling of the parent: its odd part shrinks to nothing and, were it followed further,
+would grow again with the opposite sign, the same motions shifted by the parent's period. There the branch ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.branching import doubled_direction
+from suboctave.bifurcation.normal_form import NormalForm, normal_form
+from suboctave.continuation.ending import Ending, EndReason
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import Arrival
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.problem import Array
+from suboctave.curves.events.finder import position
+from suboctave.curves.events.locate import Guess, Singular, locate_singular
+from suboctave.curves.identity import apart
+from suboctave.curves.motion import MotionProblem
+from suboctave.errors import ConvergenceError
+from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+
+__all__ = [
+    "UNSEEN",
+    "Beside",
+    "Junction",
+    "Meeting",
+    "beside",
+    "curvature_of",
+    "doubled",
+    "emanating",
+    "meeting",
+    "period_name",
+]
+
+#: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
+_DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+#: share of a motion by which the first or last motion of a branch may differ from that of the bifurcation beside it
+_BESIDE = 0.02
+#: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
+_CLOSE = 0.02
+#: share of its odd part with which a step leaves a motion right beside its parent, on whose doublings what follows lies
+_VANISHED = 0.01
+#: way in the scaled parameter that rounding may account for
+_STILL = 1e-10
+#: what a branch says where it could not look closer
+UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
+
+
+@dataclass(frozen=True)
+class Junction:
+    """The bifurcation at which a branch leaves or meets another: its kind, place, amplitude and period.
+
+    kind
+        "PD" or "BP", of the other branch.
+    parameter, omega, amplitude
+        The free parameter's value, the frequency, the amplitude of the observed DOF.
+    nu
+        Period of the other branch's motions in periods of the load.
+    """
+
+    kind: str
+    parameter: float
+    omega: float
+    amplitude: float
+    nu: int
+
+    @classmethod
+    def of(cls, item: Bifurcation) -> Junction:
+        """The place of a located bifurcation."""
+        value = item.parameter(item.parameter_name)
+        return cls(item.kind, value, item.omega, item.amplitude, item.orbit.basis.nu)
+
+    def same_place(self, item: Bifurcation, span: float, beside: PeriodicOrbit) -> bool:
+        """Whether a located bifurcation is this one, located anew.
+
+        `span` is the range of the free parameter, `beside` the motion at which a branch leaves or meets this one: the
+        mirror image of a bifurcation has its place and its amplitude.
+        """
+        there = Junction.of(item)
+        near = abs(self.parameter - there.parameter) <= 1e-5 * span and there.kind == self.kind
+        alike = abs(self.amplitude - there.amplitude) <= 1e-3 * max(self.amplitude, there.amplitude)
+        return near and alike and apart(beside, item.orbit) <= _BESIDE
+
+    def __str__(self) -> str:
+        return f"the {self.kind} of the {period_name(self.nu)} motion at omega = {self.omega:.9g}"
+
+
+def period_name(nu: int) -> str:
+    """T, 2T, 4T, ..."""
+    return "T" if nu == 1 else f"{nu}T"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
+
+    `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere.
+    """
+
+    solution: Singular
+    parent: MotionProblem
+    arrival: Arrival
+    doubt: str = ""
+
+
+def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | None:
+    """The parent's period doubling that a curve passes between two neighbours, None if it passes none."""
+    curve = b.curve
+    assert isinstance(curve, MotionProblem)
+    basis = curve.balance.basis
+    if basis.nu % 2:
+        return None
+    odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
+    turned = bool(odd_a @ odd_b < 0.0)
+    if not turned and length(odd_b) > _VANISHED * length(odd_a):
+        return None
+    parent = curve.with_basis(basis.halved)
+    share = length(odd_a) / (length(odd_a) + length(odd_b))
+    u = between(a, b, share)
+    x, omega, values = curve.split(u)
+    half = basis.even_part(x)
+    try:
+        balance = parent.balance.settle(half, omega, values)
+        found = locate_singular(Guess(balance, half, omega, values, curve.name, curve.span), Kind.HALF)
+    except ConvergenceError:
+        return None
+    state = found.state
+    value = state.omega if curve.name == "omega" else state.values[curve.name]
+    there = curve.join(parent.balance.basis.resized(state.x, basis), value)
+    place = position(a, b, there)
+    beyond = 1e-6 if turned else 2.0 * _VANISHED
+    if place is None or not -1e-6 <= place <= 1.0 + beyond or found.vectors is None:
+        return None
+    reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
+    last, doubt = _last_before(a, b, there, found, newton)
+    return Meeting(
+        found,
+        parent.with_balance(state.balance),
+        Arrival(last, Ending(EndReason.MET_BRANCH, curve.where(there), reason)),
+        doubt,
+    )
+
+
+def _odd(u: Array, curve: MotionProblem, weights: Array) -> Array:
+    """The weighted coefficients of odd order."""
+    shaped = curve.balance.shaped((weights * u)[:-1])
+    return np.concatenate((shaped[1::4].ravel(), shaped[2::4].ravel()))
+
+
+def _last_before(
+    a: CurvePoint, b: CurvePoint, there: Array, found: Singular, newton: NewtonOptions
+) -> tuple[CurvePoint | None, str]:
+    """The curve's point right before it meets its parent, None if a neighbour is that; and what remains in doubt."""
+    curve = b.curve
+    assert isinstance(curve, MotionProblem)
+    before = curve.transfer(a.u, a.curve)
+    way = length(b.weights * (there - before))
+    direction = emanating(found, curve, b.weights)
+    if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
+        direction = -direction
+    assert found.vectors is not None
+    form = normal_form("PD", found.state, found.vectors, curve.name)
+    close = beside(curve, there, direction, b.weights, doubled(found.floquet), newton, curvature_of(form), 0.7 * way)
+    if close is None:
+        return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
+    point = close.point
+    arclength = a.arclength + length(b.weights * (point.u - before))
+    last = replace(point, tangent=-point.tangent, orientation=-point.orientation, arclength=arclength)
+    return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
+
+
+def emanating(found: Singular, curve: MotionProblem, weights: Array) -> Array:
+    """The direction in which a curve of twice the period leaves a period doubling, unit length in its weights."""
+    assert found.vectors is not None
+    state, size = found.state, curve.balance.size
+    scale = np.tile(state.balance.scales()[1], len(found.vectors.right) // size)
+    phi = doubled_direction(found.vectors.right * scale, size, curve.balance.basis)
+    direction = curve.join(phi, 0.0)
+    return direction / length(weights * direction)
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A point right beside a bifurcation; `smooth`: whether nothing else happens to the motion on the way there."""
+
+    point: CurvePoint
+    smooth: bool
+
+
+def beside(
+    curve: MotionProblem,
+    u: Array,
+    direction: Array,
+    weights: Array,
+    multipliers: ComplexArray,
+    newton: NewtonOptions,
+    curvature: float | None = None,
+    reach: float = np.inf,
+) -> Beside | None:
+    """The curve's point close to a bifurcation in a direction, with its tangent pointing away; None if there is none.
+
+    On the way the critical multiplier leaves +1, and the parameter its value, with the square of the distance. Where
+    the point's multipliers are not those of the bifurcation, or the parameter goes another way, something else happens
+    in between: then one closer to it is taken.
+
+    Parameters
+    ----------
+    u, direction
+        The bifurcation, and where the curve leaves it, of unit length in `weights`.
+    multipliers
+        Of the motion at u, over the period of the curve's motions.
+    curvature
+        Which way the parameter goes, by its sign, where a normal form tells.
+    reach
+        Distance that the point must not exceed.
+    """
+    points: list[tuple[float, CurvePoint]] = []
+    for distance in _DISTANCES:
+        if distance > reach:
+            continue
+        try:
+            point = _solved_beside(curve, u, distance * direction, weights, newton)
+        except ConvergenceError:
+            continue
+        points.append((distance, point))
+        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1], curvature):
+            return Beside(points[-2][1], True)
+    return Beside(points[-1][1], False) if points else None
+
+
+def _solved_beside(curve: MotionProblem, u: Array, way: Array, weights: Array, newton: NewtonOptions) -> CurvePoint:
+    row = weights * way
+    solved = correct(curve, u + way, row / length(row), weights, newton)
+    if not 0.5 <= length(weights * (solved.u - u)) / length(row) <= 2.0:
+        raise ConvergenceError("what was found lies elsewhere")
+    return make_point(solved, curve, way, 0.0)
+
+
+def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
+    """Whether a point has multipliers close to given ones."""
+    curve = point.curve
+    assert isinstance(curve, MotionProblem)
+    x, omega, values = curve.split(point.u)
+    found = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
+    expected = np.sort_complex(multipliers)
+    return float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
+
+
+def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint], curvature: float | None) -> bool:
+    """Whether the parameter goes one way between two points beside a bifurcation, and goes on so at both.
+
+    The bifurcation's own place is not asked: cut off at a harmonic, the two curves meet a little elsewhere.
+    """
+    index = far[1].curve.parameter
+    way = far[1].u[index] - close[1].u[index]
+    slopes = [point.tangent[index] for _, point in (far, close)]
+    moved = abs(way) * far[1].weights[index]
+    foretold = curvature is None or curvature * way > 0.0
+    return moved <= _STILL or (foretold and all(slope * way > 0.0 for slope in slopes))
+
+
+def curvature_of(form: NormalForm | None) -> float | None:
+    """Which way the parameter goes on the branch that leaves a bifurcation; None where its form leaves that open."""
+    if form is None or form.criticality is None:
+        return None
+    return form.coefficients.get("curvature")
+
+
+def doubled(result: FloquetResult) -> ComplexArray:
+    """Multipliers over twice the period."""
+    squared: ComplexArray = result.multipliers**2
+    return squared

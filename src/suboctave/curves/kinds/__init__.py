@@ -1,0 +1,1 @@
+"""The kinds of curves, one file each: the equations that single their motions out."""

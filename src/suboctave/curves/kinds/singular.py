@@ -1,0 +1,120 @@
+"""Limit points, period doublings and Neimark-Sacker points: J_kappa is singular.
+
+    LP, PD    g = 0                          kappa = 0, w0 / 2
+    NS        Re g = Im g = 0                kappa unknown
+
+g is the bordered scalar of `bifurcation.bordered`, in units of omega^2.
+"""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
+from suboctave.curves.augmentation import Augmentation, Equations, gradient_of
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.perturbation import Kind, rate_by_kappa
+from suboctave.lazy import lazy
+
+_NAMES = {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}
+
+
+@dataclass(frozen=True)
+class SingularOperator(Augmentation):
+    """J_kappa is singular: LP (Kind.INTEGER), PD (Kind.HALF), NS (Kind.FREE, with kappa unknown).
+
+    `unit` is what g is measured in, omega^2.
+    """
+
+    kind: Kind
+    borders: NullVectors
+    unit: float
+
+    @classmethod
+    def of(cls, state: BalanceState, kind: Kind, kappa: float = 0.0) -> SingularOperator:
+        """With the null vectors at a motion."""
+        return cls(kind, null_vectors(state, kind, kappa), state.omega**2)
+
+    @property
+    def name(self) -> str:
+        """Kind of bifurcation."""
+        return _NAMES[self.kind]
+
+    @property
+    def extras(self) -> int:
+        """kappa, where it is free."""
+        return 1 if self.kind is Kind.FREE else 0
+
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> SingularEquations:
+        """See `Augmentation.at`."""
+        return SingularEquations(self, state, float(extra[0]) if self.extras else 0.0, names)
+
+    def multiplier(self, rate: float, extra: Array) -> complex:
+        """See `Augmentation.multiplier`."""
+        if self.kind is Kind.FREE:
+            return cmath.exp(2j * cmath.pi * float(extra[0]) / rate)
+        return 1.0 + 0.0j if self.kind is Kind.INTEGER else -1.0 + 0.0j
+
+    def spans(self, rate: float) -> Array:
+        """kappa in units of the base frequency."""
+        return np.full(self.extras, rate)
+
+    def resized(self, basis: HarmonicBasis, size: int) -> SingularOperator:
+        """See `Augmentation.resized`."""
+        return replace(self, borders=self.borders.resized(basis, size, self.kind))
+
+
+class SingularEquations(Equations):
+    """g, or its real and imaginary part, in units of omega^2."""
+
+    def __init__(self, of: SingularOperator, state: BalanceState, kappa: float, names: tuple[str, ...]) -> None:
+        self.of = of
+        self.state = state
+        self.kappa = kappa
+        self.names = names
+
+    @lazy
+    def bordered(self) -> Bordered:
+        """g with its null vectors."""
+        return bordered(self.state, self.of.kind, self.of.borders, self.kappa)
+
+    @lazy
+    def values(self) -> Array:
+        """See `Equations.values`."""
+        g = self.bordered.g / self.of.unit
+        return np.array([g.real, g.imag] if self.of.extras else [g.real])
+
+    @lazy
+    def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
+        """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
+        return gradient_of(self.bordered, self.names)
+
+    def takes_over(self, other: Equations) -> bool:
+        """Keep the gradient of a motion a rounding away, but for kappa: whether that vanishes is asked for."""
+        b = self.bordered
+        if type(other) is not SingularEquations or b.kind is Kind.FREE:
+            return False
+        by_x, rates, _ = other.gradient
+        by_kappa = -rate_by_kappa(self.state, b.kind, b.left, b.right)
+        self.__dict__["gradient"] = by_x, rates, by_kappa
+        return True
+
+    @property
+    def rows(self) -> Array:
+        """See `Equations.rows`."""
+        by_x, rates, by_kappa = self.gradient
+        if not self.of.extras:
+            return np.append(by_x.real, [rates[name].real for name in self.names])[None] / self.of.unit
+        whole = np.concatenate((by_x, [by_kappa], [rates[name] for name in self.names])) / self.of.unit
+        return np.array([whole.real, whole.imag])
+
+    def renewed(self) -> SingularOperator:
+        """See `Equations.renewed`."""
+        return SingularOperator(self.of.kind, self.bordered.vectors, self.state.omega**2)
+
+
+__all__ = ["SingularEquations", "SingularOperator"]

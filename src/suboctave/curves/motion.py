@@ -1,0 +1,375 @@
+"""Periodic motions as curves for the continuation engine: unknowns `u = (X, extra, free parameters)`.
+
+    R(X, omega, parameters) + addition = 0,    scalar equations (X, extra, parameters) = 0
+
+What is followed is a matter of the augmentation (`curves.kinds`): without any, frequency responses and responses
+over a parameter; with the equations of a bifurcation, bifurcations in two parameters; with that of an extremum besides,
+their extrema in three. `extra` are the unknowns that come with the augmentation (kappa, an unfolding, an instant). The
+engine's free parameter is the last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from suboctave.bifurcation.gaps import rests_in_corner
+from suboctave.continuation.kernels import weighted_length
+from suboctave.continuation.linear import length
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.curves.kinds.response import PLAIN
+from suboctave.errors import ConvergenceError
+from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.truncation import (
+    AdaptiveHarmonics,
+    choose_harmonics,
+    motion_size,
+    next_harmonics,
+    truncation,
+)
+from suboctave.lazy import lazy
+
+#: motions of less than this share of the reference count as rest
+_REST = 1e-8
+#: distance of the critical multiplier from the unit circle up to which harmonics suffice
+_CRITICAL = 1e-3
+#: steps after which that distance is computed again
+CRITICAL_EVERY = 5
+_TINY = float(np.finfo(float).tiny)
+
+
+class MotionEvaluation:
+    """The augmented equations and their derivatives at one u."""
+
+    def __init__(self, curve: MotionProblem, state: BalanceState, extra: Array) -> None:
+        self.curve = curve
+        self.state = state
+        self.extra = extra
+        self.equations: Equations = curve.augmentation.at(state, extra, curve.names)
+
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Multipliers of the motion, by the monodromy matrix."""
+        return floquet_multipliers(self.state)
+
+    @property
+    def critical(self) -> complex | None:
+        """The multiplier that lies on the unit circle at a solution, None if none need."""
+        return self.curve.augmentation.multiplier(self.state.rate, self.extra)
+
+    @property
+    def doubt(self) -> float:
+        """Distance of the critical multiplier from where it should be: what the harmonics left out make of it."""
+        critical = self.critical
+        return 0.0 if critical is None else float(np.abs(self.floquet.multipliers - critical).min())
+
+    @lazy
+    def residual(self) -> Array:
+        """`[R + addition; scalar equations]`, in units of the forces that balance at the curve's last point."""
+        equations, top = self.equations, self.state.residual
+        if equations.addition is not None:
+            top = top + equations.addition
+        return np.concatenate((top, equations.values * self.curve.force)) if equations.values.size else top
+
+    @lazy
+    def jacobian(self) -> Array:
+        """Derivatives by u, shape (N, N + 1)."""
+        state, equations = self.state, self.equations
+        names, n, q = self.curve.names, state.balance.dimension, len(self.extra)
+        # omega comes first
+        along = state.extended_jacobian(names[0])
+        rows = equations.rows
+        if not rows.size:
+            return along
+        out = np.zeros((n + rows.shape[0], rows.shape[1]))
+        out[:n, :n], out[:n, n + q] = along[:, :n], along[:, n]
+        if equations.column is not None:
+            out[:n, n] = equations.column
+        for i, name in enumerate(names[1:], 1):
+            out[:n, n + q + i] = state.residual_by(name)
+        out[n:] = rows
+        out[n:] *= self.curve.force
+        return out
+
+    def takes_over(self, other: Evaluation) -> bool:
+        """See `Evaluation`."""
+        assert isinstance(other, MotionEvaluation)
+        return self.equations.takes_over(other.equations)
+
+    @lazy
+    def error(self) -> float:
+        """The larger of the residual in units of the forces that balance (at rest, where there are none, of those of a
+        tiny motion) and the scalar equations'.
+        """
+        state, addition = self.state, self.equations.addition
+        if addition is None:
+            size = state.residual_size()
+        else:
+            shaped = (state.residual + addition).reshape(state.x.shape)
+            size = length(shaped * state.balance.scales()[1])
+        worst = size / max(state.force_scale(), self.curve.least_force(state.omega), _TINY)
+        for value in self.equations.values.tolist():
+            worst = max(worst, abs(value))
+        return worst
+
+    @lazy
+    def at_rest(self) -> bool:
+        """True if the motion is nothing beside what the loads make of the structure elsewhere on the curve.
+
+        Without loads (parametric excitation alone) rest is a motion like any other, which may lose its stability; but
+        not in a corner of a law, where it has no linear neighbourhood.
+        """
+        reference = self.curve.reference
+        if motion_size(self.state) > _REST * reference:
+            return False
+        return reference > 0.0 or rests_in_corner(self.state)
+
+    @lazy
+    def truncation(self) -> float:
+        """Estimated size of the neglected harmonics relative to the motion."""
+        return truncation(self.state)
+
+
+@dataclass(eq=False, repr=False)
+class MotionProblem:
+    """Periodic motions along one free parameter, their bifurcations in two, extrema along curves of those in three.
+
+    balance
+        Equations of motion in the present basis.
+    names, spans
+        The free parameters, "omega" first where it is one of them, and the widths of their ranges.
+    omega
+        Frequency, where it is not free.
+    adaptive, tolerance
+        Rule for the number of harmonics (None to keep it) and the neglected share of the motion that is tolerated.
+    augmentation
+        What singles the motions out, with its bordering vectors.
+    reference
+        A size of the motion met before the curve begins (the linear response), so that it can start from rest.
+    force
+        Size of the forces at the last point: the unit of the scalar equations.
+    cache
+        The equations in every basis that was needed.
+    held
+        Values of parameters that are not those of the equations.
+    steps
+        How many steps lie behind.
+    """
+
+    balance: HarmonicBalance
+    names: tuple[str, ...]
+    spans: tuple[float, ...]
+    omega: float
+    adaptive: AdaptiveHarmonics | None = None
+    tolerance: float = 0.0
+    augmentation: Augmentation = PLAIN
+    reference: float = 0.0
+    force: float = 1.0
+    cache: dict[HarmonicBasis, HarmonicBalance] = field(default_factory=dict)
+    held: Mapping[str, float] = field(default_factory=dict)
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.cache.setdefault(self.balance.basis, self.balance)
+
+    @classmethod
+    def response(
+        cls, balance: HarmonicBalance, name: str, omega: float, span: float, adaptive: AdaptiveHarmonics | None
+    ) -> MotionProblem:
+        """All motions along one free parameter."""
+        return cls(balance, (name,), (span,), omega, adaptive, 0.0 if adaptive is None else adaptive.tolerance)
+
+    @lazy
+    def parameter(self) -> int:
+        """Index of the last free parameter in u, the last entry."""
+        return self.balance.dimension + self.augmentation.extras + len(self.names) - 1
+
+    @property
+    def name(self) -> str:
+        """The last free parameter."""
+        return self.names[-1]
+
+    @property
+    def span(self) -> float:
+        """Width of its range."""
+        return self.spans[-1]
+
+    @property
+    def delicate(self) -> bool:
+        """See `Curve`: limit points of doubled motions, whose equations those of the parent's period doublings solve as
+        well. Where the doubled part is small the two are told apart by little.
+        """
+        return self.augmentation.name == "LP" and self.balance.basis.nu % 2 == 0
+
+    def index(self, name: str) -> int:
+        """Index of one of the free parameters in u."""
+        return self.balance.dimension + self.augmentation.extras + self.names.index(name)
+
+    def least_force(self, omega: float) -> float:
+        """Force that residuals are held against at least: that of a motion at rest."""
+        return _REST * omega**2 * self.reference
+
+    @property
+    def _weight(self) -> Array:
+        return self.balance.column_weights
+
+    def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
+        """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
+        x, own = self.balance.shaped(u[: self.balance.dimension]), self.balance.values
+        if self.names == ("omega",) and not self.held:
+            return x, float(u[-1]), own
+        free = self.named(u)
+        omega = free.pop("omega", self.omega)
+        return x, omega, {**own, **self.held, **free} if free or self.held else own
+
+    def extra(self, u: Array) -> Array:
+        """The unknowns of the augmentation in a vector u."""
+        return u[self.balance.dimension : -len(self.names)]
+
+    def join(self, x: Array, values: float | Array, extra: Array | None = None) -> Array:
+        """The vector u of coefficients, the free parameters, and extra unknowns."""
+        n, k = self.balance.dimension, len(self.names)
+        u = np.empty(n + self.augmentation.extras + k)
+        u[:n] = x.ravel()
+        u[-k:] = values
+        if extra is not None:
+            u[n:-k] = extra
+        return u
+
+    def evaluate(self, u: Array) -> MotionEvaluation:
+        """See `Curve.evaluate`."""
+        if not math.isfinite(u.dot(u)):
+            raise ConvergenceError("the iteration left the range of numbers")
+        x, omega, values = self.split(u)
+        if not omega > 0.0:
+            raise ConvergenceError("omega is not positive")
+        return MotionEvaluation(self, self.balance.at(x, omega, values), self.extra(u))
+
+    def size(self, u: Array) -> float:
+        """Norm of the coefficients, weighted by the square roots of the masses."""
+        return float(weighted_length(self._weight, u))
+
+    def weights(self, u: Array, largest: float) -> Array:
+        """See `Curve.weights`."""
+        size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
+        weights, n = np.empty(len(u)), self.balance.dimension
+        np.divide(self._weight, size, out=weights[:n])
+        if self.augmentation.extras:
+            weights[n : -len(self.names)] = 1.0 / self.augmentation.spans(self.split(u)[1] / self.balance.basis.nu)
+        for i, span in enumerate(self.spans, len(u) - len(self.names)):
+            weights[i] = 1.0 / span
+        return weights
+
+    def unit(self, weights: Array) -> float:
+        """Size of a motion that counts as one in `weights`."""
+        return float(self._weight[0] / weights[0])
+
+    def adapted(self, u: Array, evaluation: Evaluation) -> MotionProblem:
+        """The curve with the harmonics, samples and bordering vectors of this point."""
+        assert isinstance(evaluation, MotionEvaluation)
+        state = evaluation.state
+        augmentation = evaluation.equations.renewed()
+        balance = self.balance
+        if self.adaptive is not None:
+            balance = self._in_basis(self._basis(evaluation, self.adaptive))
+        x = state.x if balance is self.balance else self.balance.basis.resized(state.x, balance.basis)
+        balance = balance.settle(x, state.omega, state.values)
+        if balance is self.balance and augmentation is self.augmentation:
+            return self
+        self.cache[balance.basis] = balance
+        if balance.basis != self.balance.basis:
+            augmentation = augmentation.resized(balance.basis, balance.size)
+        force = max(state.force_scale(), self.least_force(state.omega))
+        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
+
+    def _basis(self, evaluation: MotionEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
+        """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""
+        state, present = evaluation.state, self.balance.basis
+        basis = choose_harmonics(state, adaptive, self.tolerance)
+        lower = basis.harmonics < present.harmonics
+        if basis.harmonics > present.harmonics or not (lower or self.steps % CRITICAL_EVERY == 0):
+            return basis
+        if evaluation.doubt > _CRITICAL:
+            return next_harmonics(state, adaptive)
+        return present if lower and evaluation.doubt > 0.1 * _CRITICAL else basis
+
+    def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
+        if basis is self.balance.basis or basis == self.balance.basis:
+            return self.balance
+        if basis not in self.cache:
+            self.cache[basis] = self.balance.with_basis(basis)
+        return self.cache[basis]
+
+    def with_balance(self, balance: HarmonicBalance) -> MotionProblem:
+        """The same curve with other equations of motion (basis, samples)."""
+        self.cache[balance.basis] = balance
+        augmentation = self.augmentation
+        if balance.basis != self.balance.basis:
+            augmentation = augmentation.resized(balance.basis, balance.size)
+        return replace(self, balance=balance, augmentation=augmentation)
+
+    def with_basis(self, basis: HarmonicBasis) -> MotionProblem:
+        """The same curve in another basis."""
+        return self if basis == self.balance.basis else self.with_balance(self._in_basis(basis))
+
+    def transfer(self, u: Array, origin: Curve) -> Array:
+        """See `Curve.transfer`."""
+        if origin is self:
+            return u
+        assert isinstance(origin, MotionProblem)
+        basis, own = origin.balance.basis, self.balance.basis
+        if basis is own or basis == own:
+            return u
+        n, k = origin.balance.dimension, len(self.names)
+        x = basis.resized(u[:n].reshape(basis.size, -1), own)
+        return np.concatenate((x.ravel(), origin.augmentation.carried(u[n:-k], own, self.balance.size), u[-k:]))
+
+    def images(self, u: Array) -> list[Array]:
+        """The motion shifted by 0, 1, ..., nu - 1 load periods: all the same motion."""
+        basis = self.balance.basis
+        if basis.nu == 1:
+            return [u]
+        extra, parameters = self.extra(u), u[-len(self.names) :]
+        shifted = []
+        x = u[: self.balance.dimension].reshape(basis.size, -1)
+        for turn, cosine, sine in _turns(basis.nu, basis.harmonics):
+            y = x.copy()
+            y[1::2] = cosine * x[1::2] + sine * x[2::2]
+            y[2::2] = cosine * x[2::2] - sine * x[1::2]
+            shifted.append(self.join(y, parameters, self.augmentation.shifted(extra, turn)))
+        return shifted
+
+    def unwrapped(self, u: Array, near: Array) -> Array:
+        """See `Curve.unwrapped`."""
+        if not self.augmentation.extras:
+            return u
+        own = slice(self.balance.dimension, -len(self.names))
+        moved = u.copy()
+        moved[own] = self.augmentation.unwrapped(u[own], near[own])
+        return moved
+
+    def named(self, u: Array) -> dict[str, float]:
+        """Values of the free parameters by name."""
+        return dict(zip(self.names, u[-len(self.names) :].tolist(), strict=True))
+
+    def where(self, u: Array) -> str:
+        """The free parameters' values in words."""
+        return ", ".join(f"{name} = {value:.6g}" for name, value in self.named(u).items())
+
+
+@lru_cache(maxsize=64)
+def _turns(nu: int, harmonics: int) -> list[tuple[float, Array, Array]]:
+    """The shifts by load periods as angles of the motion's own period, with cosine and sine at every harmonic."""
+    turns = [2.0 * np.pi * shift / nu for shift in range(nu)]
+    angles = [turn * np.arange(1, harmonics + 1)[:, None] for turn in turns]
+    return [(turn, np.cos(angle), np.sin(angle)) for turn, angle in zip(turns, angles, strict=True)]
+
+
+__all__ = ["CRITICAL_EVERY", "MotionEvaluation", "MotionProblem"]

@@ -1,0 +1,337 @@
+"""From what a step brackets to a bifurcation: solved, with as many harmonics as it needs, and labelled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.branching import branching_equation
+from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
+from suboctave.continuation.problem import Array
+from suboctave.curves.events.finder import Located, locate, position
+from suboctave.curves.events.layer import (
+    behind_grazing,
+    grazing_beside,
+    layer_of,
+    solve_or_behind,
+    unresolved,
+)
+from suboctave.curves.events.locate import Guess, Singular
+from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Sample
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.truncation import choose_harmonics, next_harmonics, truncation
+
+#: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
+_CRITICAL = 1e-3
+_NEWTON = NewtonOptions()
+#: halvings of a step in which a bifurcation is looked for with more harmonics
+_HALVED = 16
+#: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
+_MOVED = 0.05
+#: slope of a branch in its parameter at a branch point, both scaled, below which it turns back there
+_STILL = 1e-5
+
+
+def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> Bifurcation | None:
+    """The bifurcation located between two neighbours: solved again with the harmonics that events ask for, labelled.
+
+    None if the change of its test is all that is known. Beside the grazing of an exact contact, where Newton's method
+    has no chance, that is enough: it is noted in `warnings`, as is what was not found again.
+    """
+    arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
+    curve = b.point.curve
+    assert isinstance(curve, MotionProblem)
+    solution = located.solution
+    if solution is None:
+        guess = guess_at(located.sample.point.u, located.sample.point, _kappa(located))
+        behind = behind_grazing(located.kind, guess)
+        own = behind is not None and _lies_between(behind, curve, a, b)
+        # harmonics may move it beyond the ends of a short step, where it may also be another one
+        solution = behind if own else _with_more_harmonics(located, a, b) or behind
+    if solution is None:
+        beside = grazing_beside(guess)
+        # the bracket of a grazing shows the excursion itself; across a branch point other tests change, too
+        if located.bracket is not None and (beside is None or BRANCH_POINT.changed(*located.bracket)):
+            return None
+        orbit = orbit_of(located.sample)
+        # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
+        width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
+        warnings.append(
+            f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
+            f"to +- {width:.1e}: " + (f"{beside.label} grazes there" if beside else "a law is rough there")
+        )
+        return Bifurcation(
+            located.kind.name,
+            orbit,
+            located.sample.floquet,
+            orbit.residual,
+            orbit.amplitude(observe),
+            curve.name,
+            uncertainty=width,
+            arclength=arclength,
+            contact=beside,
+        )
+    unit = curve.unit(located.sample.point.weights)
+    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
+    return replace(found, tangent=_tangent(a, b, located.fraction, found)) if found.kind == "BP" else found
+
+
+def _tangent(a: Sample, b: Sample, share: float, found: Bifurcation) -> tuple[float, ...]:
+    """The direction of the branch at a bifurcation between two samples, in the harmonics of its motion."""
+    curve = b.point.curve
+    assert isinstance(curve, MotionProblem)
+    t = (1.0 - share) * curve.transfer(a.point.tangent, a.point.curve) + share * b.point.tangent
+    return tuple(curve.with_balance(found.orbit.balance).transfer(t, curve).tolist())
+
+
+def solved_bifurcation(
+    kind: BifurcationKind,
+    solution: Singular,
+    curve: MotionProblem,
+    observe: int,
+    warnings: list[str],
+    arclength: float = 0.0,
+    size: float = 0.0,
+    neighbours: tuple[Sample, Sample] | None = None,
+) -> Bifurcation:
+    """A solved bifurcation with the harmonics that events ask for, labelled; `size` as in `Guess`; `neighbours`: the
+    samples it was located between.
+    """
+    solution, coarser = _refined(kind, solution, curve, warnings, size, neighbours)
+    guess = _guess_from(solution, curve, size)
+    state = solution.state
+    layer = layer_of(kind, solution, guess)
+    orbit = as_orbit(state, solution.balance_residual, truncation(state), curve)
+    return Bifurcation(
+        kind.name,
+        orbit,
+        solution.floquet,
+        solution.residual,
+        orbit.amplitude(observe),
+        curve.name,
+        solution.vectors,
+        solution.kappa,
+        0.0 if layer is None else unresolved(kind, guess, layer, coarser),
+        arclength=arclength,
+        contact=layer or kind.contact(solution, curve.name),
+    )
+
+
+def turns_at(located: Located, a: Sample, b: Sample) -> bool:
+    """Whether the curve stands still in its parameter at a branch point between two samples, as the bifurcating branch
+    of a pitchfork does.
+    """
+    curve, solution = b.point.curve, located.solution
+    assert isinstance(curve, MotionProblem)
+    if solution is None:
+        return False
+    try:
+        equation = branching_equation(solution.state, curve.name, curve.span, solution.vectors)
+    except ConvergenceError:
+        return False
+    here, weights = curve.with_balance(solution.state.balance), b.point.weights
+    chord = weights * (b.point.tangent if a is b else b.point.u - curve.transfer(a.point.u, a.point.curve))
+    ways = [weights * curve.transfer(direction, here) for direction in equation.directions]
+    along = max((way / length(way) for way in ways), key=lambda way: abs(float(way @ chord)))
+    return abs(float(along[-1])) < _STILL
+
+
+def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | None:
+    """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
+    the way with fewer.
+    """
+    curve, state = located.sample.point.curve, located.sample.state
+    assert isinstance(curve, MotionProblem)
+    beyond: Singular | None = None
+    while curve.adaptive is not None:
+        basis = next_harmonics(state, curve.adaptive)
+        if basis.size <= state.basis.size:
+            break
+        x = state.basis.resized(state.x, basis)
+        balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+        state = balance.at(x, state.omega, state.values)
+        wide, kind, sample = curve.with_balance(balance), located.kind, located.sample
+        try:
+            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, kind.kappa(sample))
+            found = kind.solve(guess)
+            if kind.genuine(found, guess):
+                if _lies_between(found, wide, a, b):
+                    return found
+                beyond = beyond or found
+        except ConvergenceError:
+            pass
+        between = _between(kind, wide, a, b)
+        if between is not None:
+            return between
+    size = b.point.arclength - a.point.arclength
+    return beyond if beyond is not None and _distance(beyond, located.sample) <= size else None
+
+
+def _distance(found: Singular, sample: Sample) -> float:
+    """Scaled distance of a solution from a sample, in the harmonics of the sample."""
+    curve = sample.point.curve
+    assert isinstance(curve, MotionProblem)
+    wide = curve.with_balance(found.state.balance)
+    there = wide.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
+    return length(sample.point.weights * (curve.transfer(there, wide) - sample.point.u))
+
+
+def _refined(
+    kind: BifurcationKind,
+    solution: Singular,
+    curve: MotionProblem,
+    warnings: list[str],
+    size: float,
+    neighbours: tuple[Sample, Sample] | None,
+) -> tuple[Singular, tuple[int, float] | None]:
+    """Solved again with the harmonics that events ask for; with how many it was found before that, and where."""
+    adaptive = curve.adaptive
+    coarser = None
+    if adaptive is None:
+        return solution, coarser
+    for _ in range(8):
+        state = solution.state
+        basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
+        if basis.size <= state.basis.size:
+            # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
+            critical = kind.critical(solution)
+            if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
+                break
+            basis = next_harmonics(state, adaptive)
+        if basis.size <= state.basis.size:
+            break
+        wide, completed = state.completed_x
+        x = wide.resized(completed, basis)
+        # more harmonics need more samples of a law that tells nothing of itself
+        balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
+        guess = replace(_guess_from(solution, curve, size), balance=balance, x=x)
+        try:
+            better = solve_or_behind(kind, guess)
+            if neighbours is not None:
+                better = _of_its_own(kind, better, curve.with_balance(balance), *neighbours)
+        except ConvergenceError as failure:
+            warnings.append(
+                f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
+                f"harmonics; with {basis.harmonics} it was not found again ({failure})"
+            )
+            break
+        moved = abs(better.state.omega - state.omega) / state.omega
+        if moved > 0.05:
+            warnings.append(
+                f"{kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
+                f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
+            )
+            break
+        coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
+        solution = better
+    return solution, coarser
+
+
+def _of_its_own(kind: BifurcationKind, found: Singular, curve: MotionProblem, a: Sample, b: Sample) -> Singular:
+    """What was solved for with more harmonics, if it still lies between two samples; else what lies between them with
+    these harmonics. Beside a young contact Newton's method may run to the next bifurcation of the kind.
+    """
+    if a is b or _lies_between(found, curve, a, b):
+        return found
+    return _between(kind, curve, a, b) or found
+
+
+def _lies_between(found: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
+    """Whether a solution, one of the motions of `curve`, lies between two samples, but for what harmonics move."""
+    there = curve.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
+    share = position(a.point, b.point, b.point.curve.transfer(there, curve))
+    if share is None or not -_MOVED <= share <= 1.0 + _MOVED:
+        # of a short step, only its ends with the same harmonics tell
+        ends = _ends(curve, a, b)
+        share = None if ends is None else position(ends[0].point, ends[1].point, there)
+    return share is not None and -_MOVED <= share <= 1.0 + _MOVED
+
+
+def _between(kind: BifurcationKind, curve: MotionProblem, a: Sample, b: Sample) -> Singular | None:
+    """What lies between two samples with the harmonics of `curve`; None if the test does not change there, or nothing
+    is solved for.
+    """
+    ends = _ends(curve, a, b)
+    if ends is None or not kind.changed(*ends):
+        return None
+    located = locate(kind, *ends, _NEWTON, _sampled(b), guess_at, _HALVED)
+    return None if located is None else located.solution
+
+
+def _ends(curve: MotionProblem, a: Sample, b: Sample) -> tuple[Sample, Sample] | None:
+    """Two samples with other harmonics; None if they cannot be solved for."""
+    try:
+        first, last = (solved_in(curve, sample, _NEWTON, _sampled(b)) for sample in (a, b))
+    except ConvergenceError:
+        return None
+    return first, last
+
+
+def _sampled(like: Sample) -> Callable[[CurvePoint], Sample]:
+    """What turns a point into a sample with another one's stability method."""
+
+    def sample(point: CurvePoint) -> Sample:
+        assert isinstance(point.evaluation, MotionEvaluation)
+        return Sample(point, point.evaluation.state, like.method)
+
+    return sample
+
+
+def solved_in(
+    curve: MotionProblem, sample: Sample, newton: NewtonOptions, make_sample: Callable[[CurvePoint], Sample]
+) -> Sample:
+    """The same motion with other harmonics."""
+    point = sample.point
+    u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
+    weights = curve.weights(u, 0.0)
+    row = weights * along / length(weights * along)
+    return make_sample(make_point(correct(curve, u, row, weights, newton), curve, along, point.arclength))
+
+
+def _residual(state: BalanceState) -> float:
+    return state.residual_size() / max(state.force_scale(), float(np.finfo(float).tiny))
+
+
+def orbit_of(sample: Sample) -> PeriodicOrbit:
+    """A point of a response curve as a periodic motion."""
+    evaluation = sample.point.evaluation
+    assert isinstance(evaluation, MotionEvaluation)
+    curve = sample.point.curve
+    assert isinstance(curve, MotionProblem)
+    return as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
+
+
+def as_orbit(state: BalanceState, residual: float, neglected: float, curve: MotionProblem) -> PeriodicOrbit:
+    """A solved state as a periodic motion."""
+    values = dict(state.values)
+    return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, residual, neglected, curve.adaptive)
+
+
+def guess_at(u: Array, point: CurvePoint, kappa: float) -> Guess:
+    """Where the system of a bifurcation begins: a point of a response curve."""
+    curve = point.curve
+    assert isinstance(curve, MotionProblem)
+    x, omega, values = curve.split(u)
+    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa, size=curve.unit(point.weights))
+
+
+def _guess_from(solution: Singular, curve: MotionProblem, size: float = 0.0) -> Guess:
+    state = solution.state
+    at = (state.balance, state.x, state.omega, state.values)
+    return Guess(*at, curve.name, curve.span, solution.kappa, solution.vectors, size)
+
+
+def _kappa(located: Located) -> float:
+    try:
+        return located.kind.kappa(located.sample)
+    except ConvergenceError:
+        return 0.0

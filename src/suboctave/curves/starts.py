@@ -1,0 +1,368 @@
+"""The first point of a branch.
+
+From a given motion, or, without one: Newton's method from the linear response; where that fails (it can cycle for
+ever on a contact that is closed at rest, and nothing is linear about a body between stops), a path that leads from a
+linear structure without resonances to the system,
+
+    share (A X + F) + (1 - share) B X = P,        B_k = omega^2 (1 + i k) m,
+
+from share = 0 to 1 by continuation. At 0 there is one motion, so that a path that stays bounded cannot come back
+there: it reaches 1 through whatever folds lie on the way (Allgower & Georg, Numerical Continuation Methods, 1990,
+chapter 11). Damping and restoring forces bound it, linear stiffness or not, contacts closed at rest or not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from suboctave.continuation.linear import length
+from suboctave.continuation.march import March
+from suboctave.continuation.newton import NewtonOptions, Solved, correct
+from suboctave.continuation.point import CurvePoint, make_point, solve_at
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.continuation.stepping import SteppingOptions
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
+from suboctave.harmonic.evaluation import BalanceState, apply_blocks
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.lazy import lazy
+from suboctave.timedomain import integrate
+
+_PATH = "path from a heavily damped linear structure"
+#: how the path is followed: contacts that begin or cease turn it within very short ways
+_STEPPING = SteppingOptions(max_step=0.1, initial_step=0.02, min_step=1e-9, max_points=1500)
+#: singular value of R_X, in units of omega^2 and of the masses, below which something moves freely
+_FREE = 1e-9
+#: growth of the motion along the path from which on it is called unbounded
+_UNBOUNDED = 1e4
+
+
+def linear_response(curve: MotionProblem, value: float) -> Array:
+    """u of the response without elements, at a value of the free parameter."""
+    balance = curve.balance
+    zero = np.zeros((balance.basis.size, balance.size))
+    x, omega, values = curve.split(curve.join(zero, value))
+    state = balance.at(x, omega, values)
+    load = balance.load(values, omega)
+    if state.compliance is not None:
+        load = apply_blocks(state.compliance, load)
+    try:
+        inverse = np.linalg.inv(state.blocks).astype(complex)
+    except np.linalg.LinAlgError:
+        # a free body or an undamped resonance: the least motion that balances what can be balanced
+        inverse = np.linalg.pinv(state.blocks).astype(complex)
+    return curve.join(apply_blocks(inverse, load), value)
+
+
+def start_point(
+    curve: MotionProblem, value: float, given: Any, newton: NewtonOptions, largest: float = 0.0
+) -> CurvePoint:
+    """A solved point of the curve at a value of the free parameter, in a basis that suits it.
+
+    Parameters
+    ----------
+    given
+        None, a `PeriodicOrbit`, coefficients (2 H + 1, n), or a state `(x, dx/dt)` of shape (2 n,) from which time
+        integration leads to the motion.
+
+    Raises
+    ------
+    ConvergenceError
+        If no motion is found; says what was tried.
+    """
+    tried = []
+    linear = linear_response(curve, value)
+    curve.reference = max(curve.reference, curve.size(linear))
+    if given is not None:
+        if isinstance(given, PeriodicOrbit) and curve.adaptive is not None and given.basis.nu == curve.balance.basis.nu:
+            curve = curve.with_basis(given.basis)
+        guess = _from_given(curve, value, given)
+        try:
+            return _settled(curve, guess, newton, largest)
+        except ConvergenceError as failure:
+            if isinstance(given, PeriodicOrbit):
+                # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
+                with suppress(ConvergenceError):
+                    return _settled(curve, guess, newton, largest, _solve_nearest)
+            raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
+    patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
+    ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
+    for finer in _with_more_harmonics(curve):
+        kept = _like(finer, None, finer.reference)
+        ways += [
+            (f"linear response with {finer.balance.basis.harmonics} harmonics", partial(_linear, finer, value)),
+            (f"{_PATH} with {finer.balance.basis.harmonics}", partial(_released, kept, value, newton)),
+        ]
+    if curve.adaptive is not None:
+        ways.append((f"{_PATH} with as many as it needs", partial(_released, curve, value, newton)))
+    loose = None
+    for name, guess_by in ways:
+        try:
+            begun, guess = guess_by()
+            begun = curve.with_balance(begun.balance)
+            loose = _unheld(begun, guess)
+            return _settled(begun, guess, patient, largest)
+        except ConvergenceError as failure:
+            reason = str(failure)
+            if reason not in tried:
+                tried += [name, reason]
+    raise ConvergenceError(
+        f"no motion found to start from at {curve.where(linear)}{loose or ''}. Tried: " + "; ".join(tried) + ". "
+        "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
+    )
+
+
+def _unheld(curve: MotionProblem, u: Array) -> str | None:
+    """What may move freely beside a motion, in words; None if nothing may."""
+    x, omega, values = curve.split(u)
+    state = curve.balance.at(x, omega, values)
+    weights = curve.balance.row_weights(curve.balance.dimension)
+    _, sizes, rows = np.linalg.svd(state.jacobian * weights[:, None] * weights)
+    if sizes[-1] > _FREE * omega**2:
+        return None
+    loose = curve.balance.shaped(rows[-1])
+    mean = length(loose[0])
+    if mean < 0.9:
+        return ": an undamped resonance lies there. Give the structure some damping, or go beside it"
+    dof = int(np.argmax(np.abs(loose[0])))
+    return (
+        f": nothing holds DOF {dof}, whose mean position is arbitrary there (it floats between its stops, or has no "
+        "stiffness). Give it a small stiffness, or a load that reaches a stop"
+    )
+
+
+def _linear(curve: MotionProblem, value: float) -> tuple[MotionProblem, Array]:
+    return curve, linear_response(curve, value)
+
+
+def _with_more_harmonics(curve: MotionProblem) -> Iterator[MotionProblem]:
+    """The curve, and where the number of harmonics is free, with more of them: too few may have no motion at all."""
+    yield curve
+    if curve.adaptive is None:
+        return
+    nu = curve.balance.basis.nu
+    for harmonics in (15, 31, 63):
+        if curve.balance.basis.harmonics < harmonics * nu and harmonics <= curve.adaptive.maximum:
+            yield curve.with_basis(HarmonicBasis(harmonics * nu, nu))
+
+
+def _like(curve: MotionProblem, adaptive: AdaptiveHarmonics | None, reference: float) -> MotionProblem:
+    """The same motions with another rule for harmonics and another size of reference."""
+    tolerance = 0.0 if adaptive is None else adaptive.tolerance
+    cache = {curve.balance.basis: curve.balance}
+    return replace(curve, adaptive=adaptive, tolerance=tolerance, reference=reference, cache=cache)
+
+
+def _settled(
+    curve: MotionProblem, u: Array, newton: NewtonOptions, largest: float, solve: Callable[..., Solved] = solve_at
+) -> CurvePoint:
+    """Solve at the guess's parameter value (unless told otherwise), again with more harmonics while the motion asks."""
+    for _ in range(12):
+        x, omega, values = curve.split(u)
+        settled = curve.balance.settle(x, omega, values)
+        if settled is not curve.balance:
+            curve = curve.with_balance(settled)
+        solved = solve(curve, u, largest, newton)
+        adapted = curve.adapted(solved.u, solved.evaluation)
+        if adapted is curve:
+            break
+        u = adapted.transfer(solved.u, curve)
+        assert isinstance(adapted, MotionProblem)
+        curve = adapted
+    return make_point(solved, curve, None, 0.0)
+
+
+def _solve_nearest(curve: MotionProblem, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
+    """The point of the curve nearest to a guess close to it, whatever its parameter value."""
+    weights = curve.weights(guess, largest)
+    row = np.linalg.svd(curve.evaluate(guess).jacobian / weights)[2][-1]
+    return correct(curve, guess, row, weights, newton)
+
+
+def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
+    balance = curve.balance
+    basis, size = balance.basis, balance.size
+    if isinstance(given, PeriodicOrbit):
+        if given.coefficients.shape[1] != size:
+            raise InputError(f"start has {given.coefficients.shape[1]} DOFs, the system has {size}")
+        return curve.join(given.basis.resized(given.coefficients, basis), value)
+    try:
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(
+            "start must be a PeriodicOrbit, a point of a branch, a Bifurcation, a state (x, dx/dt) or coefficients, "
+            f"not {type(given).__name__}{' (one of its .orbits?)' if hasattr(given, 'orbits') else ''}"
+        ) from None
+    if not np.isfinite(array).all():
+        raise InputError("start contains numbers that are not finite")
+    if array.ndim == 1 and array.size == 2 * size:
+        return _integrated(curve, value, array)
+    shape = np.shape(given)
+    if array.ndim == 1 and size == 1:  # coefficients of one degree of freedom
+        array = array[:, None]
+    if array.ndim == 2 and array.shape[1] == size and array.shape[0] % 2 == 1 and array.shape[0] > 1:
+        return curve.join(HarmonicBasis(array.shape[0] // 2, basis.nu).resized(array, basis), value)
+    raise InputError(
+        f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * size}, or coefficients of shape "
+        f"(2 H + 1, {size}), H at least 1; got an array of shape {shape}"
+    )
+
+
+def _integrated(curve: MotionProblem, value: float, state: Array) -> Array:
+    """Harmonics of the motion over one period from a state."""
+    balance = curve.balance
+    if balance.size != balance.system.n:
+        raise ConvergenceError("time integration needs the full system, not a condensed one")
+    _, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
+    samples = 8 * balance.basis.harmonics + 8
+    times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
+    trajectory = integrate(balance.system, state, times, omega, values, rtol=1e-6)
+    spectrum = np.fft.rfft(trajectory.x[:-1], axis=0) / samples
+    return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
+
+
+class _HeldEvaluation(MotionEvaluation):
+    """`share (A X + F) + (1 - share) B X - P` and its derivatives by X and by the share; `hold`: B."""
+
+    def __init__(self, curve: MotionProblem, state: BalanceState, share: float, hold: Array) -> None:
+        super().__init__(curve, state, np.zeros(0))
+        self.share = share
+        self.hold = hold
+
+    @lazy
+    def _load(self) -> Array:
+        state = self.state
+        load = state.balance.load(state.values, state.omega)
+        if state.compliance is not None:
+            load = apply_blocks(state.compliance, load)
+        return load.ravel()
+
+    @lazy
+    def _rate(self) -> Array:
+        return self.state.residual + self._load - self.hold @ self.state.unknowns
+
+    @lazy
+    def residual(self) -> Array:
+        """See above, shape (N,)."""
+        return self.state.residual - (1.0 - self.share) * self._rate
+
+    @lazy
+    def jacobian(self) -> Array:
+        """Derivatives by X and by the share."""
+        return np.column_stack((self.share * self.state.jacobian + (1.0 - self.share) * self.hold, self._rate))
+
+    @lazy
+    def error(self) -> float:
+        """Residual in units of the forces that balance."""
+        balance = self.state.balance
+        size = length(self.residual * balance.row_weights(balance.dimension))
+        return size / max(self.state.force_scale(), np.finfo(float).tiny)
+
+
+class _Held:
+    """Motions of a system that a heavily damped linear structure holds, less and less: share 0 to 1 of its own forces.
+
+    B is `omega^2 (1 + i k / nu) m` at the multiple k omega / nu, m the masses that the DOFs show.
+    """
+
+    def __init__(self, curve: MotionProblem, value: float) -> None:
+        self.curve = curve
+        self.value = value
+        balance = curve.balance
+        x, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
+        self.rest = balance.at(x, omega, values)
+        if self.rest.compliance is None:
+            multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
+            blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
+            blocks[:] = np.diag(omega**2 * balance.scales()[0] ** 2)
+            self.hold = self.rest.block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None])
+        else:
+            # a condensed structure is known by its compliance alone
+            self.hold = self.rest.linear_jacobian
+
+    @property
+    def parameter(self) -> int:
+        return self.curve.parameter
+
+    def first(self) -> Array:
+        """The held motion without a share of its own: linear."""
+        load = -self.evaluate(self.curve.join(self.rest.x, 0.0)).residual
+        try:
+            return np.append(np.linalg.solve(self.hold, load), 0.0)
+        except np.linalg.LinAlgError:
+            raise ConvergenceError("the condensed structure is free to move, or undamped at its resonance") from None
+
+    def motion(self, u: Array) -> Array:
+        """u as one of the response curve."""
+        return np.append(u[:-1], self.value)
+
+    def evaluate(self, u: Array) -> Evaluation:
+        x, omega, values = self.curve.split(self.motion(u))
+        state = self.curve.balance.at(x, omega, values)
+        return _HeldEvaluation(self.curve, state, float(u[-1]), self.hold)
+
+    def size(self, u: Array) -> float:
+        return self.curve.size(u)
+
+    def weights(self, u: Array, largest: float) -> Array:
+        weights = self.curve.weights(u, largest)
+        weights[-1] = 1.0
+        return weights
+
+    def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
+        adapted = self.curve.adapted(self.motion(u), evaluation)
+        if adapted is self.curve:
+            return self
+        assert isinstance(adapted, MotionProblem)
+        return _Held(adapted, self.value)
+
+    def transfer(self, u: Array, origin: Curve) -> Array:
+        assert isinstance(origin, _Held)
+        return self.curve.transfer(u, origin.curve)
+
+    def images(self, u: Array) -> list[Array]:
+        return [u]
+
+    def unwrapped(self, u: Array, near: Array) -> Array:
+        return u
+
+    def where(self, u: Array) -> str:
+        return f"{u[-1]:.1%} of the system's own forces at {self.curve.name} = {self.value:.6g}"
+
+
+def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tuple[MotionProblem, Array]:
+    """The motion at a value of the parameter, followed from that of the held system, and its curve.
+
+    Raises
+    ------
+    ConvergenceError
+        If the path does not lead to the system itself.
+    """
+    problem = _Held(curve, value)
+    u = problem.first()
+    # the size of this motion, not of a linear response that a free body or a resonance makes large
+    problem = _Held(_like(curve, curve.adaptive, curve.size(u)), value)
+    point = make_point(solve_at(problem, u, 0.0, newton), problem, None, 0.0)
+    # where the orientation changes a step may have gone over to another path
+    march = March(point, 1.0, (0.0, 1.0), newton, _STEPPING, lambda a, b: a.orientation == b.orientation)
+    # of all its points the last alone is kept: with many harmonics the matrices of hundreds would fill the memory
+    (last,) = deque(march, maxlen=1)
+    assert isinstance(last.curve, _Held)
+    if abs(last.parameter - 1.0) <= 1e-12:
+        return last.curve.curve, last.curve.motion(last.u)
+    if last.curve.size(last.u) > _UNBOUNDED * curve.size(u):
+        raise ConvergenceError(
+            f"the motion grows without bound at {last.curve.where(last.u)}: neither damping nor restoring forces hold "
+            "the load there"
+        )
+    raise ConvergenceError(march.ended)

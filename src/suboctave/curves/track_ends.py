@@ -1,0 +1,325 @@
+"""Where a curve of bifurcations ends although its parameters stay in range: its motions cease to be of its kind.
+
+- NS: kappa reaches 0 (R1, on a curve of limit points) or w0/2 (R2, on a curve of period doublings), located there. At
+  w0/2 the harmonics left out shift the end in the equations solved, so that a curve may go on with neutral saddles: it
+  ends as well where the pair has become two real multipliers. Perturbations of motions with a half-wave symmetry have
+  either even or odd multiples of w0 beside kappa. The two of a pair are then of different kinds, and pass each other
+  at w0/2 as if nothing were there: the curve goes on with kappa above it, and ends where that reaches w0.
+- BP: the unfolding is not zero any more: the symmetry that forces branch points is broken.
+- LP of motions without the half-wave symmetry that the system has: the even harmonics vanish, where the branch points
+  of the symmetric motions change between super- and subcritical. Along these every point solves the same equations.
+- LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
+  the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
+  tracker would slide on along them: J at the parent is block diagonal, J_0 and J_half.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation.problem import Array
+from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.kinds.branch_point import BranchPointUnfolded
+from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.subharmonic_part import NOTHING_LEFT, doubled_size, subharmonic_share
+from suboctave.curves.tracked_events import Found
+from suboctave.curves.tracked_sample import TrackedSample, nearest_point, zero_along
+from suboctave.curves.tracked_tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+
+#: sub-harmonic share of the motion from which on the end of the curve is looked for
+_FAINT = 3e-3
+#: speed in the plane of the parameters below which they may stand, and distance there at which the end is reached
+#: whatever the share: what more of the way a motion of little damping shows is less than residuals tell
+_STANDING, _REACHED = 1e-4, 2e-7
+#: steps like the last within which it vanishes and its end is looked for; how far that may lie from where two points
+#: lead, as a share of the way
+_AHEAD, _LEADS = 3.0, 0.3
+#: way along the parent's curve, in scaled arclength, within which that end lies
+_BESIDE = 0.05
+#: parts of that way on which it is looked for one after the other: the parent's curve may turn sharply there
+_NEARER = (1.0, 1e-2, 1e-4)
+#: the same along a curve of LP or PD for the end of an NS curve
+_AROUND = 0.2
+#: kappa in units of the base frequency, from 0 or 1/2, at which an NS curve has reached its end
+_RESONANT = 2e-3
+#: the same, within which the pair is looked at
+_DOUBTFUL = 0.05
+#: the same, from which that end is looked for, with steps as long as need be
+_CLOSE = 0.02
+#: share of a perturbation with waves of the other parity that is none
+_NO_PARITY = 1e-6
+#: residual of the odd harmonics alone, in units of the forces and of the even ones' share, of a symmetric system; share
+#: of a parameter's range after which it is asked again whether they stay by themselves
+_UNSYMMETRIC, _ASIDE = 0.1, 0.02
+#: unfolding, in units of the forces that balance, above which there is no branch point
+_UNFOLDING = 1e-8
+
+
+@dataclass(frozen=True)
+class End:
+    """Why a curve ends, the event there where it was located, and whether the motion there is the curve's last."""
+
+    reason: str
+    event: Found | None = None
+    last: bool = False
+
+    def way(self, a: TrackedSample) -> float:
+        """Distance in the plane of the parameters from a point to the event, in scaled arclength."""
+        return 0.0 if self.event is None else _apart(self.event.sample.point, a.point)
+
+
+def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions, lopsided: bool = True) -> End | None:
+    """The end of a curve between two neighbours, None if it goes on; lopsided: whether its motions had no half-wave
+    symmetry where it began.
+    """
+    augmentation = b.curve.augmentation.own
+    if isinstance(augmentation, BranchPointUnfolded):
+        beta = float(b.evaluation.extra[0])
+        if abs(beta) > _UNFOLDING:
+            return End(
+                f"the branch points end after {a.curve.where(a.point.u)}: their unfolding is {beta:.1e} at "
+                f"{b.curve.where(b.point.u)}, the symmetry that forces them is broken there"
+            )
+    target = resonant_between(a, b)
+    if target is not None:
+        return _resonance(a, target == 0.5, newton)
+    if b.curve.balance.basis.nu == 1:
+        return _symmetry_gained(a, b) if lopsided else None
+    share = subharmonic_share(b.point)
+    if share <= _FAINT:
+        parent = _on_the_parent(a, newton)
+        if parent is not None:
+            return _in_the_parent(parent)
+    elif _standing(a, b):
+        parent = _on_the_parent(a, newton)
+        if parent is not None:
+            return _in_the_parent(parent) if _apart(parent.sample.point, b.point) <= 10.0 * _REACHED else None
+        return End(
+            f"the curve ends on the period doublings of the parent motion beside {b.curve.where(b.point.u)}: the "
+            "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
+        )
+    if share <= NOTHING_LEFT:
+        return End(
+            f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are period "
+            "doublings of the parent motion, which solve the same equations"
+        )
+    return None
+
+
+def resonant_between(a: TrackedSample, b: TrackedSample) -> float | None:
+    """kappa in units of the base frequency at which an NS curve ends between two neighbours; None if it goes on, or if
+    the curve is another one.
+    """
+    augmentation = b.curve.augmentation.own
+    if not isinstance(augmentation, SingularOperator) or augmentation.kind is not Kind.FREE:
+        return None
+    before, share = a.kappa / a.state.rate, b.kappa / b.state.rate
+    double = abs(share - 0.5) < 0.25
+    if double and _symmetric(b):
+        return None
+    # a step may lead across
+    target = 0.5 if double else float(round(share))
+    distance = (share - target) * math.copysign(1.0, before - target)
+    return target if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)) else None
+
+
+def comes_close(a: TrackedSample, b: TrackedSample) -> bool:
+    """False if an NS curve ends between two neighbours and the first is not close to its end: there may be several
+    resonances about, on the curves through them.
+    """
+    target = resonant_between(a, b)
+    return target is None or abs(a.kappa / a.state.rate - target) < _CLOSE
+
+
+def end_ahead(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
+    """The GPD in which limit points of doubled motions end within a step or two behind the second of two neighbours.
+
+    Towards it the parameters run like the square of the doubled part y, which vanishes evenly: p = p_end + c y^2. Where
+    y is small the equations tell limit points from period doublings of the parent by little, and of little damping by
+    nothing; so the end is looked for while they still do, and taken if it lies where the last two points lead.
+    """
+    lead = _lead(a, b)
+    if lead is None or subharmonic_share(b.point) <= NOTHING_LEFT:
+        return None
+    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
+    if size > _AHEAD * (before - size):
+        return None
+    parent = _on_the_parent(b, newton)
+    if parent is None:
+        return None
+    units = b.point.weights[-2:]
+    miss = float(np.linalg.norm(units * (parent.sample.point.u[-2:] - b.point.u[-2:] - lead)))
+    return _in_the_parent(parent) if miss <= _LEADS * float(np.linalg.norm(units * lead)) + _REACHED else None
+
+
+def _lead(a: TrackedSample, b: TrackedSample) -> Array | None:
+    """What the parameters still change by until the doubled part of limit points vanishes, if two neighbours lead
+    there; None if they do not, or are others.
+    """
+    if b.curve.balance.basis.nu % 2 or b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
+        return None
+    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
+    if not 0.0 < size < before:
+        return None
+    result: Array = (b.point.u[-2:] - a.point.u[-2:]) * size**2 / (before**2 - size**2)
+    return result
+
+
+def _in_the_parent(parent: Found) -> End:
+    where = parent.sample.curve.where(parent.sample.point.u)
+    reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
+    return End(reason, parent, last=True)
+
+
+def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
+    """The end of a curve of limit points whose motions become symmetric, x(t + T / 2) = -x(t)."""
+    if b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
+        return None
+    before, share = (_unsymmetric_share(sample.state) for sample in (a, b))
+    if share > _FAINT or share >= before or before <= _NO_PARITY:
+        return None
+    state, x = a.state, a.state.x.copy()
+    x[0], x[3::4], x[4::4] = 0.0, 0.0, 0.0
+    symmetric = state.balance.at(x, state.omega, state.values)
+    # what is missing without the even harmonics is of their order where the system has no such symmetry, else of its
+    # square
+    if symmetric.residual_size() > _UNSYMMETRIC * before * symmetric.force_scale():
+        return None
+    # a system may be symmetric at one value of a parameter that the curve passes
+    for name, width in zip(a.curve.names, a.curve.spans, strict=True):
+        if name != "omega":
+            values = {**state.values, name: state.values[name] + _ASIDE * width}
+            aside = state.balance.at(x, state.omega, values)
+            if np.abs(_even(aside.residual.reshape(x.shape))).max() > _NO_PARITY * aside.force_scale():
+                return None
+    return End(
+        f"the motions become symmetric at {b.curve.where(b.point.u)}, x(t + T/2) = -x(t): what follows are branch "
+        "points of symmetric motions, which solve the same equations"
+    )
+
+
+def is_lopsided(sample: TrackedSample) -> bool:
+    """Whether a motion lacks the half-wave symmetry by more than rounding."""
+    return _unsymmetric_share(sample.state) > _NO_PARITY
+
+
+def _unsymmetric_share(state: BalanceState) -> float:
+    """Share of mean and even harmonics in a motion."""
+    x = state.x * state.balance.scales()[0]
+    return float(np.linalg.norm(_even(x))) / (float(np.linalg.norm(x)) or 1.0)
+
+
+def _even(x: Array) -> Array:
+    """Mean and even harmonics of coefficients (2 H + 1, n)."""
+    return np.concatenate((x[:1], x[3::4], x[4::4]))
+
+
+def _apart(one: CurvePoint, other: CurvePoint) -> float:
+    """Distance in the plane of the parameters, in scaled arclength."""
+    return float(np.linalg.norm(other.weights[-2:] * (one.u[-2:] - other.u[-2:])))
+
+
+def _standing(a: TrackedSample, b: TrackedSample) -> bool:
+    """Whether the doubled part of limit points goes on to vanish while the parameters have come to their end."""
+    units, lead = b.point.weights[-2:], _lead(a, b)
+    speed = float(np.linalg.norm(units * b.point.tangent[-2:]))
+    if lead is None or speed > _STANDING or float(np.linalg.norm(units * lead)) > _REACHED:
+        return False
+    # the same by the tangent: two points may agree by chance, to what residuals tell
+    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
+    return 0.5 * speed * size * (b.point.arclength - a.point.arclength) <= _REACHED * (before - size)
+
+
+def _symmetric(b: TrackedSample) -> bool:
+    """Whether a perturbation has frequencies kappa + k w0 for even k alone, or for odd k alone."""
+    waves = b.equations.bordered.right.reshape(-1, b.curve.balance.size)
+    first, last = (float(np.linalg.norm(waves[i::2])) for i in (0, 1))
+    return min(first, last) < _NO_PARITY * max(first, last)
+
+
+def _split(b: TrackedSample) -> bool:
+    """Whether the two multipliers nearest to the critical one are real: a neutral saddle."""
+    critical = b.evaluation.critical
+    if critical is None:
+        return False
+    mu = b.evaluation.floquet.multipliers
+    nearest = mu[np.argsort(np.abs(mu - critical), kind="stable")[:2]]
+    return bool(np.all(nearest.imag == 0.0))
+
+
+def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
+    """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP, BP or PD curve through it."""
+    order = 2 if double else 1
+    words = f"1:{order}"
+    if a.curve.augmentation.turning:
+        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)}")
+    balance, name = a.curve.balance, a.curve.names[0]
+    state = balance.at(a.state.x, a.state.omega, a.state.values)
+    # limit points of motions with a symmetry may be branch points, where the equations of limit points are singular
+    singled_out: list[Callable[[], Augmentation]] = [
+        lambda: SingularOperator.of(state, Kind.HALF if double else Kind.INTEGER)
+    ]
+    if not double:
+        singled_out.append(lambda: BranchPointUnfolded.of(state, name))
+    failures = []
+    for augmentation in singled_out:
+        try:
+            curve = replace(a.curve, augmentation=augmentation())
+            found = _zero_beside(a, curve, a.state.x, DoubleMultiplier(order), newton, _AROUND)
+            break
+        except ConvergenceError as failure:
+            failures.append(str(failure))
+    else:
+        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failures[0]})")
+    where = found.sample.curve.where(found.sample.point.u)
+    return End(f"the curve ends in a {words} resonance at {where}", found, last=True)
+
+
+def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
+    """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
+    basis = a.curve.balance.basis
+    if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
+        return None
+    x = basis.even_part(a.state.x)
+    try:
+        balance = a.curve.balance.with_basis(basis.halved).settle(x, a.state.omega, a.state.values)
+        own = SingularOperator.of(balance.at(x, a.state.omega, a.state.values), Kind.HALF)
+        curve = replace(a.curve, balance=balance, augmentation=own, cache={balance.basis: balance})
+        return _zero_beside(a, curve, x, GeneralisedDoubling(), newton, _BESIDE)
+    except ConvergenceError:
+        return None
+
+
+def _zero_beside(
+    a: TrackedSample, curve: MotionProblem, x: Array, test: CurveTest, newton: NewtonOptions, reach: float
+) -> Found:
+    """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
+    u = curve.join(x, a.point.u[-len(curve.names) :], np.zeros(curve.augmentation.extras))
+    start = nearest_point(curve, u, curve.weights(u, curve.size(u)), newton)
+    *wider, last = _NEARER
+    for share in wider:
+        with suppress(ConvergenceError):
+            return Found(test, zero_along(start, test.value, newton, share * reach))
+    return Found(test, zero_along(start, test.value, newton, last * reach))
+
+
+def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
+    """A motion in a curve's basis, where that is of another period: one of the parent of doubled motions."""
+    balance = a.curve.balance
+    if orbit.basis.nu == balance.basis.nu:
+        return orbit
+    return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
+
+
+__all__ = ["End", "comes_close", "end_ahead", "end_between", "is_lopsided", "rebased", "resonant_between"]

@@ -1,0 +1,382 @@
+"""Following a curve of bifurcations in two parameters: points, events, until it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation import CurvePoint, March, kernels
+from suboctave.continuation.bounds import Bounds
+from suboctave.continuation.ending import Ending, EndReason, interruption_of
+from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
+from suboctave.continuation.problem import Curve
+from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
+from suboctave.curves.points import TrackedPoint
+from suboctave.curves.subharmonic_part import keeps_subharmonics
+from suboctave.curves.trace import Settings
+from suboctave.curves.track_approach import points_before
+from suboctave.curves.track_corners import beyond_corner
+from suboctave.curves.track_ends import End, comes_close, end_ahead, end_between, is_lopsided, rebased
+from suboctave.curves.track_start import Box
+from suboctave.curves.tracked_events import Found, events_between, extreme_of, refined
+from suboctave.curves.tracked_hidden import HiddenPairs
+from suboctave.curves.tracked_located import as_event
+from suboctave.curves.tracked_pairs import PairWatch
+from suboctave.curves.tracked_sample import TrackedSample
+from suboctave.curves.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
+from suboctave.errors import ConvergenceError
+from suboctave.interruption import Interruption
+
+#: steps longer than this, in scaled arclength, must not change the curve's orientation
+_JUMP = 2e-6
+#: steps that need not come closer to the end of an NS curve
+_NEAR_END = 1e-3
+#: corners after which no further one is passed
+_CORNERS = 5
+#: way before a corner, in scaled arclength, on which what turns there is not told from it
+_CORNER = 1e-5
+#: distance of the multipliers from the critical one at which a point is doubtful; points in succession at which it is,
+#: beside multipliers so large that it cannot be told, after which a curve ends
+_DOUBTFUL, _UNTOLD, _VIOLENT = 0.05, 3, 1e4
+
+
+@dataclass
+class TrackedTrace:
+    """What following a curve in one direction gave."""
+
+    points: list[TrackedPoint] = field(default_factory=list)
+    events: list[TrackedEvent] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    closed: bool = False
+    endings: tuple[Ending, Ending] = (Ending(EndReason.START), Ending(EndReason.NOT_STARTED))
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped in one of its directions before it came to an end."""
+        return interruption_of(self.endings) is not None
+
+    def ends(self, ending: Ending) -> None:
+        """Why it ends at its last point."""
+        self.endings = (self.endings[0], ending)
+
+    def reversed_before(self, other: TrackedTrace) -> TrackedTrace:
+        """This trace walked backwards, then `other`, which started from the same point."""
+        whole = self.points[-1].arclength
+        points = [p.at(whole - p.arclength) for p in reversed(self.points)]
+        points += [p.at(whole + p.arclength) for p in other.points[1:]]
+        events = [replace(e, arclength=whole - e.arclength) for e in reversed(self.events)]
+        events += [replace(e, arclength=whole + e.arclength) for e in other.events]
+        endings = (self.endings[1], other.endings[1])
+        return TrackedTrace(points, events, self.warnings + other.warnings, False, endings)
+
+
+def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> TrackedTrace:
+    """Follow a curve from a solved start along the start's own tangent; KeyboardInterrupt ends it politely."""
+    return _Tracker(start, box, settings).run()
+
+
+class _Tracker:
+    def __init__(self, start: CurvePoint, box: Box, settings: Settings) -> None:
+        assert isinstance(start.curve, MotionProblem)
+        self.settings = settings
+        self.box = box
+        self.others = _other_bounds(start.curve, box)
+        self.lopsided = is_lopsided(TrackedSample(start))
+        heading = math.copysign(1.0, start.tangent[start.curve.parameter])
+        self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
+        self.trace = TrackedTrace()
+        tests = tests_of(start.curve)
+        self.tests: tuple[CurveTest, ...] = tuple(t for t in tests if not isinstance(t, PairCrossing))
+        self.previous: TrackedSample | None = None
+        self.hidden = HiddenPairs(self.tests, settings.newton)
+        pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
+        self.pairs = PairWatch(pairs, settings.newton)
+        self.corners = 0
+        #: how many points have known multipliers, and where none of these is the critical one
+        self.looked = 0
+        self.doubtful: list[str] = []
+        #: how many of the last of these in succession, with others that are large
+        self.untold = 0
+        #: the first point, headed as the curve leaves it
+        self.home: CurvePoint | None = None
+
+    def run(self) -> TrackedTrace:
+        trace = self.trace
+        if self.settings.report is not None:
+            self.settings.report.begins()
+        try:
+            while True:
+                ending = self._march()
+                trace.ends(ending)
+                beyond = self._beyond_corner() if ending.reason is EndReason.STEP_TOO_SMALL else None
+                if beyond is None:
+                    break
+                stepping = self.settings.stepping
+                heading = math.copysign(1.0, beyond.tangent[-1])
+                home = self.home
+                self.march = March(
+                    beyond, heading, self.box.second, self.settings.newton, stepping, self._clear, home=home
+                )
+            trace.closed = self.march.closed
+            self._say_doubts()
+            self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
+        except KeyboardInterrupt as cause:
+            where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
+            trace.ends(Ending.stopped(Interruption.of(cause), where))
+        trace.events.sort(key=lambda event: event.arclength)
+        if trace.closed:
+            _drop_seam(trace.events)
+        return trace
+
+    def _march(self) -> Ending:
+        """Take in points until the curve ends; why it does."""
+        for point in self.march:
+            stop = self._accept(point)
+            if stop is not None:
+                return stop
+        return self.march.ending
+
+    def _beyond_corner(self) -> CurvePoint | None:
+        """A point behind a corner that the steps could not get around, None if there is none."""
+        last = self.previous
+        if last is None or self.corners >= _CORNERS:
+            return None
+        self.corners += 1
+        before = (p.orbit for p in reversed(self.trace.points))
+        found = beyond_corner(last, before, self.settings.newton)
+        if found is None:
+            return None
+        point, note = found
+        if note not in self.trace.warnings:
+            self.trace.warnings.append(note)
+        if point is None or not self._inside(TrackedSample(point)):
+            return None
+        self._turn_at_corner(last, point)
+        return point
+
+    def _turn_at_corner(self, last: TrackedSample, beyond: CurvePoint) -> None:
+        """Parameters that run the other way behind a corner have an extremum in it, known as well as the corner is.
+
+        It stands for whatever turns on the last steps into it, where nothing tells one turn from another.
+        """
+        middle = 0.5 * (last.point.arclength + beyond.arclength)
+        events = self.trace.events
+        events[:] = [e for e in events if e.kind not in ("extremum", "CP") or middle - e.arclength > _CORNER]
+        for test in self.tests:
+            if not isinstance(test, Extremum):
+                continue
+            i = last.curve.index(test.name)
+            if last.point.tangent[i] * beyond.tangent[i] < 0.0:
+                found = Found(test, last, extreme_of(test, test.value(last), last))
+                event = as_event(found, self.settings.stability, self.settings.observe)
+                width = abs(float(beyond.u[i] - last.point.u[i]))
+                events.append(replace(event, isola="", uncertainty=width, arclength=middle))
+
+    @staticmethod
+    def _clear(a: CurvePoint, b: CurvePoint) -> bool:
+        """True if a step stays on its curve."""
+        way = b.arclength - a.arclength
+        if b.orientation != a.orientation and way > _JUMP:
+            return False
+        if way > _NEAR_END and not comes_close(TrackedSample(a), TrackedSample(b)):
+            return False
+        return keeps_subharmonics(a, b)
+
+    def _accept(self, point: CurvePoint) -> Ending | None:
+        """Take a point in; why the curve ends there or before it, if it does."""
+        settings, new = self.settings, TrackedSample(point)
+        self.home = self.home or point
+        if self.previous is not None:
+            # by now the choice of harmonics has asked for what it needs
+            self._note_doubt(self.previous)
+            if self.untold >= _UNTOLD:
+                largest = np.abs(self.previous.evaluation.floquet.multipliers).max()
+                where = self.previous.curve.where(self.previous.point.u)
+                detail = (
+                    f"multipliers of up to {largest:.0e} at {where} leave the critical one untold: the motions are so "
+                    "unstable there that their bifurcations have no meaning"
+                )
+                return Ending(EndReason.NO_MEANING, where, detail)
+        if self.previous is None or point is self.march.start:
+            # beyond a corner nothing leads on from what lies behind
+            for watch in (self.hidden, self.pairs):
+                self._take(watch.rest(self.trace.warnings))
+                watch.passed(new, self.trace.warnings)
+            self._add(new)
+            self.previous = new
+            return None
+        if self.march.closed:
+            new = self._closing(self.previous, new)
+        a = self.previous
+        end = end_between(a, new, settings.newton, self.lopsided)
+        if end is not None:
+            self._take_end(a, end)
+            return Ending(EndReason.MOTIONS_END, detail=end.reason)
+        try:
+            left = self._left(a, new)
+        except ConvergenceError:
+            return Ending(EndReason.LEFT_RANGE, a.curve.where(a.point.u))
+        new = self._smooth(a, left or new)
+        warnings = self.trace.warnings
+        found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
+        self._take(found + events_between(a, new, self.tests, settings.newton, warnings))
+        self._add(new)
+        self.previous = new
+        if settings.report is not None:
+            basis, where, trace = new.curve.balance.basis, point.curve.where(point.u), self.trace
+            numbers = len(trace.points), len(trace.events), basis.harmonics // basis.nu
+            settings.report.at(point.parameter, where, *numbers)
+        if left is not None:
+            return Ending(EndReason.RANGE_END, new.curve.where(new.point.u))
+        ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
+        if ahead is None:
+            return None
+        self._take_end(new, ahead)
+        return Ending(EndReason.MOTIONS_END, detail=ahead.reason)
+
+    def _take(self, found: list[Found]) -> None:
+        settings, warnings = self.settings, self.trace.warnings
+        for item in found:
+            better = refined(item, settings.newton, warnings)
+            if not better.test.confirmed(better.sample):
+                where = better.sample.curve.where(better.sample.point.u)
+                warnings.append(
+                    f"{better.test.kind} at {where} is left out: with the harmonics kept a pair of multipliers lies on "
+                    "the unit circle there, by the monodromy matrix none does"
+                )
+                continue
+            self.trace.events.append(as_event(better, settings.stability, settings.observe))
+
+    def _add(self, sample: TrackedSample) -> None:
+        point = sample.point
+        self.trace.points.append(
+            TrackedPoint(
+                sample.orbit,
+                point.arclength,
+                point.iterations,
+                self.settings.stability,
+                sample.instant_or_frequency,
+                sample.coefficient,
+                sample.multipliers_by(self.settings.stability),
+                extreme=sample.extreme,
+                isola=sample.isola,
+            )
+        )
+
+    def _note_doubt(self, sample: TrackedSample) -> None:
+        """Whether the critical multiplier is one of the monodromy matrix, where that is known and now and then."""
+        evaluation = sample.evaluation
+        known = "floquet" in evaluation.__dict__ or sample.curve.steps % CRITICAL_EVERY == 0
+        if known and evaluation.critical is not None:
+            self.looked += 1
+            doubtful = evaluation.doubt > _DOUBTFUL
+            if doubtful:
+                self.doubtful.append(sample.curve.where(sample.point.u))
+            violent = np.abs(evaluation.floquet.multipliers).max() > _VIOLENT
+            self.untold = self.untold + 1 if doubtful and violent else 0
+
+    def _say_doubts(self) -> None:
+        if self.doubtful:
+            self.trace.warnings.append(
+                f"at {len(self.doubtful)} of {self.looked} points whose multipliers were computed the critical one is "
+                f"missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, or "
+                "the motion is so unstable that its multipliers cannot be told"
+            )
+
+    def _take_end(self, a: TrackedSample, end: End) -> None:
+        settings = self.settings
+        for b in points_before(end, a, settings.newton):
+            self._take(events_between(a, b, self.tests, settings.newton, self.trace.warnings))
+            self._add(b)
+            a = b
+        arclength = a.point.arclength + end.way(a)
+        if end.event is not None:
+            found = refined(end.event, settings.newton, self.trace.warnings)
+            item = as_event(found, settings.stability, settings.observe)
+            curve = a.curve.augmentation.name
+            self.trace.events.append(replace(item, arclength=arclength, curve=curve))
+            if end.last:
+                orbit = rebased(item.orbit, a)
+                kappa = 0.5 * orbit.omega / orbit.basis.nu if found.test.kind == "R2" else 0.0
+                self.trace.points.append(TrackedPoint(orbit, arclength, 0, settings.stability, kappa))
+
+    def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
+        """The first point again, with the bordering vectors of the last."""
+        weights = back.point.weights
+        curve = a.curve.adapted(a.point.u, a.evaluation).with_basis(back.curve.balance.basis)
+        try:
+            solved = correct(curve, back.point.u, weights * back.point.tangent, weights, self.settings.newton)
+        except ConvergenceError:
+            return back
+        along = curve.transfer(a.point.tangent, a.curve)
+        return TrackedSample(make_point(solved, curve, along, back.point.arclength))
+
+    def _smooth(self, a: TrackedSample, b: TrackedSample) -> TrackedSample:
+        """The second of two neighbours with the direction in which the curve comes to it.
+
+        On the end of a range a coefficient may have a corner (a gap that is just closed): derivatives there may be
+        those of the far side.
+        """
+        point, angle = b.point, self.settings.stepping.sharpest
+        if kernels.cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(angle):
+            return b
+        chord = point.weights * (point.u - b.curve.transfer(a.point.u, a.curve))
+        return TrackedSample(replace(point, tangent=kernels.normalised(chord, point.weights)))
+
+    def _inside(self, sample: TrackedSample) -> bool:
+        """Whether a point lies in the ranges of the parameters but the last."""
+        return all(bounds.low <= bounds.value(sample.point) <= bounds.high for bounds in self.others)
+
+    def _left(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
+        """The first point between two neighbours at which the curve leaves the range of a parameter but the last, None
+        if it stays in them; raises ConvergenceError where it leaves one but no solution is found on its bound.
+        """
+        newton, found = self.settings.newton, None
+        for bounds in self.others:
+            end = b if found is None else found
+            bound = bounds.passed(a.point, end.point)
+            if bound is None:
+                landed = bounds.turned_beyond(a.point, end.point, newton)
+            elif bounds.value(end.point) == bound:
+                landed = end.point
+            else:
+                landed = bounds.land(a.point, end.point, bound, newton)
+                if landed is None:
+                    raise ConvergenceError(
+                        f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
+                    )
+            if landed is not None:
+                found = end if landed is end.point else TrackedSample(landed)
+        return found
+
+
+def _other_bounds(curve: MotionProblem, box: Box) -> list[Bounds]:
+    """The ranges of the parameters but the last."""
+
+    def index_of(name: str) -> Callable[[Curve], int]:
+        def index(curve: Curve) -> int:
+            assert isinstance(curve, MotionProblem)
+            return curve.index(name)
+
+        return index
+
+    ranges = box.ranges(curve.names)
+    return [Bounds(index_of(name), *ranges[name]) for name in curve.names[:-1] if name in ranges]
+
+
+def _drop_seam(events: list[TrackedEvent]) -> None:
+    """What lies on the seam of a closed curve is met at both ends: keep the first."""
+    if len(events) > 1:
+        first, last = events[0], events[-1]
+        names = first.names
+        same = all(math.isclose(first.parameter(n), last.parameter(n), rel_tol=1e-8, abs_tol=1e-12) for n in names)
+        if first.kind == last.kind and first.parameter_name == last.parameter_name and same:
+            events.pop()
+
+
+__all__ = ["TrackedTrace", "follow_tracked"]

@@ -1,0 +1,215 @@
+"""Where tracking begins: a bifurcation, or an extremum along a curve of them, solved again as a point of its curve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.gaps import levels
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation import CurvePoint
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import correct, tangent
+from suboctave.continuation.point import make_point
+from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.discretisation import rule_of
+from suboctave.curves.events.formulation import BORDERED, Alcorta2019, ExtendedSystem, Formulation
+from suboctave.curves.kinds.branch_point import BranchPointUnfolded
+from suboctave.curves.kinds.extended import ExtendedOperator, PublishedDoubling
+from suboctave.curves.kinds.extremum import LimitPointExtremal
+from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
+from suboctave.curves.kinds.grazing import GrazingContactEquations
+from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.trace import Settings
+from suboctave.curves.tracked_sample import null_row
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+
+_OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
+#: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
+_NEAR = 0.05
+
+
+@dataclass(frozen=True)
+class Box:
+    """Ranges of the first and the last free parameter, and of that between along a curve of extrema; None where one is
+    not bounded. The curve ends on them.
+    """
+
+    first: tuple[float, float] | None
+    second: tuple[float, float]
+    between: tuple[float, float] | None = None
+
+    def ranges(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Those of the free parameters that are bounded, by their names, the last one last."""
+        known = {names[0]: self.first, names[1]: self.between, names[-1]: self.second}
+        return {name: ends for name, ends in known.items() if ends is not None}
+
+    def around(self, names: Sequence[str], values: Mapping[str, float]) -> bool:
+        """Whether values of the free parameters lie within the ranges."""
+        return all(low <= values[name] <= high for name, (low, high) in self.ranges(names).items())
+
+
+def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
+    """Whether something is an extremum along a tracked curve, the ends of isolas among them."""
+    return isinstance(item, TrackedEvent) and bool(item.extreme)
+
+
+def kind_of(item: Bifurcation) -> str:
+    """Kind of the bifurcations that are followed."""
+    return item.curve if isinstance(item, TrackedEvent) else item.kind
+
+
+def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
+    """The rule for harmonics, None for a number of them, and the basis that tracking begins with."""
+    rule = rule_of(wanted)
+    if isinstance(rule, AdaptiveHarmonics):
+        return rule, basis
+    return None, HarmonicBasis(rule * basis.nu, basis.nu)
+
+
+def _augmentation(
+    item: Bifurcation, state: BalanceState, names: tuple[str, ...], formulation: Formulation
+) -> tuple[Augmentation, np.ndarray]:
+    """What singles the bifurcation out, and the start of its extra unknowns."""
+    if kind_of(item) == "grazing":
+        assert item.contact is not None
+        places = np.array(levels(state.local(item.contact.element)))
+        index = int(np.argmin(np.abs(places - item.contact.gap)))
+        tau = item.contact.time * state.rate
+        return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
+    if kind_of(item) == "BP":
+        return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
+    kind = _OPERATORS[kind_of(item)]
+    extra = np.zeros(0)
+    if kind is Kind.FREE:
+        kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
+        extra = np.array([kappa])
+    kappa = float(extra.sum())
+    if isinstance(formulation, Alcorta2019) and kind is Kind.HALF:
+        return PublishedDoubling.started(state, names), extra
+    if isinstance(formulation, ExtendedSystem) or (isinstance(formulation, Alcorta2019) and kind is Kind.INTEGER):
+        return ExtendedOperator.started(state, kind, kappa)
+    return SingularOperator.of(state, kind, kappa), extra
+
+
+def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tuple[float, ...]:
+    """Sizes of the free parameters: widths of their ranges, where there are none their values."""
+    ranges = dict((item.context or {}).get("bounds", {})) if is_extremum(item) else {}
+    if box is not None:
+        ranges |= box.ranges(names)
+    sizes = [abs(float(ranges[n][1]) - float(ranges[n][0])) if n in ranges else abs(item.parameter(n)) for n in names]
+    return tuple(size or 1.0 for size in sizes)
+
+
+def curve_through(
+    item: Bifurcation,
+    balance: HarmonicBalance,
+    adaptive: AdaptiveHarmonics | None,
+    names: tuple[str, ...],
+    spans: tuple[float, ...],
+    formulation: Formulation = BORDERED,
+) -> tuple[MotionProblem, np.ndarray]:
+    """The curve of bifurcations in free parameters through one of them, and its u there, in the basis of `balance`."""
+    orbit = item.orbit
+    x = orbit.basis.resized(orbit.coefficients, balance.basis)
+    balance = balance.settle(x, orbit.omega)
+    state = balance.at(x, orbit.omega)
+    augmentation, extra = _augmentation(item, state, names, formulation)
+    force = state.force_scale()
+    curve = MotionProblem(
+        balance,
+        names,
+        spans,
+        orbit.omega,
+        adaptive,
+        # between what a response curve needs and what a located event does
+        0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
+        augmentation,
+        # nothing but a motion of unit size measures one at rest
+        reference=0.0 if force > 0.0 else 1.0,
+    )
+    curve.force = max(force, curve.least_force(orbit.omega))
+    return curve, curve.join(x, np.array([item.parameter(name) for name in names]), extra)
+
+
+def with_extremum(curve: MotionProblem, u: np.ndarray, turning: str, plane: tuple[str, str]) -> MotionProblem:
+    """The curve with the equation of an extremum of one of the two parameters in its plane, at one of its points."""
+    extra = curve.extra(u)
+    (beside,) = set(plane) - {turning}
+    sizes = dict(zip(curve.names, curve.spans, strict=True))
+    n = curve.balance.dimension
+    extra_spans = 1.0 / curve.weights(u, 0.0)[n : n + len(extra)]
+    state = curve.evaluate(u).state
+    base = curve.augmentation.own
+    augmentation: Augmentation
+    if isinstance(base, SingularOperator) and base.name == "LP":
+        augmentation = LimitPointExtremal(base, beside, state.force_scale() / sizes[beside], turning)
+    else:
+        augmentation = BorderedExtremal.of(base, state, extra, beside, turning, sizes, extra_spans)
+    return replace(curve, augmentation=augmentation)
+
+
+def solved_start(
+    item: Bifurcation,
+    balance: HarmonicBalance,
+    adaptive: AdaptiveHarmonics | None,
+    names: tuple[str, ...],
+    box: Box,
+    settings: Settings,
+) -> CurvePoint:
+    """The bifurcation solved again as a point of the curve, in a basis that suits it.
+
+    Raises
+    ------
+    ConvergenceError
+        If it is not found again.
+    """
+    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), settings.formulation)
+    for name, (low, high) in box.ranges(names).items():
+        u[curve.index(name)] = min(high, max(low, u[curve.index(name)]))
+    if is_extremum(item):
+        curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
+    begin = u
+    origin = curve
+    along: np.ndarray | None = None
+    try:
+        for _ in range(8):
+            weights = curve.weights(u, 0.0)
+            row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
+            if abs(row[-1]) > 1e-2:
+                row = np.eye(1, len(row), len(row) - 1)[0]
+            solved = correct(curve, u, row, weights, settings.newton)
+            adapted = curve.adapted(solved.u, solved.evaluation)
+            same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
+            if same:
+                break
+            along = adapted.transfer(tangent(solved), curve)
+            u, curve = adapted.transfer(solved.u, curve), adapted
+        moved = weights * (solved.u - curve.transfer(begin, origin))
+        if float(np.linalg.norm(moved)) > _NEAR:
+            raise ConvergenceError(f"what was found lies elsewhere, at {curve.where(solved.u)}")
+        return make_point(solved, curve, None, 0.0)
+    except ConvergenceError as failure:
+        raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
+
+
+__all__ = [
+    "Box",
+    "curve_through",
+    "discretisation",
+    "is_extremum",
+    "kind_of",
+    "solved_start",
+    "spans_of",
+    "with_extremum",
+]

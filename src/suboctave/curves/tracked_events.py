@@ -1,0 +1,375 @@
+"""Events between two neighbours of a curve of bifurcations: bracketed, located, and located again with more harmonics.
+
+What is looked for are the sign changes of `tracked_tests`. At a cusp the curve turns in both parameters, which makes no
+extremum of either: there the tangent's components divided by the cusp's function keep their signs.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import scipy
+
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point, point_between
+from suboctave.continuation.problem import Array
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.tracked_sample import BEGINNING, TrackedSample, nearest_point, same_discretisation, zero_along
+from suboctave.curves.tracked_tests import CurveTest, Cusp, Extremum
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.truncation import choose_harmonics
+
+#: way along a curve, in scaled arclength, that more harmonics may move an event
+_BESIDE = 0.05
+#: share of a step within which events coincide
+SAME = 5e-3
+#: share of a step to which an event is located, at once and where more harmonics are to follow
+_RESOLVED, _ROUGH = 1e-11, 1e-3
+#: share of a test's values at the ends of a step with which a zero is near enough for secants
+_LITTLE = 0.05
+#: the same share above which a test that has been resolved jumps there instead of vanishing
+_JUMP = 0.5
+#: ratio of a test's values at two ends beyond which it does not change evenly
+_LARGE = 30.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """An event between two neighbours.
+
+    test, sample, extreme
+        Its test, where it lies, and at an extremum which way the curve turns.
+    rough, slope
+        Where more harmonics are to locate it better; about the test's derivative by arclength.
+    off
+        How far it may still lie off, in scaled arclength, where nothing could locate it better.
+    """
+
+    test: CurveTest
+    sample: TrackedSample
+    extreme: str = ""
+    rough: _Stretch | None = None
+    slope: float = 0.0
+    off: float = 0.0
+
+
+def events_between(
+    a: TrackedSample, b: TrackedSample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
+) -> list[Found]:
+    """Every event between two neighbours, in the order met.
+
+    The first one's tests count in the discretisation it was found in, as on the step before: what changes sign there
+    is not lost, nor found twice, if that of the second one's moves it across.
+    """
+    found: list[Found] = []
+    for test in tests:
+        try:
+            both = [located(test, low, high, newton) for low, high in brackets(test, a, b, newton)]
+            found += [item for item in both if item is not None]
+        except ConvergenceError as failure:
+            warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
+    if b.curve.augmentation.turning:
+        found = _without_consequences(found, b.curve, SAME * (b.point.arclength - a.point.arclength))
+    return sorted(found, key=lambda item: item.sample.point.arclength)
+
+
+def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: NewtonOptions) -> Found | None:
+    """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
+    own = test.within(low, high)
+    same = same_discretisation(low, high, newton)
+    stretch = _Stretch(same, high, own if same is low else own.within(same, high), newton)
+    own = stretch.test
+    if same is not low and stretch.values[0.0] * stretch.values[1.0] > 0.0:
+        # in this discretisation it lies before the first
+        way = high.point.arclength - low.point.arclength
+        slope = (stretch.values[1.0] - stretch.values[0.0]) / way
+        sample = zero_along(same.point, own.value, newton, way, slope)
+        return Found(own, sample, extreme_of(own, -slope, sample), None, slope) if own.genuine(sample) else None
+    # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
+    close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
+    sample, slope = stretch.about(_ROUGH if close else 0.0)
+    if not own.genuine(sample) or (not close and stretch.jumps_at(sample)):
+        return None
+    before = stretch.values[0.0] if stretch.values[0.0] != 0.0 else -slope
+    # what more harmonics will move need not be known better
+    finer = _finer(sample) is not None
+    sample = sample if finer else stretch.zero_from(sample, slope)
+    return Found(own, sample, extreme_of(own, before, sample), stretch if finer else None, slope)
+
+
+def _without_consequences(found: list[Found], curve: MotionProblem, near: float) -> list[Found]:
+    """Events along a curve of extrema without those that others bring about.
+
+    Where the third parameter turns the extreme one does so too: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M.
+    At a cusp a symmetry may have both turn, which makes no extremum of either.
+    """
+    extreme, last = curve.augmentation.turning, curve.names[-1]
+
+    def beside(item: Found, others: list[Found]) -> bool:
+        return any(abs(item.sample.point.arclength - o.sample.point.arclength) <= near for o in others)
+
+    turns = {name: [i for i in found if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
+    cusps = [item for item in found if isinstance(item.test, Cusp)]
+    both = [item for item in turns[extreme] if beside(item, turns[last])]
+    dropped = both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
+    return [item for item in found if not any(item is d for d in dropped)]
+
+
+def brackets(
+    test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
+) -> list[tuple[TrackedSample, TrackedSample]]:
+    """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
+    changed = test.changed(a, b)
+    share = None if changed or not isinstance(test, Extremum) else _turn_inside(test.name, a, b)
+    if not changed and share is None:
+        return []
+    if isinstance(test, Extremum) and test.level(a, b):
+        return []
+    if share is None:
+        return [(a, b)]
+    middle = TrackedSample(point_between(a.point, b.point, share, newton))
+    return [(a, middle), (middle, b)] if test.changed(a, middle) else []
+
+
+def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
+    """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
+    share, slope = slowest_between(name, a, b)
+    start = abs(a.slopes[name])
+    # where it nearly vanishes the interpolation cannot tell
+    return share if 0.0 < share < 1.0 and slope < 0.05 * start else None
+
+
+def slowest_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float]:
+    """Where between two neighbours (0 and 1: at one of them) a parameter runs slowest by its cubic interpolation, and
+    its slope there in the direction of the first.
+    """
+    start, curve, half = _slope_between(name, a, b)
+    sign = math.copysign(1.0, start)
+    share = -half / curve if curve != 0.0 else 0.0
+    if 0.0 < share < 1.0:
+        return share, sign * (start + share * half)
+    last = sign * b.slopes[name]
+    return (0.0, sign * start) if sign * start < last else (1.0, last)
+
+
+def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float, float]:
+    """The derivative of a parameter by arclength, `start + 2 half s + curve s^2` at the share s of the way between two
+    neighbours, by its cubic interpolation; nothing of it without a way.
+    """
+    i, j, way = a.curve.index(name), b.curve.index(name), b.point.arclength - a.point.arclength
+    if not way > 0.0:
+        return 0.0, 0.0, 0.0
+    chord = float(b.point.u[j] - a.point.u[i]) / way
+    start, stop = a.slopes[name], b.slopes[name]
+    return start, 3.0 * (start + stop - 2.0 * chord), 3.0 * chord - 2.0 * start - stop
+
+
+class _Stretch:
+    """A test between two neighbours, by the share of the way along the chord."""
+
+    def __init__(self, a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> None:
+        self.a, self.b = a, b
+        self.test = test
+        self.newton = newton
+        self.samples = {0.0: a, 1.0: b}
+        self.values = {0.0: test.value(a), 1.0: test.value(b)}
+        #: as in `newton.correct`: points that only lead to the zero may have the derivatives of one beside
+        self.spare = 0.0
+
+    @property
+    def way(self) -> float:
+        """Its length in scaled arclength."""
+        return self.b.point.arclength - self.a.point.arclength
+
+    def value(self, share: float) -> float:
+        """The test's function."""
+        if share not in self.values:
+            sample = self.samples[share] = TrackedSample(self._point(share))
+            self.values[share] = self.test.value(sample)
+        return self.values[share]
+
+    def _point(self, share: float) -> CurvePoint:
+        """As `point_between`, started from the nearest points known."""
+        a, b = self.a.point, self.b.point
+        low = max(s for s in self.samples if s < share)
+        high = min(s for s in self.samples if s > share)
+        curve, weights, origin = b.curve, b.weights, b.curve.transfer(a.u, a.curve)
+        chord = b.u - origin
+        row = weights * chord
+        row = row / length(row)
+        # a fixed plane for every share, whatever the start
+        place = share * float(row @ (weights * chord)) + float(row @ (weights * origin))
+
+        def start(u: Array, along: Array) -> Array:
+            scaled = weights * along
+            return u + (place - float(row @ (weights * u))) / float(row @ scaled) * along
+
+        first, last = self.samples[low].point, self.samples[high].point
+        ends = [(curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve)) for p in (first, last)]
+        between_them = start(between(first, last, (share - low) / (high - low)), row / weights)
+        if share - low > high - share:
+            ends.reverse()
+        # along a corner of the equations, near a grazing, neighbours may lie on both sides of it
+        for guess in (between_them, *(start(*end) for end in ends)):
+            try:
+                solved = correct(curve, guess, row, weights, self.newton, spare=self.spare)
+                break
+            except ConvergenceError:
+                continue
+        else:
+            solved = correct(curve, between_them, row, weights, replace(self.newton, iterations=30, damped=True))
+        return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
+
+    def about(self, resolved: float) -> tuple[TrackedSample, float]:
+        """A point beside the zero, closer than a share of the way or (0) where little is left of the test's values at
+        the ends, and about the test's derivative by arclength there.
+        """
+        first, last = self.values[0.0], self.values[1.0]
+        self.spare = BEGINNING
+        # components of a tangent change evenly; others may be large at one end
+        if first * last > 0.0:
+            raise ConvergenceError("the test does not change sign between the points about it")
+        even = isinstance(self.test, Extremum)
+        scaled = _even(first, last)
+        start, stop = scaled(first), scaled(last)
+        self.value(self._turn() if even or start == stop else start / (start - stop))
+        size = max if even else min
+        little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
+        share = self._root(resolved or _RESOLVED, little)
+        value, way = self.value(share), self.b.point.arclength - self.a.point.arclength
+        slope = last - first
+        if 0.0 < share < 1.0:
+            # of the parabola through all three
+            slope = (value - first) / share + (last - value) / (1.0 - share) - slope
+        return self.samples[share], slope / way if way > 0.0 else 0.0
+
+    def jumps_at(self, sample: TrackedSample) -> bool:
+        """Whether the test changes sign without vanishing, as c3 does in a corner; a parameter may turn in one."""
+        ends = abs(self.values[0.0]), abs(self.values[1.0])
+        return not isinstance(self.test, Extremum) and abs(self.test.value(sample)) > _JUMP * min(ends)
+
+    def _turn(self) -> float:
+        """The share at which a parameter turns by its cubic interpolation; 0 if nowhere, and for other tests."""
+        if not isinstance(self.test, Extremum):
+            return 0.0
+        start, curve, half = _slope_between(self.test.name, self.a, self.b)
+        inside = half * half - start * curve
+        if inside >= 0.0 and start != 0.0:
+            # the root on the side of the end whose sign is the other one
+            share = -start / (half - math.copysign(math.sqrt(inside), start))
+            return share if 0.0 < share < 1.0 else 0.0
+        return 0.0
+
+    def zero_from(self, sample: TrackedSample, slope: float) -> TrackedSample:
+        """Where the test vanishes, from a point beside, by secants; by Brent's method where these leave the way."""
+        low, high = self.a.point.arclength, self.b.point.arclength
+        try:
+            found = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
+        except ConvergenceError:
+            found = None
+        # tangents at the ends may be those of points a rounding away
+        slack = _ROUGH * (high - low)
+        if found is not None and low - slack <= found.point.arclength <= high + slack:
+            return found
+        return self.zero(_RESOLVED)
+
+    def zero(self, resolved: float) -> TrackedSample:
+        """Where the test vanishes, to a share of the way."""
+        self.spare = 0.0
+        for known in (self.samples, self.values):
+            for share in [share for share in known if 0.0 < share < 1.0]:
+                del known[share]
+        return self.samples_at(self._root(resolved))
+
+    def _root(self, resolved: float, little: float = 0.0) -> float:
+        """The share at which the test vanishes, or its modulus is below `little`, by Brent's method.
+
+        Secants are those of `_even`.
+        """
+        for low, high in itertools.pairwise(sorted(self.values)):
+            first, last = self.values[low], self.values[high]
+            if first * last > 0.0:
+                continue
+            scaled = _even(first, last)
+
+            def value(share: float, scaled: Callable[[float], float] = scaled) -> float:
+                found = self.value(share)
+                return 0.0 if abs(found) <= little else scaled(found)
+
+            return float(scipy.optimize.brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
+        raise ConvergenceError("the test does not change sign")
+
+    def samples_at(self, share: float) -> TrackedSample:
+        """The point at a share."""
+        self.value(share)
+        return self.samples[share]
+
+
+def _even(first: float, last: float) -> Callable[[float], float]:
+    """What a test's values are taken as between two ends: as they are, or, where those at one end are large, about as
+    their logarithm, lest secants stay at the other.
+    """
+    least, most = sorted((abs(first), abs(last)))
+    if not 0.0 < _LARGE * least < most:
+        return float
+    return lambda value: math.asinh(value / least)
+
+
+def _finer(sample: TrackedSample) -> HarmonicBasis | None:
+    """The basis that an event asks for, None where the present one will do."""
+    curve = sample.curve
+    if curve.adaptive is None:
+        return None
+    basis = choose_harmonics(sample.state, curve.adaptive, curve.adaptive.event_tolerance)
+    return basis if basis.harmonics > curve.balance.basis.harmonics else None
+
+
+def extreme_of(test: CurveTest, before: float, at: TrackedSample) -> str:
+    """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before it."""
+    return test.extreme(before, at) if isinstance(test, Extremum) else ""
+
+
+def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
+    """An event located again with the harmonics that events ask for."""
+    sample = found.sample
+    for _ in range(6):
+        curve, basis = sample.curve, _finer(sample)
+        if basis is None:
+            break
+        finer = curve.with_basis(basis)
+        u = finer.transfer(sample.point.u, curve)
+        try:
+            # the harmonics that come in begin at what the motion so far excites
+            fuller, coefficients = sample.state.completed_x
+            u[: finer.balance.dimension] = fuller.resized(coefficients, basis).ravel()
+            x, omega, values = finer.split(u)
+            finer = replace(finer, balance=finer.balance.settle(x, omega, values))
+            along = finer.transfer(sample.point.tangent, curve)
+            weights = finer.weights(u, curve.size(sample.point.u))
+            start = nearest_point(finer, u, weights, newton, along, BEGINNING)
+            start = replace(start, arclength=sample.point.arclength)
+            near = TrackedSample(start)
+            test = found.test.within(near, near)
+            sample = zero_along(start, test.value, newton, _BESIDE, found.slope, factor=start.factor)
+        except ConvergenceError as failure:
+            words = (
+                f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
+                f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
+            )
+            if sample is found.sample and found.rough is not None:
+                try:
+                    sample = found.rough.zero_from(sample, found.slope)
+                except ConvergenceError as again:
+                    words += f", nor more closely without these ({again})"
+                    found = replace(found, off=_ROUGH * found.rough.way)
+            warnings.append(words)
+            break
+    return found if sample is found.sample else replace(found, sample=sample)
+
+
+__all__ = ["SAME", "Found", "brackets", "events_between", "extreme_of", "located", "refined", "slowest_between"]

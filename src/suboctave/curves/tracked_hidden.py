@@ -1,0 +1,211 @@
+"""Two events inside one step of a tracked curve: they cancel in the signs at its ends.
+
+Each test has a function that is smooth along the curve (`CurveTest.smooth`). Between two points at which it has the
+same sign, it is taken for the parabolas through these and either neighbour (on a curve's first and last step the
+parabola and the cubic through those of the one side). If one of them comes clearly nearer to zero inside than at both
+ends, or to zero but for the distance between them, a point is solved for where it does most, and the parts are looked
+at again. Nothing is evaluated where none does, as along most of a curve. What neither the ends nor their neighbours
+hint at is not found; smaller steps do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from suboctave.compiled import kernel
+from suboctave.continuation import NewtonOptions
+from suboctave.continuation.point import point_between
+from suboctave.continuation.problem import Array
+from suboctave.curves.tracked_events import SAME, Found, brackets, located, slowest_between
+from suboctave.curves.tracked_sample import TrackedSample, same_discretisation
+from suboctave.curves.tracked_tests import CurveTest, Extremum
+from suboctave.errors import ConvergenceError
+
+__all__ = ["HiddenPairs"]
+
+#: share of the smaller end's value below which the function must be suspected to fall inside
+_FALLS = 0.8
+#: share of the slower end's slope below which a parameter must run inside by its cubic interpolation as well
+_SLOWER = 0.95
+#: points solved for inside one step for one test
+_PROBES = 5
+#: shares of a step at which the interpolations are looked at
+_GRID = np.linspace(0.04, 0.96, 24)
+
+
+class HiddenPairs:
+    """Looks at every step when the points beside it are known."""
+
+    def __init__(self, tests: Sequence[CurveTest], newton: NewtonOptions) -> None:
+        self.tests = list(tests)
+        self.newton = newton
+        #: the last points, with sign and logarithm of every test's function
+        self._known: list[tuple[TrackedSample, list[tuple[float, float]]]] = []
+
+    def passed(self, sample: TrackedSample, warnings: list[str]) -> list[Found]:
+        """Take in the next point; the pairs found in the step before the last."""
+        if not self.tests:
+            return []
+        self._known = [*self._known[-3:], (sample, [test.smooth(sample) for test in self.tests])]
+        return self._look(len(self._known) - 3, warnings)
+
+    def rest(self, warnings: list[str]) -> list[Found]:
+        """The pairs found in the last step: nothing comes after it."""
+        found = self._look(len(self._known) - 2, warnings) if self.tests else []
+        self._known = []
+        return found
+
+    def _look(self, at: int, warnings: list[str]) -> list[Found]:
+        """Pairs between the known points `at` and `at + 1`."""
+        if at < 0 or len(self._known) < 3:
+            return []
+        found: list[Found] = []
+        near = self._known
+        samples = [sample for sample, _ in near]
+        places = [sample.point.arclength for sample in samples]
+        if _clear(np.array(places), np.array([known for _, known in near]), at):
+            return []
+        if not all(a < b for a, b in pairwise(places)):
+            return []
+        for i, test in enumerate(self.tests):
+            functions = [known[i] for _, known in near]
+            share = falling(places, _values(functions), at)
+            if share is None or self._told(test, samples, at):
+                continue
+            try:
+                found += self._pair(test, samples, functions, at)
+            except ConvergenceError as failure:
+                where = samples[at].curve.where(samples[at].point.u)
+                warnings.append(f"whether two {test.kind} lie after {where} could not be told: {failure}")
+        return found
+
+    def _told(self, test: CurveTest, samples: list[TrackedSample], at: int) -> bool:
+        """Whether a parameter does not turn twice in a step for all that is known, or was seen to do so already."""
+        if not isinstance(test, Extremum):
+            return False
+        a, b = samples[at : at + 2]
+        share, slope = slowest_between(test.name, a, b)
+        slower = 0.0 < share < 1.0 and slope < _SLOWER * min(abs(s.slopes[test.name]) for s in (a, b))
+        return not slower or test.level(*samples) or len(brackets(test, a, b, self.newton)) > 1
+
+    def _pair(
+        self, test: CurveTest, samples: list[TrackedSample], functions: list[tuple[float, float]], at: int
+    ) -> list[Found]:
+        """The two events of one test in a step that may hide them."""
+        a, b = same_discretisation(samples[at], samples[at + 1], self.newton), samples[at + 1]
+        places = [sample.point.arclength for sample in samples]
+        start, way = places[at], places[at + 1] - places[at]
+        inside, known, low = [a, b], list(functions), at
+        for _ in range(_PROBES):
+            found = next(
+                (
+                    (i, share)
+                    for i in range(low, low + len(inside) - 1)
+                    if (share := falling(places, _values(known), i)) is not None
+                ),
+                None,
+            )
+            if found is None:
+                break
+            i, share = found
+            place = places[i] + share * (places[i + 1] - places[i])
+            middle = TrackedSample(point_between(a.point, b.point, (place - start) / way, self.newton))
+            before, after = inside[i - low], inside[i - low + 1]
+            if test.changed(before, middle) and test.changed(middle, after):
+                both = [located(test, before, middle, self.newton), located(test, middle, after, self.newton)]
+                genuine = [item for item in both if item is not None]
+                return [] if isinstance(test, Extremum) and _coincide(genuine, way) else genuine
+            places.insert(i + 1, place)
+            known.insert(i + 1, test.smooth(middle))
+            inside.insert(i - low + 1, middle)
+        return []
+
+
+def _coincide(found: list[Found], way: float) -> bool:
+    """Whether two events are one place of a step: slopes jump at a corner, and may seem to turn to and fro in it."""
+    places = [item.sample.point.arclength for item in found]
+    return len(places) > 1 and max(places) - min(places) <= SAME * way
+
+
+def _values(functions: Sequence[Sequence[float]]) -> list[float]:
+    """A function from signs and logarithms, in units of its largest value."""
+    top = max(size for _, size in functions)
+    if not math.isfinite(top):
+        return [0.0] * len(functions)
+    return [sign * math.exp(size - top) for sign, size in functions]
+
+
+def falling(places: Sequence[float], values: Sequence[float], at: int) -> float | None:
+    """Where between `places[at]` and the next a function of one sign may vanish, as a share of the way, or None."""
+    first, last = values[at], values[at + 1]
+    if not first * last > 0.0:
+        return None
+    least = min(abs(first), abs(last))
+    if at > 0 and at + 2 < len(places):
+        if _straight(np.array(places), np.array(values), at):
+            return None
+        spans = [(at - 1, at + 2), (at, at + 3)]
+    elif at > 0:
+        spans = [(at - 1, at + 2), (max(0, at - 2), at + 2)]
+    else:
+        spans = [(at, at + 3), (at, min(len(places), at + 4))]
+    s = places[at] + _GRID * (places[at + 1] - places[at])
+    sign = math.copysign(1.0, first)
+    one, other = (sign * _interpolated(places[a:b], values[a:b], s) for a, b in spans)
+    lower, apart = np.minimum(one, other), np.abs(one - other)
+    for lowest, bound in ((lower, _FALLS * least), (lower - apart, 0.0)):
+        if lowest.min() < bound:
+            return float(_GRID[lowest.argmin()])
+    return None
+
+
+@kernel()
+def _clear(places, functions, at):
+    """Whether `falling` finds nothing for any of the functions at the first look; functions (m, tests, 2): signs and
+    logarithms.
+    """
+    m = places.shape[0]
+    if at < 1 or at + 2 >= m:
+        return False
+    for i in range(m - 1):
+        if not places[i] < places[i + 1]:
+            return False
+    values = np.empty(m)
+    for k in range(functions.shape[1]):
+        top = functions[:, k, 1].max()
+        if not math.isfinite(top):
+            return False
+        for i in range(m):
+            values[i] = functions[i, k, 0] * math.exp(functions[i, k, 1] - top)
+        if values[at] * values[at + 1] > 0.0 and not _straight(places, values, at):
+            return False
+    return True
+
+
+@kernel()
+def _straight(places, values, at):
+    """Whether the parabolas through two neighbours and either place beside them stay close to the chord."""
+    bend = 0.0
+    for i in range(at - 1, at + 1):
+        first = (values[i + 1] - values[i]) / (places[i + 1] - places[i])
+        last = (values[i + 2] - values[i + 1]) / (places[i + 2] - places[i + 1])
+        bend = max(bend, abs((last - first) / (places[i + 2] - places[i])))
+    # they leave it by no more than this
+    bend *= 0.25 * (places[at + 1] - places[at]) ** 2
+    return bend <= (1.0 - _FALLS) * min(abs(values[at]), abs(values[at + 1]))
+
+
+def _interpolated(x: Sequence[float], f: Sequence[float], s: Array) -> Array:
+    """The polynomial through points, by Newton's divided differences."""
+    c = list(f)
+    for k in range(1, len(x)):
+        for i in range(len(x) - 1, k - 1, -1):
+            c[i] = (c[i] - c[i - 1]) / (x[i] - x[i - k])
+    value = np.full_like(s, c[-1])
+    for i in range(len(x) - 2, -1, -1):
+        value = value * (s - x[i]) + c[i]
+    return value

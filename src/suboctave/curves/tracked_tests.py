@@ -1,0 +1,366 @@
+"""Test functions along a curve of bifurcations: extrema of its parameters, and points of codimension two.
+
+    extremum of p     component of the tangent along p
+    CP                psi . R''[phi, phi] on LP curves; both components of the tangent vanish with it
+    R1, R2            psi . (dJ_kappa/dkappa) phi on LP, PD curves: the multiplier is double
+    R3, R4            kappa - w0/3, kappa - w0/4 on NS curves
+    GPD               the cubic coefficient c3 on PD curves: super- turns into subcritical
+    LPPD              det J_half on LP curves, det J_0 on PD curves: the other multiplier is critical too
+    LPNS, PDNS        det J_0, det J_half on NS curves; the number of multipliers outside the unit circle on LP, PD
+                      curves, as of NS points along a branch: a complex pair passes it
+    NSNS              the same on NS curves
+
+The multiplier or the pair that is critical all along the curve is not counted. Two real multipliers whose product
+passes one (a neutral saddle) stay where they are. (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., chapters
+8, 9.)
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.bifurcation import measures
+from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.tracked_sample import TrackedSample
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.perturbation import Kind
+
+#: component of the tangent in scaled arclength that may be rounding at both ends of a step
+_LEVEL = 1e-9
+#: distance of the other multiplier from +1 or -1 at a point where det J_0 or det J_half vanishes
+_CRITICAL = 0.1
+#: distance of the critical pair from there within which that is asked for
+_RESONANT = 0.5
+#: corrections of kappa, and their size in units of the base frequency, after which it is known
+_CORRECTIONS, _KNOWN = 6, 1e-11
+#: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair, and
+#: of that pair's growth from that of the multipliers, as a share
+_STRAYED, _AGREES = 0.1, 0.25
+#: logarithm of a pair's modulus up to which it may be on the unit circle
+_ON_IT = 0.03
+
+
+class CurveTest(ABC):
+    """One kind of event: a function of the curve's points that changes sign."""
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """What the events are called."""
+
+    @abstractmethod
+    def value(self, sample: TrackedSample) -> float:
+        """The test function; 0 where it says nothing."""
+
+    def changed(self, a: TrackedSample, b: TrackedSample) -> bool:
+        """Whether it changes sign between two neighbours."""
+        first, last = self.value(a), self.value(b)
+        return first * last < 0.0 or (last == 0.0 and first != 0.0)
+
+    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+        """The test with a function that is smooth between two neighbours."""
+        return self
+
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+        """Sign and logarithm of the modulus of a function that vanishes with it, smooth along the whole curve."""
+        value = self.value(sample)
+        return (1.0 if value > 0.0 else -1.0), _logarithm(value)
+
+    def genuine(self, sample: TrackedSample) -> bool:
+        """Whether what was located is an event."""
+        return True
+
+    def confirmed(self, sample: TrackedSample) -> bool:
+        """Whether multipliers, which depend little on the harmonics kept, agree with an event as it is reported."""
+        return True
+
+
+@dataclass(frozen=True)
+class Extremum(CurveTest):
+    """The curve turns in one of its parameters."""
+
+    name: str
+    kind = "extremum"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        slope = sample.slopes[self.name]
+        return slope / sample.bend if self._beside_cusps(sample) else slope
+
+    @staticmethod
+    def _beside_cusps(sample: TrackedSample) -> bool:
+        """Whether both parameters turn where the cusp's function vanishes, which it does not do here."""
+        return sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning and sample.bend != 0.0
+
+    def extreme(self, before: float, at: TrackedSample) -> str:
+        """Whether the parameter has a maximum or a minimum at a zero; before: sign of the function before it."""
+        rising = before * at.bend if self._beside_cusps(at) else before
+        return "maximum" if rising > 0.0 else "minimum"
+
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+        """See `CurveTest.smooth`: at a cusp it vanishes as well."""
+        slope = sample.slopes[self.name]
+        return (1.0 if slope > 0.0 else -1.0), _logarithm(slope)
+
+    def level(self, *samples: TrackedSample) -> bool:
+        """Whether the parameter stays as it is but for rounding."""
+        return all(
+            abs(s.slopes[self.name] * float(s.point.weights[s.curve.index(self.name)])) < _LEVEL for s in samples
+        )
+
+
+@dataclass(frozen=True)
+class Cusp(CurveTest):
+    """Two limit points meet and vanish."""
+
+    kind = "CP"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        return sample.bend
+
+
+@dataclass(frozen=True)
+class GeneralisedDoubling(CurveTest):
+    """The motions that branch off change sides; a curve of their limit points begins."""
+
+    kind = "GPD"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        # at a fold-flip c3 passes through infinity, and det J_0 through zero
+        return sample.cubic * sample.sign(Kind.INTEGER)
+
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+        """See `CurveTest.smooth`."""
+        sign, size = super().smooth(sample)
+        return sign, size + sample.determinant(Kind.INTEGER)[1]
+
+
+@dataclass(frozen=True)
+class DoubleMultiplier(CurveTest):
+    """R1 on LP curves, R2 on PD curves: a curve of Neimark-Sacker points begins."""
+
+    order: int
+
+    @property
+    def kind(self) -> str:
+        """R1 or R2."""
+        return f"R{self.order}"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        return sample.twist
+
+    def genuine(self, sample: TrackedSample) -> bool:
+        """See `CurveTest.genuine`; raises ConvergenceError where the multipliers contradict."""
+        critical = 1.0 if self.order == 1 else -1.0
+        apart = np.sort(np.abs(sample.evaluation.floquet.multipliers - critical))
+        if apart[1] > _RESONANT:
+            raise ConvergenceError(
+                f"the equations have a double multiplier {critical:+.0f} there, the monodromy matrix has none "
+                f"(the second lies {apart[1]:.2g} away): too few harmonics are kept"
+            )
+        return True
+
+
+@dataclass(frozen=True)
+class Resonance(CurveTest):
+    """R3, R4 on NS curves: kappa = w0 / order."""
+
+    order: int
+
+    @property
+    def kind(self) -> str:
+        """R3 or R4."""
+        return f"R{self.order}"
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        share = sample.kappa / sample.state.rate
+        # beyond w0/2 the other one of the pair has the smaller kappa
+        return min(share, 1.0 - share) - 1.0 / self.order
+
+
+@dataclass(frozen=True)
+class RealCrossing(CurveTest):
+    """Another multiplier passes +1 (Kind.INTEGER) or -1 (Kind.HALF): LPPD on LP and PD curves, LPNS and PDNS on NS
+    curves; between neighbours by g of that operator with fixed borders.
+    """
+
+    operator: Kind
+    label: str
+    borders: NullVectors | None = None
+
+    @property
+    def kind(self) -> str:
+        """LPPD, LPNS, PDNS or NSNS."""
+        return self.label
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`."""
+        if self.borders is None:
+            return sample.sign(self.operator)
+        return float(bordered(sample.state, self.operator, self.borders).g.real)
+
+    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+        """See `CurveTest.within`."""
+        return replace(self, borders=null_vectors(b.state, self.operator))
+
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+        """See `CurveTest.smooth`."""
+        return sample.determinant(self.operator)
+
+    def genuine(self, sample: TrackedSample) -> bool:
+        """See `CurveTest.genuine`: close to R1 and R2 the pair that an NS curve follows is critical itself."""
+        if self.kind == "LPPD":
+            return True
+        target = 1.0 if self.operator is Kind.INTEGER else -1.0
+        critical = sample.evaluation.critical
+        assert critical is not None
+        apart = abs(critical - target) > _RESONANT
+        return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL))
+
+
+@dataclass(frozen=True)
+class PairCrossing(CurveTest):
+    """Another complex pair passes the unit circle: LPNS, PDNS, NSNS.
+
+    Between neighbours by its growth: with g of J_kappa, borders fixed, and kappa such that the correction `dk = g /
+    g_kappa` is imaginary, the exponent of the pair is kappa - dk to first order, and exactly where dk vanishes.
+    `target` is where on the circle the pair passes.
+    """
+
+    label: str
+    target: complex | None = None
+    borders: NullVectors | None = None
+
+    @property
+    def kind(self) -> str:
+        """LPPD, LPNS, PDNS or NSNS."""
+        return self.label
+
+    def changed(self, a: TrackedSample, b: TrackedSample) -> bool:
+        """See `CurveTest.changed`."""
+        return _passing(a.others, b.others) is not None
+
+    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+        """See `CurveTest.within`; the target stays where none passes."""
+        pair = _passing(a.others, b.others)
+        target = self.target if pair is None else (pair[0] + pair[1]) / abs(pair[0] + pair[1])
+        assert target is not None
+        return replace(self, target=target, borders=null_vectors(b.state, Kind.FREE, _frequency(b, target)))
+
+    def value(self, sample: TrackedSample) -> float:
+        """See `CurveTest.value`: logarithm of the pair's modulus."""
+        assert self.target is not None
+        assert self.borders is not None
+        rate, pair = sample.state.rate, _nearest_pair(sample, self.target)
+        kappa, growth = float(np.angle(pair)) * rate / (2.0 * np.pi), math.log(abs(pair))
+        start = kappa
+        for _ in range(_CORRECTIONS):
+            border = bordered(sample.state, Kind.FREE, self.borders, kappa)
+            change = border.g / border.gradient(())[2]
+            if abs(change.real) <= _KNOWN * rate:
+                break
+            kappa -= change.real
+            if abs(kappa - start) > _STRAYED * rate:
+                return growth
+        found = float(change.imag) * 2.0 * np.pi / rate
+        # other multipliers, the critical one among them, have zeros of g as well
+        return found if abs(found - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
+
+    def confirmed(self, sample: TrackedSample) -> bool:
+        """See `CurveTest.confirmed`."""
+        assert self.target is not None
+        found, error = sample.evaluation.floquet, 0.0
+        if found.errors.size:
+            error = float(found.errors[np.abs(found.multipliers - self.target).argmin()])
+        pairs = sample.others[sample.others.imag > 0.0]
+        return bool(pairs.size) and math.log(abs(_nearest_pair(sample, self.target))) ** 2 < (_ON_IT + error) ** 2
+
+    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+        """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
+        sign, size = measures.torus(sample.others).tolist()
+        return sign, size
+
+
+def _logarithm(value: float) -> float:
+    """Of the modulus; -inf of zero, and what is no number as it is."""
+    return math.log(abs(value)) if value != 0.0 else -math.inf
+
+
+def _nearest_pair(sample: TrackedSample, target: complex) -> complex:
+    """The complex multiplier of the upper half plane that is nearest to a target."""
+    pairs = sample.others[sample.others.imag > 0.0]
+    if not pairs.size:
+        raise ConvergenceError("the pair of multipliers splits into two real ones")
+    return complex(pairs[np.argmin(np.abs(pairs - target))])
+
+
+def _frequency(sample: TrackedSample, target: complex) -> float:
+    """kappa of that multiplier."""
+    return float(np.angle(_nearest_pair(sample, target))) * sample.state.rate / (2.0 * np.pi)
+
+
+def _passing(first: ComplexArray, last: ComplexArray) -> tuple[complex, complex] | None:
+    """The complex pair that passes the unit circle between two sets of multipliers, by its upper members."""
+    a, b = _census(first), _census(last)
+    if abs(a[0] - b[0]) < 2 + abs(a[1] - b[1]) + abs(a[2] - b[2]):
+        return None
+    outside, inside = (first, last) if a[0] > b[0] else (last, first)
+    with np.errstate(divide="ignore"):
+        if abs(float(np.log(np.abs(outside)).sum())) < measures.UNDAMPED:
+            # pairs stay on the circle and rounding alone carries them across
+            return None
+    leaving = outside[(outside.imag > 0.0) & (np.abs(outside) > 1.0)]
+    staying = inside[(inside.imag > 0.0) & (np.abs(inside) <= 1.0)]
+    if not (leaving.size and staying.size):
+        return None
+    out, partner = min(((m, p) for m in leaving for p in staying), key=lambda pair: abs(pair[0] - pair[1]))
+    return complex(out), complex(partner)
+
+
+def _census(mu: ComplexArray) -> tuple[int, int, int]:
+    """How many multipliers lie outside the unit circle, and whether odd numbers of real ones are above +1, below -1."""
+    real = mu.real[mu.imag == 0.0]
+    return int((np.abs(mu) > 1.0).sum()), int((real > 1.0).sum()) % 2, int((real < -1.0).sum()) % 2
+
+
+def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
+    """What to look for along a curve, by the kind of its bifurcations."""
+    turns = tuple(Extremum(name) for name in curve.names)
+    augmentation = curve.augmentation.own
+    if not isinstance(augmentation, SingularOperator):
+        return turns
+    own: dict[Kind, tuple[CurveTest, ...]] = {
+        Kind.INTEGER: (Cusp(), DoubleMultiplier(1)),
+        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier(2)),
+        Kind.FREE: (Resonance(3), Resonance(4)),
+    }
+    # one DOF has two multipliers with a positive product: none is left that could pass +1 or -1, or be one of a pair
+    others: dict[Kind, tuple[CurveTest, ...]] = {
+        Kind.INTEGER: (RealCrossing(Kind.HALF, "LPPD"), PairCrossing("LPNS")),
+        Kind.HALF: (RealCrossing(Kind.INTEGER, "LPPD"), PairCrossing("PDNS")),
+        Kind.FREE: (RealCrossing(Kind.INTEGER, "LPNS"), RealCrossing(Kind.HALF, "PDNS"), PairCrossing("NSNS")),
+    }
+    several = curve.balance.system.n > 1
+    return turns + own[augmentation.kind] + (others[augmentation.kind] if several else ())
+
+
+__all__ = [
+    "CurveTest",
+    "Cusp",
+    "DoubleMultiplier",
+    "Extremum",
+    "GeneralisedDoubling",
+    "PairCrossing",
+    "tests_of",
+]

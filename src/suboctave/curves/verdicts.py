@@ -1,0 +1,287 @@
+"""The verdicts that a branch states: asked of the user's method where they are open, with what no method could tell.
+
+Along a curve every motion has multipliers from `StabilityMethod.along`. Where one of them lies within its error of the
+unit circle the verdict is open, and `StabilityMethod.settled` is asked once the curve is known. What it leaves open is
+stated, as a stretch between the nearest motions with a clear verdict, unless a bifurcation located beside the motion
+is the reason: there a multiplier has to be on the circle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.measures import fold_sign, half_sign, in_doubt
+from suboctave.continuation.ending import Ending
+from suboctave.curves.audit import Unsettled, joined
+from suboctave.curves.points import BranchPoint
+from suboctave.curves.trace import Trace
+from suboctave.floquet import FloquetResult, StabilityMethod
+from suboctave.floquet.result import written
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.interruption import Interruption
+
+#: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
+_PATIENCE = 3
+
+
+def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
+    """A trace whose open verdicts were asked of a method, and that says what stayed open.
+
+    Parameters
+    ----------
+    method
+        The one whose `along` gave the multipliers of the trace's points.
+    name
+        The free parameter.
+    """
+    asking = _Asking(method, not trace.interrupted)
+    # right beside another branch a multiplier is as near +1 as one likes
+    beside = {0} if trace.departs is not None else set()
+    beside |= {len(trace.points) - 1} if trace.arrives is not None else set()
+    points = _settled(trace.points, asking, beside)
+    bifurcations = [_at_event(item, asking) for item in trace.bifurcations]
+    events = [_at_event(item, asking) for item in trace.events]
+    if asking.interruption is not None:
+        trace.ends(Ending.stopped(asking.interruption, "its end, before open verdicts on stability were settled"))
+    in_doubt = [i for i, p in enumerate(points) if not p.floquet.decided]
+    # a branch that leaves or meets another does so with a multiplier at +1
+    ends = [replace(item, kind="BP") for item in (trace.departs, trace.arrives) if item is not None]
+    known = [*bifurcations, *ends]
+    if trace.closed and points:
+        # what lies at the seam lies at both ends
+        whole = points[-1].arclength
+        known += [replace(item, arclength=item.arclength + way) for item in bifurcations for way in (-whole, whole)]
+    open_ones = [i for run in _runs(in_doubt) for i in _unexpected(run, points, known)]
+    unsettled, notes = _stretches(points, open_ones, name)
+    for probe in trace.open:
+        stretch = _between(probe, points, known, name)
+        if stretch is not None and not any(_within(stretch, told) for told in (*trace.audit.unsettled, *unsettled)):
+            unsettled.append(stretch)
+    notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]
+    notes += _replaced(points, method, name)
+    return replace(
+        trace,
+        points=points,
+        bifurcations=bifurcations,
+        events=events,
+        warnings=[*trace.warnings, *notes],
+        audit=replace(trace.audit, unsettled=tuple(joined((*trace.audit.unsettled, *unsettled)))),
+    )
+
+
+class _Asking:
+    """A method that is asked until it is interrupted; of an interrupted curve it is not asked at all."""
+
+    def __init__(self, method: StabilityMethod, whole: bool) -> None:
+        self.method = method
+        self.going_on = whole
+        self.interruption: Interruption | None = None
+
+    def settled(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
+        """The verdict where one is open, with witnesses."""
+
+        def question() -> FloquetResult:
+            return in_doubt(self.method.settled(state, found), fold_sign(state), half_sign(state))
+
+        return self._asked(question, found)
+
+    def along(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
+        """The method's multipliers in place of others."""
+        return self._asked(lambda: self.method.along(state), found)
+
+    def _asked(self, question: Callable[[], FloquetResult], known: FloquetResult) -> FloquetResult:
+        if self.going_on:
+            try:
+                return question()
+            except KeyboardInterrupt as cause:
+                self.interruption, self.going_on = Interruption.of(cause), False
+        return known
+
+
+def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -> list[BranchPoint]:
+    told: list[BranchPoint] = []
+    in_vain = 0
+    for number, point in enumerate(points):
+        found = point.floquet
+        if found.decided:
+            in_vain = 0
+        elif number not in beside and in_vain < _PATIENCE:
+            found = asking.settled(point.orbit.state(), found)
+            in_vain = 0 if found.decided else in_vain + 1
+        told.append(point if found is point.floquet else replace(point, floquet=found))
+    return told
+
+
+def _at_event(item: Bifurcation, asking: _Asking) -> Bifurcation:
+    """A located motion with the method's multipliers; asked for a verdict only if more than the critical one is open.
+
+    Those of the search are the monodromy matrix's.
+    """
+    found = item.floquet
+    monodromy = asking.method.follows_monodromy
+    if monodromy and not _others_open(item).any():
+        return item
+    state = item.orbit.state()
+    if not monodromy:
+        found = asking.along(state, found)
+    if _others_open(replace(item, floquet=found)).any():
+        found = asking.settled(state, found)
+    return replace(item, floquet=found)
+
+
+def _open(result: FloquetResult) -> np.ndarray:
+    """Which multipliers lie within their errors of the unit circle."""
+    within: np.ndarray = np.abs(np.abs(result.multipliers) - 1.0) <= result.errors
+    return within
+
+
+def _others_open(item: Bifurcation) -> np.ndarray:
+    """The same without those that make the bifurcation."""
+    within = _open(item.floquet)
+    if item.kind in _CRITICAL:
+        mu = item.multipliers
+        critical = item.critical_multiplier()
+        distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        within[np.argsort(distance, kind="stable")[: _CRITICAL[item.kind]]] = False
+    return within
+
+
+def _doubt_beside(item: Bifurcation) -> str | None:
+    """A sentence if a multiplier besides the critical one leaves open what is stable on either side."""
+    within = _others_open(item)
+    if item.kind in CONTACT_KINDS or not within.any():
+        return None
+    i = int(np.argmax(within))
+    mu, error = item.multipliers[i], item.floquet.errors[i]
+    where = f"{item.parameter_name} = {item.parameter(item.parameter_name):.9g}"
+    return (
+        f"at the {item.kind} at {where} another multiplier, {written(mu, error)}, lies within its error of the unit "
+        "circle: which motions beside it are stable is open"
+    )
+
+
+#: multipliers on the unit circle that make a bifurcation
+_CRITICAL = {"LP": 1, "BP": 1, "PD": 1, "NS": 2}
+
+
+def _unexpected(
+    run: tuple[int, int], points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]
+) -> Iterator[int]:
+    """Those of a run of points with open verdicts that no bifurcation located in it or at its ends is the reason of."""
+    first, last = run
+    reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
+    return (i for i in range(first, last + 1) if not _explained(points[i].floquet, reach, bifurcations))
+
+
+def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: Sequence[Bifurcation]) -> bool:
+    """Whether a bifurcation within a range of arclength is why a multiplier lies within its error of the circle."""
+    first, last = reach
+    near = {item.kind for item in bifurcations if first <= item.arclength <= last}
+    within = _open(result)
+    mu, errors = result.multipliers[within], result.errors[within]
+    explained = np.zeros(len(mu), dtype=bool)
+    if near & {"LP", "BP"}:
+        explained |= np.abs(mu - 1.0) <= 2.0 * errors
+    if "PD" in near:
+        explained |= np.abs(mu + 1.0) <= 2.0 * errors
+    if "NS" in near:
+        explained |= np.abs(mu.imag) > errors
+    return bool(explained.all())
+
+
+def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -> tuple[list[Unsettled], list[str]]:
+    """What stayed open, as stretches between clear verdicts, and sentences on them."""
+    stretches: list[Unsettled] = []
+    notes: list[str] = []
+    for first, last in _runs(open_ones):
+        a, b = points[max(first - 1, 0)], points[min(last + 1, len(points) - 1)]
+        result = points[first].floquet
+        ends = _value(a, name), _value(b, name)
+        # at a point where a pair lies on the circle the product may be one by chance
+        if all(point.floquet.undamped for point in (a, points[first], b)):
+            notes.append(
+                f"between {name} = {ends[0]:.9g} and {ends[1]:.9g} the motion is undamped: its multipliers stay on the "
+                "unit circle, and nothing settles which side of it they are on"
+            )
+            continue
+        i = int(np.argmax(_open(result)))
+        worst = written(result.multipliers[i], result.errors[i])
+        stretch = Unsettled(
+            name,
+            *ends,
+            (a.arclength, b.arclength),
+            f"stability is open: a multiplier, {worst} by {result.method}, lies within its error of the unit circle",
+        )
+        stretches.append(stretch)
+    return stretches, notes
+
+
+def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str) -> list[str]:
+    """One sentence where the monodromy matrix had to stand in for the method that was asked for."""
+    places = [i for i, p in enumerate(points) if p.floquet.stands_in]
+    if not places:
+        return []
+    ranges = []
+    for first, last in _runs(places):
+        a, b = _value(points[first], name), _value(points[last], name)
+        ranges.append(f"between {name} = {a:.6g} and {b:.6g}" if first < last else f"at {name} = {a:.6g}")
+    return [
+        f"stability method {method.name!r} says nothing of {len(places)} of {len(points)} points, "
+        f"{', '.join(ranges)}: multipliers of the monodromy matrix there. The first time: "
+        f"{points[places[0]].floquet.note}"
+    ]
+
+
+def _between(
+    probe: BranchPoint, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation], name: str
+) -> Unsettled | None:
+    """The step in which a multiplier comes within its error of the circle, unless a located bifurcation is why."""
+    result = probe.floquet
+    if result.undamped:
+        return None
+    at = int(np.searchsorted([p.arclength for p in points], probe.arclength))
+    low, high = max(at - 1, 0), min(at, len(points) - 1)
+    first, last = low, high
+    while first > 0 and not points[first].floquet.decided:
+        first -= 1
+    while last < len(points) - 1 and not points[last].floquet.decided:
+        last += 1
+    reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
+    if _explained(result, reach, bifurcations):
+        return None
+    i = int(np.argmax(_open(result)))
+    worst = written(result.multipliers[i], result.errors[i])
+    return Unsettled(
+        name,
+        _value(points[low], name),
+        _value(points[high], name),
+        (points[low].arclength, points[high].arclength),
+        f"a multiplier, {worst} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle "
+        "and may pass it",
+    )
+
+
+def _within(stretch: Unsettled, known: Unsettled) -> bool:
+    """Whether a stretch has something of another."""
+    return stretch.arclength[0] <= known.arclength[1] and known.arclength[0] <= stretch.arclength[1]
+
+
+def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """First and last of each run of consecutive numbers."""
+    first = last = None
+    for place in places:
+        if last is None or place > last + 1:
+            if first is not None and last is not None:
+                yield first, last
+            first = place
+        last = place
+    if first is not None and last is not None:
+        yield first, last
+
+
+def _value(point: BranchPoint, name: str) -> float:
+    return point.orbit.omega if name == "omega" else point.orbit.values[name]

@@ -1,0 +1,344 @@
+"""`basins`: which motion every state of a plane tends to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import InputError, suggest
+from suboctave.experiments.basins.attractors import BasinAttractor, Catalogue, read_attractors
+from suboctave.experiments.basins.run import APERIODIC, GONE, OPEN, BasinRun
+from suboctave.experiments.common import BasinOptions, checked_integration, start_state
+from suboctave.experiments.time_result import TimeResult
+from suboctave.interruption import Interruption
+from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_omega, check_range, read_values
+from suboctave.model.system import System
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import reporting
+from suboctave.store.arrays import padded
+from suboctave.timedomain.flow import check_count, check_extent
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["Basins", "basins", "check_plane"]
+
+_OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed"}
+
+
+@dataclass(eq=False)
+class Basins(TimeResult):
+    """Basins of attraction on a plane of states at phase 0 of the load.
+
+    Attributes
+    ----------
+    x, y
+        (W,) and (V,): the states' coordinates along `plane`, from end to end of the box.
+    labels
+        (V, W): the number of the attractor in `attractors`; -1 of motions that do not repeat, -2 where the trajectory
+        left the range of numbers, -3 where nothing was computed (an interruption).
+    settling
+        (V, W): periods of the load after which the trajectory was known to be trapped.
+    attractors
+        `BasinAttractor`: name, period, points, amplitude, multipliers.
+    followed, contradicted
+        How many of the trajectories that were stopped early were followed to the end, and how many of those did not
+        end where they were said to.
+    """
+
+    x: Array
+    y: Array
+    labels: NDArray[np.int_]
+    settling: NDArray[np.int_]
+    attractors: list[BasinAttractor]
+    plane: tuple[str, str]
+    rest: Array
+    omega: float
+    parameters: Mapping[str, float]
+    followed: int
+    contradicted: int
+    complete: bool
+    observed: int
+    system: System
+    seconds: float = 0.0
+
+    @property
+    def names(self) -> dict[int, str]:
+        """Names of the labels that occur."""
+        names = {i: one.name for i, one in enumerate(self.attractors)} | _OTHERS
+        return {i: names[i] for i in sorted(set(np.unique(self.labels).tolist()), key=lambda i: (i < 0, abs(i)))}
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """The share of the computed states that each has, by name."""
+        count = max(int((self.labels != OPEN).sum()), 1)
+        return {name: float((self.labels == i).sum()) / count for i, name in self.names.items() if i != OPEN}
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Of the shares, if the states were drawn at random: `sqrt(s (1 - s) / N)`. An upper bound for a grid."""
+        count = max(int((self.labels != OPEN).sum()), 1)
+        return {name: float(np.sqrt(s * (1.0 - s) / count)) for name, s in self.shares.items()}
+
+    @property
+    def grid_errors(self) -> dict[str, float]:
+        """Of the shares, as areas: the cell about a state at a boundary may belong to both sides.
+
+        The B states next to one of another label count with a standard deviation of half a cell each, independently:
+        `sqrt(B) / (2 N)`. Where boundaries are finer than the grid, `standard_errors` say more.
+        """
+        count = max(int((self.labels != OPEN).sum()), 1)
+        return {
+            name: float(np.sqrt(_at_boundary(self.labels == i).sum()) / (2.0 * count))
+            for i, name in self.names.items()
+            if i != OPEN
+        }
+
+    def attractor_at(self, x: float, y: float) -> BasinAttractor | None:
+        """The attractor of the state next to a point of the plane; None if its motion is aperiodic or unknown."""
+        places = []
+        for name, value, grid in (("x", x, self.x), ("y", y, self.y)):
+            step = (grid[-1] - grid[0]) / max(len(grid) - 1, 1) or 1.0
+            place = int(np.floor((value - grid[0]) / step + 0.5))
+            if not 0 <= place < len(grid):
+                raise InputError(f"{name}={value:g} lies outside of the box")
+            places.append(place)
+        label = int(self.labels[places[1], places[0]])
+        return self.attractors[label] if label >= 0 else None
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Labels and settling times on (y, x), and the attractors."""
+        known = self.attractors
+        multipliers = padded([one.multipliers for one in known], complex)
+        points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
+        shares, errors, grid = self.shares, self.standard_errors, self.grid_errors
+        return self._dataset(
+            self.system,
+            "basins",
+            {
+                "label": (("y", "x"), self.labels),
+                "settling": (("y", "x"), self.settling),
+                "period": (("attractor",), np.array([one.period for one in known], dtype=int)),
+                "amplitude": (("attractor",), np.array([one.amplitude for one in known])),
+                "given": (("attractor",), np.array([one.given for one in known], dtype=bool)),
+                "multipliers_real": (("attractor", "multiplier"), multipliers.real),
+                "multipliers_imag": (("attractor", "multiplier"), multipliers.imag),
+                "points": (("section", "state"), points),
+                "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
+                "share": (("kind",), np.array([shares[name] for name in shares])),
+                "standard_error": (("kind",), np.array([errors[name] for name in shares])),
+                "grid_error": (("kind",), np.array([grid[name] for name in shares])),
+                "rest": (("state",), self.rest),
+            },
+            {"x": self.x, "y": self.y, "attractor": [one.name for one in known], "kind": list(shares)},
+            plane_x=self.plane[0],
+            plane_y=self.plane[1],
+            omega=self.omega,
+            complete=int(self.complete),
+            followed=self.followed,
+            contradicted=self.contradicted,
+            observed=self.observed,
+            dofs=self.system.n,
+        )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row for each label that occurs: name, period, amplitude, share and its errors."""
+        import pandas as pd
+
+        by_name = {one.name: one for one in self.attractors}
+        rows = [
+            (
+                name,
+                by_name[name].period if name in by_name else 0,
+                by_name[name].amplitude if name in by_name else np.nan,
+                share,
+                self.standard_errors[name],
+                self.grid_errors[name],
+            )
+            for name, share in self.shares.items()
+        ]
+        return pd.DataFrame(rows, columns=["name", "period", "amplitude", "share", "standard_error", "grid_error"])
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """The plane in one colour for each attractor, stroboscopic points marked; saved if a path is given.
+
+        Options are those of `pictures.plot_basins`: `points`, `title`, `size`.
+        """
+        from suboctave.pictures.chaos import plot_basins
+
+        marks = [one.points[:, self._columns()] for one in self.attractors] if self.system.n == 1 else None
+        return plot_basins(self.to_xarray(), path, **{"points": marks, **options})
+
+    def _columns(self) -> list[int]:
+        names = coordinates(self.system)
+        return [names.index(name) for name in self.plane]
+
+    def __repr__(self) -> str:
+        shares = ", ".join(f"{name} {share:.4f} +- {self.grid_errors[name]:.1g}" for name, share in self.shares.items())
+        return (
+            f"Basins({len(self.x)} x {len(self.y)} states at omega={self.omega:.8g}: {shares}"
+            f"{'' if self.complete else ', not complete'})"
+        )
+
+
+@with_options(BasinOptions)
+@timed
+def basins(
+    system: System,
+    *,
+    omega: float,
+    box: tuple[tuple[float, float], tuple[float, float]],
+    grid: tuple[int, int] = (200, 200),
+    plane: tuple[str | int, str | int] | None = None,
+    rest: Any = None,
+    attractors: Any = None,
+    parameters: Mapping[str, float] | None = None,
+    periods: int = 500,
+    keep: Any = None,
+    **options: Unpack[BasinOptions],
+) -> Basins:
+    """The basins of attraction on a plane of states at phase 0 of the load.
+
+    Parameters
+    ----------
+    omega, parameters
+        Of the load; other values of some parameters, by name.
+    box
+        `((from, to), (from, to))` of the two coordinates; `grid` states along each, the ends among them.
+    plane, rest
+        The two coordinates: names `"x_0"`, `"v_2"` (of displacements and velocities) or numbers in the state (2n,);
+        default displacement and velocity of the observed degree of freedom. All others are as in `rest`, (2n,) or a
+        motion, default zero.
+    attractors
+        Motions (of harmonic balance, of shooting, found in time), branches or diagrams of which the stable motions at
+        this frequency are taken; one, several, or by name in a mapping. What else attracts is identified and named: a
+        coarse sample of the states is followed first, and every trajectory that comes to no known motion is examined.
+    periods
+        Periods of the load after which a trajectory that is not trapped yet is classified by its last points.
+    keep
+        A file in which what is done is kept as it comes (a journal): called again with the same arguments after a kill
+        or Ctrl-C, only the rest is computed, and the result is the same. Finished ones are read from it. With other
+        arguments, other `attractors` among them, it is refused.
+
+    A trajectory is stopped as soon as it lies in an ellipsoid about a stroboscopic point of a stable motion in which
+    the map over a few periods contracts, in the norm adapted to the monodromy matrix. The derivative of the map is
+    taken in 192 points of it, and the radius that passes is reduced by a tenth: no proof, so that up to 200 of the
+    stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing contracts
+    has no such neighbourhood; its trajectories are followed for all `periods`.
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    """
+    values, state = read_values(system, parameters), start_state(system, rest)
+    check_omega(omega)
+    how = checked_integration(system, options, tolerance=1e-8)
+    columns = check_plane(system, plane, how.observe)
+    sides, counts = _box(box), _grid(grid)
+    periods = check_count("periods", periods)
+    check_extent(counts[0] * counts[1], periods, counts[0] * counts[1] * 2 * system.n)
+    ends = [np.linspace(low, high, count) for (low, high), count in zip(sides, counts, strict=True)]
+    states = np.repeat(state[None], counts[0] * counts[1], axis=0)
+    states[:, columns[0]], states[:, columns[1]] = np.tile(ends[0], counts[1]), np.repeat(ends[1], counts[0])
+    catalogue = Catalogue(system, float(omega), values, how)
+    run = BasinRun(catalogue, states, counts, periods)
+    interruption: Interruption | None = None
+    with reporting(options.get("progress"), "basins") as report:
+        run.open(keep, read_attractors(catalogue, attractors))
+        try:
+            run.go(report)
+        except KeyboardInterrupt as cause:
+            interruption = Interruption.of(cause)
+        finally:
+            run.close()
+    names = coordinates(system)
+    return _result(run, ends, (names[columns[0]], names[columns[1]]), state, interruption)
+
+
+def _result(
+    run: BasinRun, ends: list[Array], plane: tuple[str, str], rest: Array, interruption: Interruption | None
+) -> Basins:
+    catalogue, shape = run.catalogue, (len(ends[1]), len(ends[0]))
+    system = catalogue.system
+    result = Basins(
+        x=ends[0],
+        y=ends[1],
+        labels=run.labels.reshape(shape),
+        settling=run.settling.reshape(shape),
+        attractors=catalogue.known,
+        plane=plane,
+        rest=rest,
+        omega=catalogue.omega,
+        parameters={**system.parameters, **catalogue.values},
+        followed=run.followed,
+        contradicted=run.contradicted,
+        complete=interruption is None,
+        observed=catalogue.how.observe,
+        system=system,
+    )
+    result.interruption = interruption
+    return result
+
+
+def coordinates(system: System) -> list[str]:
+    """Names of the entries of a state: `x_0 ... v_0 ...`."""
+    return [f"{kind}_{i}" for kind in "xv" for i in range(system.n)]
+
+
+def check_plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
+    """The two coordinates as numbers in the state, or `InputError`."""
+    if plane is None:
+        return observe, system.n + observe
+    if not (isinstance(plane, tuple | list) and len(plane) == 2):
+        raise InputError(f'plane={plane!r}: name two coordinates of the state, such as ("x_0", "v_0")')
+    names = coordinates(system)
+    read = []
+    for one in plane:
+        if isinstance(one, str):
+            if one not in names:
+                raise InputError(f"plane: there is no coordinate {one!r}{suggest(one, names)}")
+            read.append(names.index(one))
+        elif isinstance(one, int | np.integer) and not isinstance(one, bool) and 0 <= one < len(names):
+            read.append(int(one))
+        else:
+            raise InputError(
+                f"plane: {one!r} is no coordinate: a name such as x_0, or a number from 0 to {len(names) - 1}"
+            )
+    if read[0] == read[1]:
+        raise InputError(f"plane={plane!r} names one coordinate twice")
+    return read[0], read[1]
+
+
+def _box(box: Any) -> list[tuple[float, float]]:
+    if not (isinstance(box, tuple | list | np.ndarray) and len(box) == 2):
+        raise InputError(f"box={box!r}: give ((from, to), (from, to)) of the two coordinates")
+    sides = []
+    for name, side in zip(("box, first coordinate", "box, second coordinate"), box, strict=True):
+        low, high = check_range(name, tuple(side) if isinstance(side, list | np.ndarray) else side, False)
+        sides.append((min(low, high), max(low, high)))
+    return sides
+
+
+def _grid(grid: Any) -> tuple[int, int]:
+    if not (isinstance(grid, tuple | list) and len(grid) == 2):
+        raise InputError(f"grid={grid!r}: give the number of cells along both coordinates, such as (200, 200)")
+    return check_count("grid", grid[0]), check_count("grid", grid[1])
+
+
+def _at_boundary(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Cells that have a neighbour on the other side."""
+    out = np.zeros_like(inside)
+    across, along = inside[:, 1:] != inside[:, :-1], inside[1:] != inside[:-1]
+    out[:, 1:] |= across
+    out[:, :-1] |= across
+    out[1:] |= along
+    out[:-1] |= along
+    return out

@@ -1,0 +1,316 @@
+"""`brute_force_diagram`: what trajectories settle on while a parameter is varied; it knows of no branch.
+
+The state is carried on from value to value, upwards and downwards, or every value begins anew, from rest or from
+states that are given. Only attracting motions are seen, and only those whose basins are met; none of
+these is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import InputError, suggest
+from suboctave.experiments.attractors import Attractor, attractor_of
+from suboctave.experiments.common import (
+    FEW,
+    Integration,
+    SectionOptions,
+    checked_integration,
+    period_count,
+    start_state,
+    starting_states,
+    varied_grid,
+)
+from suboctave.experiments.time_result import TimeResult
+from suboctave.interruption import Interruption, pass_on
+from suboctave.model.elements.base import Array
+from suboctave.model.system import System
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import Report, reporting
+from suboctave.store.columns import parameter_column
+from suboctave.timedomain.flow import Flow, check_count, check_extent
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["BruteForceDiagram", "brute_force_diagram"]
+
+_CARRIED = ("up", "down")
+_STARTS = (*_CARRIED, "rest")
+
+
+@dataclass(eq=False)
+class BruteForceDiagram(TimeResult):
+    """Stroboscopic points over a parameter, for S ways to start and V values.
+
+    Attributes
+    ----------
+    name, values
+        What was varied ("omega" or a parameter), and its values (V,), increasing.
+    starts
+        S of "up", "down", "rest", "state 0", "state 1", ...
+    points
+        (S, V, P, 2n): states at phase 0 of the load after the transient; NaN where nothing was computed.
+    largest
+        (S, V, P, n): the largest |x_i| in the period before each point.
+    complete
+        False where an interruption (Ctrl-C) left values out.
+    """
+
+    name: str
+    values: Array
+    starts: tuple[str, ...]
+    points: Array
+    largest: Array
+    complete: bool
+    omega: float | None
+    transient: int
+    tolerance: float
+    method: str
+    observed: int
+    system: System
+    seconds: float = 0.0
+
+    @cached_property
+    def attractors(self) -> list[list[Attractor | None]]:
+        """S lists of V attractors, None where the trajectory left the range of numbers or was not computed."""
+        rows = zip(self.points, self.largest, strict=True)
+        return [[self._attractor(*one) for one in zip(self.values, *row, strict=True)] for row in rows]
+
+    def _attractor(self, value: float, points: Array, largest: Array) -> Attractor | None:
+        if not np.isfinite(points).all():
+            return None
+        at = {**self.system.parameters, **({} if self.omega is None else {self.name: float(value)})}
+        omega = float(value) if self.omega is None else self.omega
+        return attractor_of(self.system, points, largest, omega, at, self.tolerance, self.observed)
+
+    @property
+    def period(self) -> NDArray[np.int_]:
+        """(S, V): periods in periods of the load, 0 where nothing repeats, -1 where nothing was computed."""
+        return np.array([[-1 if one is None else one.period for one in row] for row in self.attractors], dtype=int)
+
+    @property
+    def amplitude(self) -> Array:
+        """(S, V): largest |x| of the observed degree of freedom, NaN where nothing was computed."""
+        return np.array([[np.nan if one is None else one.amplitude for one in row] for row in self.attractors])
+
+    def of(self, start: str) -> list[Attractor | None]:
+        """The attractors of one way to start, in the order of `values`."""
+        if start not in self.starts:
+            raise InputError(f"there is no start {start!r}{suggest(str(start), self.starts)}")
+        return self.attractors[self.starts.index(start)]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Points on (start, value, section, dof), periods and amplitudes on (start, value)."""
+        n = self.system.n
+        axes = ("start", "value", "section", "dof")
+        return self._dataset(
+            self.system,
+            "brute force",
+            {
+                "displacement": (axes, self.points[..., :n]),
+                "velocity": (axes, self.points[..., n:]),
+                "largest": (axes, self.largest),
+                "period": (axes[:2], self.period),
+                "amplitude": (axes[:2], self.amplitude),
+            },
+            {
+                "start": list(self.starts),
+                "value": self.values,
+                "dof": list(self.system.dof_names or range(n)),
+            },
+            varied=self.name,
+            **({} if self.omega is None else {"omega": self.omega}),
+            transient=self.transient,
+            tolerance=self.tolerance,
+            method=self.method,
+            observed=self.observed,
+            dofs=n,
+            complete=int(self.complete),
+        )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per value and start: what was varied, start, period, amplitude, defect of the repetition."""
+        import pandas as pd
+
+        rows = [
+            (float(value), start, one.kind, one.period, one.amplitude, one.defect)
+            for start, row in zip(self.starts, self.attractors, strict=True)
+            for value, one in zip(self.values, row, strict=True)
+            if one is not None
+        ]
+        own = ("start", "kind", "period", "amplitude", "defect")
+        return pd.DataFrame(rows, columns=[parameter_column(self.name, own), *own])
+
+    def plot(self, path: Any = None, curves: Any = None, **options: Any) -> Any:
+        """Draw the motions found, one colour for each period, over branches if any are given; saved to a path.
+
+        Options are those of `pictures.plot_brute_force`: `quantity` ("amplitude" or "section"), `starts`, `dof`,
+        `title`, `size`.
+        """
+        from suboctave.pictures.in_time import plot_brute_force
+
+        return plot_brute_force(self.to_xarray(), path, curves=curves, **options)
+
+    def __repr__(self) -> str:
+        counts = []
+        for period in sorted({int(p) for p in self.period.ravel() if p >= 0}, key=lambda p: (p == 0, p)):
+            name = "aperiodic" if period == 0 else "T" if period == 1 else f"{period}T"
+            counts.append(f"{name} {int((self.period == period).sum())}")
+        return (
+            f"BruteForceDiagram({self.name} from {self.values[0]:g} to {self.values[-1]:g}, {len(self.values)} values, "
+            f"{' and '.join(self.starts)}: {', '.join(counts) or 'nothing'}{'' if self.complete else ', not complete'})"
+        )
+
+
+@with_options(SectionOptions)
+@timed
+def brute_force_diagram(
+    system: System,
+    omega: Any,
+    *,
+    parameter: str | None = None,
+    values: Any = None,
+    count: int = 200,
+    start: str | Sequence[str] = ("up", "down"),
+    state: Any = None,
+    states: Any = None,
+    transient: int = 200,
+    periods: int = 60,
+    **options: Unpack[SectionOptions],
+) -> BruteForceDiagram:
+    """Integrate in time over a range of the frequency or of a parameter, for what the motion settles on.
+
+    Parameters
+    ----------
+    omega
+        The frequencies: `(from, to)`, of which `count` are taken, or all of an array. With `parameter`, one number.
+    parameter, values
+        A parameter that is varied instead, and its range `(from, to)` or its values.
+    start
+        "up", "down": the state is carried on through increasing or decreasing values. "rest": every value begins at
+        rest. Several of them in a sequence.
+    state
+        Where "up" and "down" begin, (2n,), a periodic motion or an attractor; default rest.
+    states
+        Further states (k, 2n) from which every value begins anew: they find motions that coexist.
+    transient, periods
+        Periods of the load that are left out at every value, and those that are kept. A motion of period nT is
+        recognised if `periods` is at least 3 n.
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    """
+    first = start_state(system, state)
+    name, at, grid = varied_grid(system, omega, parameter, values, count)
+    fresh, names = starting_states(system, states), _starts(start)
+    periods, transient = check_count("periods", periods), period_count("transient", transient)
+    how = checked_integration(system, options)
+    labels = (*names, *(f"state {i}" for i in range(len(fresh))))
+    trajectories = len(labels) * len(grid)
+    check_extent(trajectories, transient + periods, trajectories * periods * 2 * system.n)
+    points, largest = (np.full((len(labels), len(grid), periods, size), np.nan) for size in (2 * system.n, system.n))
+    diagram = BruteForceDiagram(
+        name, grid, labels, points, largest, True, None if name == "omega" else at, transient, how.period_tolerance,
+        how.method, how.observe, system,
+    )  # fmt: skip
+    scan = _Scan(diagram, periods, how)
+    with reporting(options.get("progress"), "brute force") as report:
+        try:
+            diagram.interruption = scan.go(first, fresh, report)
+        except KeyboardInterrupt as cause:
+            diagram.interruption = Interruption.of(cause)
+    diagram.complete = diagram.interruption is None
+    return diagram
+
+
+@dataclass
+class _Scan:
+    """The work of one diagram; fills its `points` and `largest`."""
+
+    diagram: BruteForceDiagram
+    periods: int
+    how: Integration
+
+    def go(self, first: Array, fresh: Array, report: Report | None) -> Interruption | None:
+        """States that are carried on from `first` (2n,), then every value anew from rest and from `fresh` (k, 2n)."""
+        d, how = self.diagram, self.how
+        carried = [label for label in d.starts if label in _CARRIED]
+        anew = [i for i, label in enumerate(d.starts) if label not in _CARRIED]
+        share = len(carried) / len(d.starts)
+        if carried:
+            flow = Flow(d.system, how.method, 1, how.steps, how.tolerance, lanes=FEW)
+            self._carry(flow, carried, first, _share(report, 0.0, share))
+        if not anew:
+            return None
+        begin = np.vstack([np.zeros((1, 2 * d.system.n)), fresh]) if "rest" in d.starts else fresh
+        flow = Flow(d.system, how.method, 1, how.steps, how.tolerance)
+        return self._begin_anew(flow, anew, begin, _share(report, share, 1.0))
+
+    def _carry(self, flow: Flow, which: list[str], first: Array, report: Report | None) -> None:
+        """Carry states through the values, all directions side by side."""
+        d = self.diagram
+        count = len(d.values)
+        states = np.repeat(first[None], len(which), axis=0)
+        rows = [d.starts.index(one) for one in which]
+        for step in range(count):
+            columns = [step if one == "up" else count - 1 - step for one in which]
+            motions = flow.over(states, *self._at(d.values[columns]), skip=d.transient, measure=True, workers=1)
+            pass_on(motions.interruption)
+            assert motions.peaks is not None
+            for i, (row, column) in enumerate(zip(rows, columns, strict=True)):
+                d.points[row, column], d.largest[row, column] = motions.states[i], motions.peaks[i]
+            # where a motion has left the range of numbers, the next value begins as the first one did
+            states = np.where(motions.failed[:, None], first, motions.end)
+            if report is not None:
+                report((step + 1) / count, f"{d.name} = {d.values[columns[0]]:.6g}")
+
+    def _begin_anew(self, flow: Flow, rows: list[int], begin: Array, report: Report | None) -> Interruption | None:
+        """Every value from every state in `begin` (k, 2n); what stopped it, if anything did."""
+        d, k = self.diagram, len(begin)
+        motions = flow.over(
+            np.repeat(begin, len(d.values), axis=0),
+            *self._at(np.tile(d.values, k)),
+            skip=d.transient,
+            measure=True,
+            workers=self.how.workers,
+            report=report,
+        )
+        assert motions.peaks is not None
+        for out, kept in ((d.points, motions.states), (d.largest, motions.peaks)):
+            out[rows] = kept.reshape(k, len(d.values), *kept.shape[1:])
+        return motions.interruption
+
+    def _at(self, values: Array) -> tuple[Any, int, dict[str, Array]]:
+        """Frequency, periods and parameters of a flow."""
+        d = self.diagram
+        whole = d.transient + self.periods
+        return (values, whole, {}) if d.omega is None else (d.omega, whole, {d.name: values})
+
+
+def _share(report: Report | None, begin: float, end: float) -> Report | None:
+    if report is None:
+        return None
+    return lambda share, where: report(begin + (end - begin) * share, where)
+
+
+def _starts(start: str | Sequence[str]) -> list[str]:
+    listed = [start] if isinstance(start, str) else list(start) if isinstance(start, Iterable) else [start]
+    for one in listed:
+        if one not in _STARTS:
+            raise InputError(
+                f"start is one of {', '.join(_STARTS)}, or several of them, not {one!r}{suggest(str(one), _STARTS)}"
+            )
+    if not listed:
+        raise InputError(f"start is one of {', '.join(_STARTS)}, or several of them, not none")
+    return list(dict.fromkeys(listed))

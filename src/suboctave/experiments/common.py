@@ -1,0 +1,261 @@
+"""What experiments in time share: starts, counts, grids and options that are checked, and forces without jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.interruption import pass_on
+from suboctave.model.elements.base import Array
+from suboctave.model.elements.coupled import as_coupled
+from suboctave.model.inputs import check_parameter, check_range
+from suboctave.model.system import System
+from suboctave.options import RunOptions
+from suboctave.timedomain.flow import METHODS, Flow, check_count
+from suboctave.timedomain.layout import Layout
+
+__all__ = [
+    "FEW",
+    "TOLERANCE",
+    "BasinOptions",
+    "ComplexArray",
+    "Integration",
+    "ParallelOptions",
+    "RecognitionOptions",
+    "SectionOptions",
+    "check_continuous",
+    "checked_integration",
+    "checked_range",
+    "observed_dof",
+    "period_count",
+    "start_state",
+    "starting_states",
+    "steps_of",
+    "varied_grid",
+]
+
+ComplexArray: TypeAlias = NDArray[np.complex128]
+
+#: by how much the points of a periodic motion may miss each other, relative to the motion's size
+TOLERANCE = 1e-6
+#: trajectories side by side where there are one or two
+FEW = 4
+#: samples per period of the accurate method, steps of Newmark's
+_SAMPLES = {"accurate": 200, "newmark": 1000}
+
+
+# ----------------------------------------------------------------------------------------------------------- options
+class ParallelOptions(RunOptions, total=False):
+    """Options of verbs that follow trajectories side by side."""
+
+    workers: Annotated[int | None, "Threads; default as many as there are processors. Results do not depend on it."]
+
+
+class RecognitionOptions(RunOptions, total=False):
+    """How finely a motion is integrated, and how its period is recognised."""
+
+    tolerance: Annotated[
+        float | None,
+        "Local error relative to the size of the motion (default 1e-10, of `basins` 1e-8); of Newmark's method that of "
+        "the equations solved in each step.",
+    ]
+    period_tolerance: Annotated[
+        float | None,
+        "Motions whose points repeat to this share of their size (default 1e-6) are periodic; at least three "
+        "repetitions are needed.",
+    ]
+    observe: Annotated[int | None, "The degree of freedom whose amplitude is reported; default that of the first load."]
+
+
+class BasinOptions(RecognitionOptions, ParallelOptions, total=False):
+    """Both."""
+
+
+class SectionOptions(BasinOptions, total=False):
+    """Both, with a choice of the method."""
+
+    method: Annotated[
+        str | None,
+        '"accurate" (default): Dormand and Prince of order 8 with steps of its own, corners of laws located; or '
+        '"newmark": fixed steps, as in `integrate`.',
+    ]
+    steps_per_period: Annotated[int | None, "Steps of Newmark's method in one period (default 1000)."]
+
+
+@dataclass(frozen=True)
+class Integration:
+    """Options that have been checked."""
+
+    method: str
+    steps: int
+    tolerance: float | None
+    period_tolerance: float
+    observe: int
+    workers: int | None
+
+
+def checked_integration(system: System, options: Mapping[str, Any], **defaults: Any) -> Integration:
+    """Options of integration, or a verb's defaults; `InputError` for those that make no sense."""
+    given = defaults | {name: value for name, value in options.items() if value is not None}
+    method, period_tolerance = given.get("method", "accurate"), given.get("period_tolerance", TOLERANCE)
+    _check_system(system)
+    if not (isinstance(period_tolerance, int | float) and 1e-14 <= period_tolerance < 1.0):
+        raise InputError(f"period_tolerance={period_tolerance!r}: give a share of the motion's size, such as 1e-6")
+    steps, observe = steps_of(method, given.get("steps_per_period")), observed_dof(system, given.get("observe"))
+    return Integration(method, steps, given.get("tolerance"), period_tolerance, observe, given.get("workers"))
+
+
+def _check_system(system: Any) -> None:
+    if not isinstance(system, System):
+        raise InputError(f"the first argument must be a System, not {type(system).__name__}")
+
+
+def steps_of(method: str, given: int | None) -> int:
+    """Samples of the accurate method, or steps of Newmark's, in one period."""
+    if method not in METHODS:
+        raise InputError(f"method={shortened(method)}{suggest(str(method), METHODS)}")
+    return check_count("steps_per_period", _SAMPLES.get(method, 200) if given is None else given)
+
+
+def observed_dof(system: System, observe: int | None) -> int:
+    """The observed degree of freedom, or `InputError`."""
+    dof = system.observed_dof if observe is None else observe
+    if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or not 0 <= dof < system.n:
+        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
+    return int(dof)
+
+
+def period_count(name: str, value: Any) -> int:
+    """A number of periods, 0 or more."""
+    if not (is_number(value) and float(value).is_integer() and value >= 0):
+        raise InputError(f"{name} must be a whole number of periods, not {shortened(value)}")
+    return int(value)
+
+
+# ------------------------------------------------------------------------------------------------------------ starts
+def start_state(system: System, state: Any) -> Array:
+    """A state (2n,): rest for None, that of a periodic motion at t = 0, or what is given."""
+    _check_system(system)
+    if state is None:
+        return np.zeros(2 * system.n)
+    for name in ("start", "state"):
+        held = getattr(state, name, None)
+        if held is not None and not isinstance(state, np.ndarray):
+            state = held() if callable(held) else held
+            break
+    array = _numbers(state)
+    if array.shape != (2 * system.n,) or not np.isfinite(array).all():
+        raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
+    return array
+
+
+def starting_states(system: System, states: Any) -> Array:
+    """States (k, 2n), none for None."""
+    if states is None:
+        return np.zeros((0, 2 * system.n))
+    array = np.atleast_2d(_numbers(states))
+    if array.ndim != 2 or array.shape[1] != 2 * system.n or not np.isfinite(array).all():
+        raise InputError(f"states must be finite numbers of shape (k, {2 * system.n}), got {array.shape}")
+    return array
+
+
+def _numbers(given: Any) -> Array:
+    try:
+        return np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return np.zeros(0)
+
+
+# ------------------------------------------------------------------------------------------------------------- grids
+def checked_range(name: str, given: Any, count: int, positive: bool) -> Array:
+    """Increasing values: `count` of a range `(from, to)`, or all of an array."""
+    if isinstance(given, tuple) and len(given) == 2:
+        first, last = check_range(name, given, positive)
+        return np.linspace(min(first, last), max(first, last), count)
+    array = _numbers(given)
+    if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (positive and (array <= 0.0).any()):
+        what = "positive frequencies" if positive else "finite values"
+        raise InputError(f"{name}: give a range (from, to), or an array of {what}")
+    return np.unique(array)
+
+
+def varied_grid(system: System, omega: Any, parameter: str | None, values: Any, count: int) -> tuple[str, float, Array]:
+    """What is varied, the frequency if that is not, and the increasing values."""
+    count = check_count("count", count)
+    if parameter is None or parameter == "omega":
+        if values is not None and parameter is None:
+            raise InputError("values= are those of a parameter: name it with parameter=")
+        if is_number(omega):
+            raise InputError("omega must be a range (from, to) or several values; or name a parameter to vary")
+        return "omega", 0.0, checked_range("omega", omega, count, True)
+    check_parameter(system, parameter)
+    if not (is_number(omega) and omega > 0.0):
+        raise InputError(f"omega must be a positive number while {parameter} is varied, not {omega!r}")
+    if values is None:
+        raise InputError(f"give the range or the values of {parameter}: values=(from, to)")
+    grid = checked_range(parameter, values, count, False)
+    for end in (grid[0], grid[-1]):
+        try:
+            system.with_parameters({parameter: float(end)})
+        except InputError as failure:
+            raise InputError(f"{parameter}={end:g}: {failure}") from None
+    return parameter, float(omega), grid
+
+
+# ------------------------------------------------------------------------------------------------------------ forces
+_PER_PERIOD, _PERIODS, _HALVINGS = 200, 30, 40
+#: the share of a force's range that remains between two neighbours if it jumps there
+_JUMP = 1e-3
+
+
+def check_continuous(system: System, state: Array, omega: float, values: Mapping[str, float]) -> None:
+    """Refuse elements of a user's own whose force jumps on the way of the motion from `state` (2n,).
+
+    Derivatives of the flow take continuous forces for granted. Between the two samples of the motion that differ most
+    in force, the place is halved again and again: what is left of a continuous force is nothing.
+    """
+    own = Layout(system).called_back
+    if not own:
+        return
+    flow = Flow(system, "newmark", _PER_PERIOD, _PER_PERIOD, lanes=8)
+    motions = flow.over(state, omega, _PERIODS, values)
+    pass_on(motions.interruption)
+    states = motions.states[0]
+    states = np.vstack([state[None], states[np.isfinite(states).all(axis=1)]])
+    for placed in own:
+        _check_jump(system, placed.element, states, {**system.parameters, **values})
+
+
+def _check_jump(system: System, element: Any, states: Array, values: Mapping[str, float]) -> None:
+    law, n = as_coupled(element), system.n
+    rows, c = law.inputs(n), element.coefficient_values(values)
+    q = rows @ states[:, :n].T
+    if element.depends_on_velocity:
+        q = np.vstack([q, rows @ states[:, n:].T])
+    phase = 2.0 * np.pi * (np.arange(q.shape[1]) % _PER_PERIOD) / _PER_PERIOD
+    f = np.asarray(law.tangent(q, phase, c)[0], dtype=float)
+    largest = float(np.ptp(f))
+    if len(f) < 2 or not largest > 0.0:
+        return
+    k = int(np.argmax(np.abs(np.diff(f))))
+    # the phase stands still: a force that jumps at an instant, whatever the motion, does no harm
+    low, high, at = q[:, k : k + 1], q[:, k + 1 : k + 2], phase[k : k + 1]
+    first, last = (float(law.tangent(y, at, c)[0][0]) for y in (low, high))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        force = float(law.tangent(middle, at, c)[0][0])
+        if abs(force - first) >= abs(last - force):
+            high, last = middle, force
+        else:
+            low, first = middle, force
+    if abs(last - first) > _JUMP * largest:
+        place = ", ".join(f"{value:.4g}" for value in low[:, 0])
+        raise InputError(
+            f"{element.label}: the force jumps by {abs(last - first):.3g} at ({place}); the derivative of the flow "
+            "does not contain that. Write the law with a steep but continuous passage"
+        )

@@ -1,0 +1,221 @@
+"""Results of time integration as datasets that a file or the journal of a study can hold, and back.
+
+The dataset of `to_xarray()`, complex numbers as pairs of variables `..._real`, `..._imag`, and besides `record`: JSON
+with the system and what is no array. What follows from the numbers (attractors of sections, shares of basins) is
+computed again when it is needed. docs/results.md describes the variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.experiments.basins.attractors import BasinAttractor
+from suboctave.experiments.basins.verb import Basins
+from suboctave.experiments.brute_force import BruteForceDiagram
+from suboctave.experiments.lyapunov import LyapunovExponents
+from suboctave.experiments.lyapunov_map import LyapunovMap
+from suboctave.experiments.poincare import PoincareSections
+from suboctave.experiments.stepped_result import SteppedSine
+from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.trajectories import Trajectory
+from suboctave.experiments.two_trajectories import Separation, TwoTrajectories
+from suboctave.model.system import System, build
+from suboctave.store.arrays import array_of, flat
+from suboctave.store.plain import from_json, to_json
+from suboctave.store.registry import Codec, Datasets, register
+from suboctave.store.systems import system_arrays, written_system
+from suboctave.timedomain.trapping import Trap
+
+if TYPE_CHECKING:
+    import xarray
+
+_CLASSES: dict[str, type] = {"TwoTrajectories": TwoTrajectories}
+
+
+def _read(kind: _Kind, groups: Datasets, allow_code: bool, linear: Any) -> TimeResult:
+    """The result that `_written` wrote, equal bit for bit; InputError where the datasets are not those of one."""
+    dataset = groups[""]
+    try:
+        record = from_json(str(dataset["record"].item()), _CLASSES)
+        system = build(record["system"], system_arrays(dataset), allow_code)
+        result: TimeResult = kind.made(**kind.read(_Read(dataset, record, system)), system=system)
+        result.seconds = float(record["seconds"])
+    except InputError:  # which is a ValueError
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"this is no result of suboctave: {type(error).__name__}: {error}") from None
+    return result
+
+
+def _written(kind: _Kind, item: Any) -> dict[str, xarray.Dataset]:
+    import xarray
+
+    dataset = item.to_xarray()
+    system, arrays = written_system(item.system)
+    record = {"system": system, "seconds": float(item.seconds), **kind.more(item)}
+    variables = {name: (v.dims, v.values, v.attrs) for name, v in dataset.variables.items()}
+    variables["record"] = ((), np.array(to_json(record)), {"long_name": "the system and what is no array, as JSON"})
+    for name, array in arrays.items():
+        variables[name] = (tuple(f"{name}_{axis}" for axis in range(array.ndim)), array, {})
+    stored = xarray.Dataset(dict(flat(variables)), attrs=dataset.attrs)
+    return {"": stored.set_coords([name for name in dataset.coords if name in stored])}
+
+
+@dataclass(frozen=True)
+class _Read:
+    """A dataset that is read, its record and the system in it."""
+
+    dataset: xarray.Dataset
+    record: Mapping[str, Any]
+    system: System
+
+    def __getitem__(self, name: str) -> Any:
+        return array_of(self.dataset, name)
+
+    def state(self) -> np.ndarray:
+        """Displacements and velocities side by side."""
+        return np.concatenate([self["displacement"], self["velocity"]], axis=-1)
+
+    def texts(self, name: str) -> list[str]:
+        """A variable of texts."""
+        return [str(text) for text in self[name]]
+
+    def parameters(self) -> dict[str, float]:
+        """The values of parameters by name."""
+        return dict(zip(self.texts("parameter"), self["parameters"].tolist(), strict=True))
+
+    def attributes(self, **kinds: type) -> dict[str, Any]:
+        """Attributes by name, each of its kind."""
+        return {name: kind(self.dataset.attrs[name]) for name, kind in kinds.items()}
+
+    def arrays(self, *names: str) -> dict[str, Any]:
+        """Variables by name."""
+        return {name: self[name] for name in names}
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What a dataset of these contents becomes: arguments but the system; and what the record holds besides."""
+
+    made: Any
+    read: Callable[[_Read], dict[str, Any]]
+    more: Callable[[Any], dict[str, Any]] = lambda item: {}
+
+
+def _trajectory(d: _Read) -> dict[str, Any]:
+    return {
+        **d.arrays("time", "displacement", "velocity", "largest"),
+        **d.attributes(omega=float, steps_per_period=int, method=str),
+        "parameters": d.parameters(),
+    }
+
+
+def _sections(d: _Read) -> dict[str, Any]:
+    names, values = d.texts("parameter"), d["parameters"]
+    return {
+        "points": d.state(),
+        **d.arrays("largest", "omega", "failed", "finished"),
+        "varied": {name: values[:, names.index(name)].copy() for name in d.record["varied"]},
+        **d.attributes(tolerance=float, transient=int, method=str, observed=int),
+    }
+
+
+def _brute_force(d: _Read) -> dict[str, Any]:
+    omega = d.dataset.attrs.get("omega")
+    return {
+        "name": str(d.dataset.attrs["varied"]),
+        "values": d["value"],
+        "starts": tuple(d.texts("start")),
+        "points": d.state(),
+        "omega": None if omega is None else float(omega),
+        **d.arrays("largest"),
+        **d.attributes(complete=bool, transient=int, tolerance=float, method=str, observed=int),
+    }
+
+
+def _stepped(d: _Read) -> dict[str, Any]:
+    return {
+        **d.arrays("omega", "response", "largest", "period", "ends", "tapped"),
+        "directions": tuple(d.texts("direction")),
+        "multiples": d["multiple"],
+        "components": d["component"],
+        **d.attributes(settle=int, measure=int, noise=float, observed=int, complete=bool),
+    }
+
+
+def _exponents(d: _Read) -> dict[str, Any]:
+    return {
+        **d.arrays("exponents", "standard_errors", "by_trajectory", "stretches", "running", "end"),
+        **d.attributes(omega=float, divergence=float, smooth=bool, transient=int, tolerance=float),
+        "parameters": d.parameters(),
+    }
+
+
+def _map(d: _Read) -> dict[str, Any]:
+    return {
+        "name": str(d.dataset.attrs["varied"]),
+        "values": d["value"],
+        **d.arrays("omega", "exponent", "standard_error"),
+        **d.attributes(complete=bool, periods=int, transient=int),
+    }
+
+
+def _separation(d: _Read) -> dict[str, Any]:
+    return {
+        "rates": d["rate"],
+        "settings": np.stack([d["value"], d["offset"]], axis=1),
+        **d.arrays("time", "distance"),
+        **d.attributes(omega=float),
+        "parameters": d.parameters(),
+        "method": d.record["method"],
+    }
+
+
+def _basins(d: _Read) -> dict[str, Any]:
+    points, of, multipliers = d["points"], d["point_of"], d["multipliers"]
+    known = [
+        BasinAttractor(
+            name, int(d["period"][i]), points[of == i], float(d["amplitude"][i]),
+            multipliers[i, : d.record["multipliers"][i]].copy(), bool(d["given"][i]),
+            [Trap(*trap) for trap in d.record["traps"][i]],
+        )
+        for i, name in enumerate(d.texts("attractor"))
+    ]  # fmt: skip
+    return {
+        **d.arrays("x", "y", "settling", "rest"),
+        "labels": d["label"],
+        "attractors": known,
+        "plane": (str(d.dataset.attrs["plane_x"]), str(d.dataset.attrs["plane_y"])),
+        "parameters": d.parameters(),
+        **d.attributes(omega=float, followed=int, contradicted=int, complete=bool, observed=int),
+    }
+
+
+def _of_basins(item: Basins) -> dict[str, Any]:
+    return {
+        "traps": [
+            [(trap.point, trap.factor, trap.radius, trap.times) for trap in one.traps] for one in item.attractors
+        ],
+        "multipliers": [len(one.multipliers) for one in item.attractors],
+    }
+
+
+#: by what the attribute `contents` says
+_KINDS: dict[str, _Kind] = {
+    "trajectory": _Kind(Trajectory, _trajectory),
+    "poincare sections": _Kind(PoincareSections, _sections, lambda item: {"varied": list(item.varied)}),
+    "brute force": _Kind(BruteForceDiagram, _brute_force),
+    "stepped sine": _Kind(SteppedSine, _stepped),
+    "lyapunov exponents": _Kind(LyapunovExponents, _exponents),
+    "lyapunov map": _Kind(LyapunovMap, _map),
+    "separation": _Kind(Separation, _separation, lambda item: {"method": item.method}),
+    "basins": _Kind(Basins, _basins, _of_basins),
+}
+for _name, _kind in _KINDS.items():
+    register(Codec(_name, _kind.made, partial(_written, _kind), partial(_read, _kind)))

@@ -1,0 +1,228 @@
+"""`lyapunov_map`: the largest Lyapunov exponent over the frequency and a parameter, every point by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, Unpack, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import InputError
+from suboctave.experiments.common import (
+    ParallelOptions,
+    check_continuous,
+    checked_range,
+    period_count,
+    start_state,
+    varied_grid,
+)
+from suboctave.experiments.lyapunov import smooth_weights
+from suboctave.experiments.time_result import TimeResult
+from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_parameter, read_values
+from suboctave.model.system import System
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import reporting
+from suboctave.store.columns import parameter_column
+from suboctave.timedomain.flow import Flow, check_count, check_extent
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["LyapunovMap", "lyapunov_map"]
+
+#: stretches that one trajectory is cut into
+_STRETCHES = 8
+#: what an exponent must be at least to count as chaos: standard errors, and a share of the frequency
+_SURE, _LEAST = 3.0, 1e-3
+
+
+@runtime_checkable
+class CriticalCurve(Protocol):
+    """A curve of bifurcations of one kind, of motions of period `nu` T."""
+
+    kind: str
+    nu: int
+    omega: Array
+
+    def parameter(self, name: str) -> Array:
+        """Values of a parameter along the curve."""
+
+
+@dataclass(eq=False)
+class LyapunovMap(TimeResult):
+    """The largest Lyapunov exponent over frequency and a parameter.
+
+    Attributes
+    ----------
+    omega, values
+        (W,) and (V,), increasing.
+    exponent
+        (V, W): natural logarithm per unit of time; NaN where nothing was computed or the motion left the range of
+        numbers.
+    standard_error
+        (V, W): from eight stretches of the one trajectory.
+    complete
+        False where an interruption (Ctrl-C) left points out.
+    """
+
+    name: str
+    omega: Array
+    values: Array
+    exponent: Array
+    standard_error: Array
+    complete: bool
+    periods: int
+    transient: int
+    system: System
+    seconds: float = 0.0
+
+    @property
+    def chaotic(self) -> NDArray[np.bool_]:
+        """(V, W): positive by more than three standard errors, and by more than a thousandth of the frequency."""
+        with np.errstate(invalid="ignore"):
+            return self.exponent > np.maximum(_SURE * self.standard_error, _LEAST * self.omega)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Exponent, its standard error and what counts as chaos on (value, omega)."""
+        axes = ("value", "omega")
+        return self._dataset(
+            self.system,
+            "lyapunov map",
+            {
+                "exponent": (axes, self.exponent),
+                "standard_error": (axes, self.standard_error),
+                "chaotic": (axes, self.chaotic),
+            },
+            {"value": self.values, "omega": self.omega},
+            varied=self.name,
+            periods=self.periods,
+            transient=self.transient,
+            complete=int(self.complete),
+        )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: frequency, value, exponent, its standard error, whether it counts as chaos."""
+        import pandas as pd
+
+        value, omega = np.meshgrid(self.values, self.omega, indexing="ij")
+        own = {"exponent": self.exponent, "standard_error": self.standard_error, "chaotic": self.chaotic}
+        columns = {"omega": omega, parameter_column(self.name, own): value, **own}
+        return pd.DataFrame({name: table.ravel() for name, table in columns.items()})
+
+    def plot(self, path: Any = None, curves: Any = (), **options: Any) -> Any:
+        """The map in colours, tracked curves of bifurcations over it if any are given; saved if a path is given.
+
+        Options are those of `pictures.plot_lyapunov_map`: `title`, `size`.
+        """
+        from suboctave.pictures.chaos import plot_lyapunov_map
+
+        lines = []
+        for curve in [curves] if isinstance(curves, CriticalCurve) else curves:
+            if not isinstance(curve, CriticalCurve):
+                raise InputError(f"curves= takes tracked curves of bifurcations, not {type(curve).__name__}")
+            period = f"{curve.nu}T" if curve.nu > 1 else "T"
+            lines.append((f"{curve.kind} of {period}", curve.omega, curve.parameter(self.name)))
+        return plot_lyapunov_map(self.to_xarray(), path, lines=lines, **options)
+
+    def __repr__(self) -> str:
+        share = float(self.chaotic.mean())
+        return (
+            f"LyapunovMap(omega from {self.omega[0]:g} to {self.omega[-1]:g}, {self.name} from {self.values[0]:g} to "
+            f"{self.values[-1]:g}, {len(self.omega)} x {len(self.values)} points, {100 * share:.3g} % chaotic"
+            f"{'' if self.complete else ', not complete'})"
+        )
+
+
+@with_options(ParallelOptions)
+@timed
+def lyapunov_map(
+    system: System,
+    omega: Any,
+    *,
+    parameter: str,
+    values: Any,
+    counts: tuple[int, int] = (60, 40),
+    state: Any = None,
+    parameters: Mapping[str, float] | None = None,
+    transient: int = 200,
+    periods: int = 400,
+    tolerance: float = 1e-8,
+    **options: Unpack[ParallelOptions],
+) -> LyapunovMap:
+    """The largest Lyapunov exponent over the frequency and a parameter; all processors work.
+
+    Parameters
+    ----------
+    omega, values
+        Frequencies and values of `parameter`: ranges `(from, to)`, of which `counts` are taken, or all of an array.
+    counts
+        Of frequencies and of values.
+    state
+        Where every trajectory begins, (2n,), default rest. Where motions coexist, one of them is seen.
+    transient, periods
+        Periods of the load that are left out, and those averaged over.
+    tolerance
+        Local error relative to the size of the motion.
+    parameters
+        Other values of some parameters, by name.
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    """
+    first = start_state(system, state)
+    check_parameter(system, parameter)
+    fixed = read_values(system, parameters)
+    if parameter in fixed:
+        raise InputError(f"parameters= fixes {parameter}, which is to be varied")
+    if not (isinstance(counts, tuple | list) and len(counts) == 2):
+        raise InputError(f"counts={counts!r}: give the number of frequencies and that of values, such as (60, 40)")
+    transient, periods = period_count("transient", transient), check_count("periods", periods)
+    if periods < 2 * _STRETCHES:
+        raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
+    cells = check_count("counts", counts[0]) * check_count("counts", counts[1])
+    check_extent(cells, transient + periods, 2 * cells * periods * system.n)
+    frequencies = checked_range("omega", omega, counts[0], True)
+    at = system.with_parameters(fixed) if fixed else system
+    _, _, column = varied_grid(at, float(frequencies[0]), parameter, values, counts[1])
+    check_continuous(at, first, float(frequencies[0]), {parameter: float(column[0])})
+    flow = Flow(system, "accurate", tolerance=tolerance, tangents=1)
+    shape = len(column), len(frequencies)
+    varied: dict[str, Any] = {parameter: np.repeat(column, shape[1]), **fixed}
+    with reporting(options.get("progress"), "Lyapunov map") as report:
+        motions = flow.over(
+            np.repeat(first[None], shape[0] * shape[1], axis=0), np.tile(frequencies, shape[0]), transient + periods,
+            varied, transient, workers=options.get("workers"), report=report,
+        )  # fmt: skip
+    assert motions.growth is not None
+    per_time = frequencies / (2.0 * np.pi)
+    mean, error = (part.reshape(shape) * per_time for part in _averaged(motions.growth[:, :, 0]))
+    complete = bool(motions.finished.all())
+    result = LyapunovMap(parameter, frequencies, column, mean, error, complete, periods, transient, at)
+    result.interruption = motions.interruption
+    return result
+
+
+def _averaged(growth: Array) -> tuple[Array, Array]:
+    """Mean growth (B,) per period and its standard error, from growths (B, P) cut into stretches."""
+    periods = growth.shape[1]
+    length = periods // _STRETCHES
+    cut = growth[:, periods - _STRETCHES * length :].reshape(-1, _STRETCHES, length)
+    means, errors = [], []
+    for weights in (np.full(length, 1.0 / length), smooth_weights(length)):
+        each = cut @ weights
+        means.append(each.mean(axis=1))
+        errors.append(each.std(axis=1, ddof=1) / np.sqrt(_STRETCHES))
+    # over the whole trajectory it is better still; what it differs by is what all stretches may have in common
+    whole = growth @ smooth_weights(periods)
+    errors[1], means[1] = np.maximum(errors[1], np.abs(whole - means[1])), whole
+    # stretches of a regular motion may all be wrong by the same
+    errors[0] = np.maximum(errors[0], np.abs(whole - means[0]))
+    smooth = errors[1] < 0.5 * errors[0]  # the less of two estimates of few stretches is smaller by chance, too
+    return np.where(smooth, means[1], means[0]), np.where(smooth, errors[1], errors[0])

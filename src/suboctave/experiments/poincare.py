@@ -1,0 +1,221 @@
+"""`poincare_sections`: where trajectories pierce the plane of phase 0 of the load, and what they settle on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from suboctave.errors import InputError
+from suboctave.experiments.attractors import Attractor, attractor_of, distinct
+from suboctave.experiments.common import SectionOptions, checked_integration, period_count, start_state
+from suboctave.experiments.time_result import TimeResult
+from suboctave.model.elements.base import Array
+from suboctave.model.system import System
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import reporting
+from suboctave.store.columns import parameter_column
+from suboctave.timedomain.flow import Flow, check_count
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["PoincareSections", "poincare_sections"]
+
+
+@dataclass(eq=False)
+class PoincareSections(TimeResult):
+    """Stroboscopic points of B trajectories.
+
+    Attributes
+    ----------
+    points
+        (B, P, 2n): displacements, then velocities, at phase 0 of the load, after the transient.
+    largest
+        (B, P, n): the largest |x_i| in the period before each point.
+    omega
+        (B,).
+    varied
+        (B,) each: the parameters that differ from the system's, by name.
+    failed
+        (B,): trajectories that left the range of numbers (their points are NaN), or some steps of which Newmark's
+        method did not solve.
+    finished
+        (B,): False for those that an interruption left out; their points are NaN.
+    tolerance
+        Relative tolerance of the recognition of periods.
+    """
+
+    points: Array
+    largest: Array
+    omega: Array
+    varied: Mapping[str, Array]
+    failed: NDArray[np.bool_]
+    finished: NDArray[np.bool_]
+    tolerance: float
+    transient: int
+    method: str
+    observed: int
+    system: System
+    seconds: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def attractor(self, index: int) -> Attractor:
+        """What trajectory number `index` has settled on."""
+        if not -len(self) <= index < len(self):
+            raise InputError(f"there is no trajectory {index}: they are numbered from 0 to {len(self) - 1}")
+        values = {name: float(column[index]) for name, column in self.varied.items()}
+        return attractor_of(
+            self.system,
+            self.points[index],
+            self.largest[index],
+            float(self.omega[index]),
+            {**self.system.parameters, **values},
+            self.tolerance,
+            self.observed,
+        )
+
+    @property
+    def periods(self) -> NDArray[np.int_]:
+        """(B,): the period of each in periods of the load, 0 where nothing repeats."""
+        return np.array([self.attractor(i).period for i in range(len(self))], dtype=int)
+
+    @property
+    def attractors(self) -> list[Attractor]:
+        """Every attractor once, by falling amplitude, with the number of trajectories on it.
+
+        All trajectories must have the same frequency and parameters; those that did not finish are left out.
+        """
+        columns = [self.omega, *self.varied.values()]
+        if any((column != column[0]).any() for column in columns):
+            raise InputError(
+                "the trajectories have different frequencies or parameters: ask for attractor(i) of each, or take "
+                "brute_force_diagram"
+            )
+        kept = np.flatnonzero(self.finished & ~self.failed)
+        return distinct(self.system, [self.attractor(int(i)) for i in kept], self.tolerance)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Points on (trajectory, section, dof), periods, and what produced them."""
+        n = self.system.n
+        names: Any = self.system.dof_names or range(n)
+        axes = ("trajectory", "section", "dof")
+        return self._dataset(
+            self.system,
+            "poincare sections",
+            {
+                "displacement": (axes, self.points[:, :, :n]),
+                "velocity": (axes, self.points[:, :, n:]),
+                "largest": (axes, self.largest),
+                "omega": (axes[:1], self.omega),
+                "period": (axes[:1], self.periods),
+                "failed": (axes[:1], self.failed),
+                "finished": (axes[:1], self.finished),
+                "parameters": (("trajectory", "parameter"), self._parameters()),
+            },
+            {"dof": list(names)},
+            varied="\n".join(self.varied),
+            transient=self.transient,
+            method=self.method,
+            tolerance=self.tolerance,
+            observed=self.observed,
+            dofs=n,
+        )
+
+    def _parameters(self) -> Array:
+        """(B, parameters): the values of all of them."""
+        columns = [self.varied.get(name, np.full(len(self), value)) for name, value in self.system.parameters.items()]
+        return np.array(columns, dtype=float).reshape(-1, len(self)).T
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: trajectory, what varies, number of the period, state, period of the motion."""
+        import pandas as pd
+
+        count, sections, size = self.points.shape
+        names = [f"{kind}_{i}" for kind in "xv" for i in range(size // 2)]
+        taken = ("trajectory", "omega", "section", *names, "period")
+        varied = {"omega": self.omega} | {parameter_column(n, taken): v for n, v in self.varied.items()}
+        columns: dict[str, Any] = {"trajectory": np.repeat(np.arange(count), sections)}
+        columns |= {n: np.repeat(values, sections) for n, values in varied.items()}
+        columns["section"] = np.tile(np.arange(sections), count)
+        columns |= {name: self.points[:, :, i].ravel() for i, name in enumerate(names)}
+        return pd.DataFrame(columns | {"period": np.repeat(self.periods, sections)})
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """The points in the plane of displacement and velocity; saved if a path is given.
+
+        Options are those of `pictures.plot_sections`: `dof`, `title`, `size`.
+        """
+        from suboctave.pictures.in_time import plot_sections
+
+        return plot_sections(self.to_xarray(), path, **options)
+
+    def __repr__(self) -> str:
+        count, sections, _ = self.points.shape
+        return f"PoincareSections({count} trajectories, {sections} points each after {self.transient} periods)"
+
+
+@with_options(SectionOptions)
+@timed
+def poincare_sections(
+    system: System,
+    states: Any = None,
+    *,
+    omega: ArrayLike,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    transient: int = 300,
+    periods: int = 60,
+    **options: Unpack[SectionOptions],
+) -> PoincareSections:
+    """Follow many trajectories and keep their states once in every period of the load, on all processors.
+
+    Parameters
+    ----------
+    states
+        (B, 2n) or (2n,): displacements, then velocities, at phase 0 of the load; None for rest.
+    omega, parameters
+        A number, or (B,) with one for each trajectory; parameters by name.
+    transient, periods
+        Periods of the load that are left out, and those that are kept.
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    """
+    if states is None or not isinstance(states, list | tuple | np.ndarray):
+        states = start_state(system, states)
+    periods, transient = check_count("periods", periods), period_count("transient", transient)
+    how = checked_integration(system, options)
+    flow = Flow(system, how.method, 1, how.steps, how.tolerance)
+    with reporting(options.get("progress"), "Poincaré sections") as report:
+        motions = flow.over(
+            states, omega, transient + periods, parameters, transient, measure=True, workers=how.workers, report=report
+        )
+    count = len(motions.states)
+    assert motions.peaks is not None
+    sections = PoincareSections(
+        points=motions.states,
+        largest=motions.peaks,
+        omega=np.broadcast_to(np.asarray(omega, dtype=float), (count,)).copy(),
+        varied={
+            name: np.broadcast_to(np.asarray(values, dtype=float), (count,)).copy()
+            for name, values in (parameters or {}).items()
+        },
+        failed=motions.failed | (motions.unsettled > 0.0),
+        finished=motions.finished,
+        tolerance=how.period_tolerance,
+        transient=transient,
+        method=how.method,
+        observed=how.observe,
+        system=system,
+    )
+    sections.interruption = motions.interruption
+    return sections

@@ -1,0 +1,266 @@
+"""`stepped_sine`: the virtual stepped-sine test, as a rig would run it; Alcorta et al. 2019, section 5.4.
+
+The frequency goes in steps, the motion is carried on and the load's phase is continuous. At each step the motion
+settles, then response and load are measured over whole periods. With X_m and P_m the components at omega of response
+and load in measured period m,
+
+    X_1 = P sum_m X_m conj(P_m) / sum_m |P_m|^2,
+
+the cross-spectrum over the auto-spectrum of the load (the estimate H1) times the load's amplitude P: what a
+harmonic-balance branch calls `harmonic(1)`, phase relative to the load. Noise on the measured response averages out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Unpack
+
+import numpy as np
+
+from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.experiments.attractors import Attractor, attractor_of
+from suboctave.experiments.common import (
+    FEW,
+    ComplexArray,
+    Integration,
+    RecognitionOptions,
+    checked_integration,
+    checked_range,
+    observed_dof,
+    start_state,
+)
+from suboctave.experiments.stepped_result import SteppedSine
+from suboctave.interruption import Interruption, pass_on
+from suboctave.model.elements.base import Array
+from suboctave.model.system import System
+from suboctave.model.timed import timed
+from suboctave.options import with_options
+from suboctave.progress import Report, reporting
+from suboctave.timedomain.flow import Flow, Motions, check_count, check_extent, check_motions
+
+__all__ = ["check_stepped_sine", "stepped_sine"]
+
+_DIRECTIONS = ("up", "down", "both")
+_SAMPLES = 128
+
+
+@with_options(RecognitionOptions)
+@timed
+def stepped_sine(
+    system: System,
+    omega: Any,
+    *,
+    steps: int = 200,
+    direction: str = "up",
+    settle: int = 200,
+    measure: int = 60,
+    state: Any = None,
+    tap: tuple[float, int, float] | None = None,
+    harmonics: Sequence[float] = (0, 0.5, 1, 2, 3),
+    noise: float = 0.0,
+    seed: int = 0,
+    **options: Unpack[RecognitionOptions],
+) -> SteppedSine:
+    """Step a sine through a range of frequencies and measure the response, as a rig does.
+
+    Parameters
+    ----------
+    omega
+        `(from, to)`, in `steps` equal steps; or all of an array. The order is irrelevant.
+    direction
+        "up", "down", or "both": two tests, each from `state`.
+    settle, measure
+        Periods of the load at each step before, and over which, is measured. Sub-harmonic motions need a `measure` that
+        their period divides (60: up to 6T, and 10T).
+    state
+        Where each test begins, (2n,), a periodic motion or an attractor; default rest.
+    tap
+        `(omega, dof, velocity)`: when a test arrives at or first passes this frequency, the velocity of a degree of
+        freedom is changed by so much, at phase 0 of the load and after settling. It may lead to another motion.
+    harmonics
+        Multiples of omega whose components are measured; `measure` times each must be whole. The fundamental always is.
+    noise, seed
+        Standard deviation of white noise on the samples of the response, in its unit, and the seed of the generator.
+
+    Raises
+    ------
+    InputError
+        Before any work; also if no load is sinusoidal with the frequency omega.
+    ConvergenceError
+        If the motion leaves the range of numbers.
+    """
+    how = checked_integration(system, options)
+    given = (steps, direction, settle, measure, state, tap, harmonics, noise, seed)
+    test, start, where = _checked(system, how, omega, *given)
+    grid, directions = test.grid, ("up", "down") if direction == "both" else (direction,)
+    flows = tuple(Flow(system, "accurate", samples, 1000, how.tolerance, lanes=FEW) for samples in (1, _SAMPLES))
+    shape = (len(directions), len(grid))
+    out = SteppedSine(
+        grid, directions, test.multiples, np.full((*shape, len(test.multiples), system.n), np.nan, dtype=complex),
+        np.full((*shape, system.n), np.nan, dtype=complex), np.full((*shape, system.n), np.nan),
+        np.full(shape, -1), np.full((*shape, 2 * system.n), np.nan), np.full(len(directions), np.nan), True,
+        test.settle, test.measure, test.noise, how.observe, system,
+    )  # fmt: skip
+    with reporting(options.get("progress"), "stepped sine") as report:
+        try:
+            test.run(flows, out, start, where, np.random.default_rng(seed), report)
+        except KeyboardInterrupt as cause:
+            out.complete, out.interruption = False, Interruption.of(cause)
+    return out
+
+
+def check_stepped_sine(system: System, omega: Any, observe: int | None = None, **arguments: Any) -> None:
+    """Refuse arguments of `stepped_sine`; nothing is computed."""
+    _checked(system, checked_integration(system, {"observe": observe}), omega, **{"seed": 0, **arguments})
+
+
+def _checked(
+    system: System,
+    how: Integration,
+    omega: Any,
+    steps: int,
+    direction: str,
+    settle: int,
+    measure: int,
+    state: Any,
+    tap: Any,
+    harmonics: Sequence[float],
+    noise: float,
+    seed: int,
+) -> tuple[_Test, Array, tuple[float, int, float] | None]:
+    """The test, where it begins, and the tap; InputError."""
+    start = start_state(system, state)
+    # a range in so many steps has one more frequency
+    is_range = isinstance(omega, tuple) and len(omega) == 2
+    grid = checked_range("omega", omega, check_count("steps", steps) + 1 if is_range else 0, True)
+    if direction not in _DIRECTIONS:
+        raise InputError(f"direction={direction!r}: up, down or both{suggest(str(direction), _DIRECTIONS)}")
+    settle, measure = check_count("settle", settle), check_count("measure", measure)
+    multiples = _multiples(harmonics, measure)
+    if not (is_number(noise) and noise >= 0.0):
+        raise InputError(f"noise must be a standard deviation in the unit of the response, 0 or more, not {noise!r}")
+    try:
+        np.random.default_rng(seed)
+    except (TypeError, ValueError):
+        raise InputError(f"seed must be a whole number, 0 or more, not {shortened(seed)}") from None
+    _loads(system, float(grid[0]))
+    tests = len(grid) * (2 if direction == "both" else 1)
+    check_extent(tests, settle + measure, tests * 2 * system.n * (len(multiples) + 3))
+    return _Test(system, how, grid, settle, measure, multiples, float(noise)), start, _tap(system, tap, grid)
+
+
+@dataclass
+class _Test:
+    """One test on its way."""
+
+    system: System
+    how: Integration
+    grid: Array
+    settle: int
+    measure: int
+    multiples: Array
+    noise: float
+
+    def run(
+        self,
+        flows: tuple[Flow, ...],
+        out: SteppedSine,
+        start: Array,
+        tap: tuple[float, int, float] | None,
+        random: np.random.Generator,
+        report: Report | None,
+    ) -> None:
+        """Both directions side by side, step by step."""
+        count, n = len(self.grid), self.system.n
+        up = np.array([direction == "up" for direction in out.directions])
+        states = np.repeat(start[None], len(up), axis=0)
+        for step in range(count):
+            columns = np.where(up, step, count - 1 - step)
+            w = self.grid[columns]
+            if tap is not None:
+                at = np.where(up, w >= tap[0], w <= tap[0]) & np.isnan(out.tapped)
+                if at.any():
+                    states[at] = _over(flows[0], states[at], w[at], self.settle).end
+                    states[at, n + tap[1]] += tap[2]
+                    out.tapped[at] = w[at]
+            states = _over(flows[0], states, w, self.settle).end
+            motions = _over(flows[1], states, w, self.measure, measured=True)
+            states = motions.end.copy()
+            for s, v in enumerate(columns):
+                assert motions.peaks is not None
+                x, peaks = motions.states[s], motions.peaks[s]
+                largest = peaks.reshape(self.measure, -1, n).max(axis=1)
+                settled = self._attractor(x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]))
+                out.period[s, v], out.largest[s, v], out.ends[s, v] = settled.period, largest.max(axis=0), states[s]
+                samples = x[:, :n] + (random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
+                out.components[s, v], out.response[s, v] = self._measured(samples, float(w[s]))
+            if report is not None:
+                report((step + 1) / count, f"omega = {w[0]:.6g}")
+
+    def _attractor(self, points: Array, largest: Array, omega: float) -> Attractor:
+        how, parameters = self.how, self.system.parameters
+        return attractor_of(self.system, points, largest, omega, parameters, how.period_tolerance, how.observe)
+
+    def _measured(self, x: Array, omega: float) -> tuple[ComplexArray, ComplexArray]:
+        """Components (K, n), and the fundamental (n,) by cross- over auto-spectrum."""
+        # samples lie at the ends of the intervals: the first at phase 2 pi / samples
+        turn = np.arange(1, len(x) + 1) / _SAMPLES
+        scale = np.where(self.multiples == 0.0, 1.0, 2.0)
+        waves = np.exp(-2j * np.pi * np.outer(self.multiples, turn))
+        components = (waves @ x) * (scale / len(x))[:, None]
+        load = _loads(self.system, omega)
+        phase = 2.0 * np.pi * turn
+        p = np.real(load * np.exp(1j * phase))
+        carrier = np.exp(-1j * phase)
+        per_period = (2.0 / _SAMPLES) * (carrier[:, None] * x).reshape(self.measure, _SAMPLES, -1).sum(axis=1)
+        loads = (2.0 / _SAMPLES) * (carrier * p).reshape(self.measure, _SAMPLES).sum(axis=1)
+        cross = np.sum(per_period * np.conj(loads)[:, None], axis=0)
+        return components, abs(load) * cross / np.sum(np.abs(loads) ** 2)
+
+
+def _over(flow: Flow, states: Array, omega: Array, periods: int, measured: bool = False) -> Motions:
+    """Follow states; their samples and the largest displacements in between are kept of what is measured."""
+    skip = 0 if measured else periods * flow.samples
+    motions = flow.over(states, omega, periods, skip=skip, measure=measured, workers=1)
+    pass_on(motions.interruption)
+    check_motions(motions)
+    return motions
+
+
+def _loads(system: System, omega: float) -> complex:
+    """Complex amplitude of the reference: the first load with the frequency omega."""
+    values = {**system.parameters, "omega": omega}
+    for component in system.load_components():
+        if component.harmonic == 1:
+            amplitude, phase = component.amplitude.value(values), component.phase.value(values)
+            if amplitude != 0.0:
+                return complex(amplitude * np.exp(1j * phase))
+    raise InputError(
+        "a stepped-sine test needs a load with the frequency omega (harmonic=1) whose amplitude is not zero"
+    )
+
+
+def _multiples(harmonics: Sequence[float], measure: int) -> Array:
+    try:
+        array = np.atleast_1d(np.asarray(list(harmonics), dtype=float))
+    except (TypeError, ValueError, OverflowError):
+        array = np.array([np.nan])
+    if not array.size or not np.isfinite(array).all() or (array < 0.0).any() or (array >= _SAMPLES / 4).any():
+        raise InputError(f"harmonics must be multiples of omega from 0 to {_SAMPLES // 4 - 1}, not {harmonics!r}")
+    whole = array * measure
+    if (np.abs(whole - whole.round()) > 1e-9).any():
+        raise InputError(
+            f"harmonics={harmonics!r}: {measure} measured periods hold no whole number of each; change measure"
+        )
+    return np.unique(np.append(array, 1.0))
+
+
+def _tap(system: System, tap: Any, grid: Array) -> tuple[float, int, float] | None:
+    if tap is None:
+        return None
+    if not isinstance(tap, tuple | list) or len(tap) != 3 or not (is_number(tap[0]) and is_number(tap[2])):
+        raise InputError(f"tap must be (omega, dof, change of velocity), not {tap!r}")
+    if not grid[0] <= tap[0] <= grid[-1]:
+        raise InputError(f"tap: omega = {tap[0]:g} is not within the test, {grid[0]:g} to {grid[-1]:g}")
+    return float(tap[0]), observed_dof(system, tap[1]), float(tap[2])

@@ -1,0 +1,197 @@
+"""`integrate`: the motion from a state, in time; the witness that a user may call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+
+from suboctave.experiments.common import FEW, period_count, start_state, steps_of
+from suboctave.experiments.time_result import TimeResult
+from suboctave.interruption import pass_on
+from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_omega, read_values
+from suboctave.model.system import System
+from suboctave.model.timed import timed
+from suboctave.options import RunOptions, with_options
+from suboctave.progress import reporting
+from suboctave.timedomain.flow import Flow, check_count, check_motions
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["Trajectory", "integrate"]
+
+
+@dataclass(eq=False)
+class Trajectory(TimeResult):
+    """A motion in time.
+
+    Attributes
+    ----------
+    time
+        (N,), from 0 at phase 0 of the load (after the transient, if one was left out) in the user's unit.
+    displacement, velocity
+        (N, n).
+    largest
+        (n,): the largest |x_i| over the whole stretch, between the samples too.
+    omega, parameters
+        Of the load, and all of the system's by name.
+    steps_per_period
+        Samples in one period of the load.
+    method
+        "accurate" or "newmark".
+    seconds
+        How long it took.
+    """
+
+    time: Array
+    displacement: Array
+    velocity: Array
+    largest: Array
+    omega: float
+    parameters: Mapping[str, float]
+    steps_per_period: int
+    method: str
+    system: System
+    seconds: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """Period of the load, in the user's unit of time."""
+        return 2.0 * np.pi / self.omega
+
+    @property
+    def end(self) -> Array:
+        """The last state (2n,), from which another integration may go on."""
+        return np.concatenate([self.displacement[-1], self.velocity[-1]])
+
+    @property
+    def stroboscopic(self) -> Array:
+        """The states (periods + 1, 2n) at phase 0 of the load, the first and the last one too."""
+        every = slice(None, None, self.steps_per_period)
+        return np.hstack([self.displacement[every], self.velocity[every]])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Displacement and velocity on (time, dof), and what produced them."""
+        names: Any = self.system.dof_names or range(self.system.n)
+        return self._dataset(
+            self.system,
+            "trajectory",
+            {
+                "displacement": (("time", "dof"), self.displacement),
+                "velocity": (("time", "dof"), self.velocity),
+                "largest": (("dof",), self.largest),
+            },
+            {"time": self.time, "dof": list(names)},
+            omega=self.omega,
+            method=self.method,
+            steps_per_period=self.steps_per_period,
+            dofs=self.system.n,
+            observed=self.system.observed_dof,
+        )
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per sample: time, displacements, velocities."""
+        import pandas as pd
+
+        columns = {"time": self.time}
+        for kind, values in (("x", self.displacement), ("v", self.velocity)):
+            columns |= {f"{kind}_{i}": values[:, i] for i in range(self.system.n)}
+        return pd.DataFrame(columns)
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Displacement over time in load periods, stroboscopic instants marked; saved if a path is given.
+
+        Options are those of `pictures.plot_trajectory`: `dof`, `quantity`, `title`, `size`.
+        """
+        from suboctave.pictures.in_time import plot_trajectory
+
+        return plot_trajectory(self.to_xarray(), path, **options)
+
+    def __repr__(self) -> str:
+        periods = (len(self.time) - 1) / self.steps_per_period
+        dof = self.system.observed_dof
+        return (
+            f"Trajectory(omega={self.omega:.10g}, {periods:g} periods of {self.steps_per_period} samples, "
+            f"max|x_{dof}|={self.largest[dof]:.8g}, {self.method})"
+        )
+
+
+@with_options(RunOptions)
+@timed
+def integrate(
+    system: System,
+    state: Any = None,
+    *,
+    omega: float,
+    periods: int = 10,
+    transient: int = 0,
+    steps_per_period: int | None = None,
+    parameters: Mapping[str, float] | None = None,
+    method: str = "accurate",
+    tolerance: float | None = None,
+    **options: Unpack[RunOptions],
+) -> Trajectory:
+    """Integrate the equation of motion in time, from phase 0 of the load over whole periods.
+
+    Parameters
+    ----------
+    state
+        Displacements and velocities at t = 0, shape (2 n,); a periodic motion, whose state at t = 0 is taken; None for
+        rest.
+    omega
+        Circular frequency of the load.
+    periods, transient
+        Periods of the load that are given, after some that are left out.
+    steps_per_period
+        Instants in one period at which the motion is given (default 200); of Newmark's method its steps (default 1000).
+    parameters
+        Other values of some of the system's, by name.
+    method
+        "accurate": Dormand and Prince's method of order 8 with steps of its own, corners of laws located. "newmark":
+        constant average acceleration (beta = 1/4, gamma = 1/2) with fixed steps, as in Alcorta et al. 2019.
+    tolerance
+        Local error relative to the size of the motion (default 1e-10); of Newmark's method that of the equations
+        solved in each step.
+
+    Raises
+    ------
+    InputError
+        Before any work.
+    ConvergenceError
+        If the motion leaves the range of numbers, or Newmark's equations could not be solved.
+    """
+    periods = check_count("periods", periods)
+    samples = steps_of(method, steps_per_period)
+    start = start_state(system, state)
+    flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
+    transient = period_count("transient", transient)
+    values, omega = read_values(system, parameters), check_omega(omega)
+    with reporting(options.get("progress"), "integrating") as report:
+        motions = flow.over(
+            start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
+        )
+    pass_on(motions.interruption)
+    check_motions(motions)
+    assert motions.peaks is not None
+    states, peaks = motions.states[0], motions.peaks[0]
+    if transient:  # the last instant of the transient is the first that is given
+        peaks = peaks[1:]
+    else:
+        states = np.vstack([start[None], states])
+    n = system.n
+    return Trajectory(
+        time=np.arange(len(states), dtype=float) * (2.0 * np.pi / float(omega) / samples),
+        displacement=states[:, :n].copy(),
+        velocity=states[:, n:].copy(),
+        largest=np.maximum(np.abs(states[0, :n]), peaks.max(axis=0)),
+        omega=float(omega),
+        parameters={**system.parameters, **values},
+        steps_per_period=samples,
+        method=method,
+        system=system,
+    )

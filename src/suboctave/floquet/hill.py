@@ -1,0 +1,310 @@
+"""Hill's method: characteristic exponents as eigenvalues in the frequency domain, selected by strip.
+
+Perturbations `y = exp(lambda t) sum_k phi_k exp(i k w0 t)` of the linearised motion (`variational`) solve
+
+    [ s_k^2 + s_k C_0 + K_0 ] phi_k + sum_l [ k_{k-l} + s_l c_{k-l} ] l r^T phi_l = 0,    s_k = lambda + i k w0,
+
+a quadratic eigenvalue problem (Hill, Acta Math. 8 (1886) 1-36; for harmonic balance von Groll & Ewins, J. Sound Vib.
+241 (2001) 223-233). Each exponent appears again and again, shifted by i w0, and near the ends of the truncated series
+wrongly.
+
+Selection by strip: the circle of `Im lambda mod w0`, from the eigenvalues of the inner half of the series, is cut at
+its widest gap. One strip of height w0 between two cuts then holds each exponent exactly once: 2 n must fall inside,
+which the method checks. Others choose by smallest `|Im lambda|` (Moore, SIAM J. Numer. Anal. 42 (2005) 2522-2568) or by
+the most central eigenvectors (Lazarus & Thomas, C. R. Mecanique 338 (2010) 510-517; weighted mean of the harmonics:
+Guillot, Lazarus, Thomas, Vergez, Cochelin, J. Comput. Phys. 416 (2020) 109477). Both fail where multipliers are
+negative and real, that is beside every period doubling: there exponents come as `sigma_j +- i w0 / 2`, equally central
+all of them, and a pair of one is taken instead of one of each.
+
+Two levels. First the solved motion with perturbations of the same H harmonics: then Hill's matrix is the Jacobian of
+the balance itself, and the leading errors of motion and perturbation cancel (with contacts both are of order H^-3,
+their sum is far smaller). Then both with 2 H + 1 harmonics: the exponents move by the two-sided Rayleigh quotient of
+the larger problem, its vectors being those of the first level with their first-order continuation. The move is the
+error estimate.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from suboctave.continuation.linear import Factor
+from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.variational import Variational, liouville, refined, two_sided
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.galerkin import galerkin
+
+#: harmonics reach this many times the highest natural frequency, or the eigenvalues are not good
+_REACH = 2.0
+#: largest dense eigenvalue problem that is attempted
+_LARGEST = 3000
+#: share of two effects that cancel (truncated motion, truncated perturbation) by which they are taken not to
+_CANCELLED = 0.05
+
+
+def exponents(system: Variational, harmonics: int) -> ComplexArray:
+    """All eigenvalues of Hill's problem with perturbation harmonics 0 .. `harmonics`, in units of the base frequency.
+
+    In the real basis (mean, cosines, sines): `lambda^2 + lambda (2 w0 D + T(C)) + w0^2 D^2 + T(C) w0 D + T(K)`.
+    """
+    n, size = system.n, 2 * harmonics + 1
+    rate = system.rate
+    derivative = np.zeros((size, size))
+    cosine = np.arange(1, size, 2)
+    derivative[cosine, cosine + 1] = np.arange(1.0, harmonics + 1.0)
+    derivative[cosine + 1, cosine] = -derivative[cosine, cosine + 1]
+    one, each = np.eye(size), np.eye(n)
+    first = np.kron(2.0 * derivative, each) + np.kron(one, system.damping / rate)
+    zeroth = np.kron(derivative @ derivative, each) + np.kron(derivative, system.damping / rate)
+    zeroth += np.kron(one, system.stiffness / rate**2)
+    nothing = np.zeros(0, dtype=complex)
+    for left, right, k, c in zip(system.left, system.right, system.k, system.c, strict=True):
+        outer = np.outer(left, right)
+        moving = c if c.any() else nothing
+        zeroth += np.kron(galerkin(k / rate**2, moving / rate, 1.0, True, harmonics + 1), outer)
+        if moving.size:
+            first += np.kron(galerkin(moving / rate, nothing, 0.0, True, harmonics + 1), outer)
+    companion = np.block([[np.zeros_like(zeroth), np.eye(size * n)], [-zeroth, -first]])
+    values: ComplexArray = np.linalg.eigvals(companion).astype(complex)
+    return values
+
+
+class _Waves:
+    """Hill's problem between waves exp(i k tau), k = -harmonics .. harmonics, in units of the base frequency.
+
+    `P(s) = s_k^2 + s_k C + K`, `s_k = s + i k`; vectors have shape (2 harmonics + 1, n).
+    """
+
+    def __init__(self, system: Variational, harmonics: int) -> None:
+        self.system, rate = system, system.rate
+        self.damping, self.stiffness = system.damping / rate, system.stiffness / rate**2
+        self.index = np.arange(-harmonics, harmonics + 1) * np.complex128(1j)
+        self.k = [two_sided(k / rate**2, harmonics) for k in system.k]
+        self.c = [two_sided(c / rate, harmonics) if c.any() else None for c in system.c]
+
+    def diagonal(self, s: complex) -> ComplexArray:
+        """Blocks of P(s) on the diagonal, shape (2 harmonics + 1, n, n)."""
+        each = (s + self.index)[:, None, None]
+        return each**2 * np.eye(self.system.n) + each * self.damping + self.stiffness
+
+    def matrix(self, s: complex) -> ComplexArray:
+        """P(s), square, wave by wave."""
+        count, n = len(self.index), self.system.n
+        out = np.zeros((count, n, count, n), dtype=complex)
+        wave = np.arange(count)
+        out[wave, :, wave, :] = self.diagonal(s)
+        for left, right, k, c in zip(self.system.left, self.system.right, self.k, self.c, strict=True):
+            toeplitz = k if c is None else k + c * (s + self.index)
+            out += toeplitz[:, None, :, None] * np.outer(left, right)[None, :, None, :]
+        return out.reshape(count * n, count * n)
+
+    def coupled(self, s: complex, phi: ComplexArray, transposed: bool = False) -> ComplexArray:
+        """P(s) without its diagonal blocks (or its transpose) applied to phi."""
+        out = np.zeros_like(phi)
+        speed = s + self.index
+        for left, right, k, c in zip(self.system.left, self.system.right, self.k, self.c, strict=True):
+            if transposed:
+                along = phi @ left
+                result = k.T @ along if c is None else k.T @ along + speed * (c.T @ along)
+                out += np.multiply.outer(result, right)
+            else:
+                along = phi @ right
+                result = k @ along if c is None else k @ along + c @ (speed * along)
+                out += np.multiply.outer(result, left)
+        return out
+
+    def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
+        """Right and left null vectors of P at an eigenvalue, by inverse iteration; shape (waves, n) each."""
+        factor = Factor.of(self.matrix(s))
+        # exactly on an eigenvalue there may be a zero pivot
+        pivots = np.diagonal(factor.lu)
+        tiny = 1e-16 * float(np.abs(pivots).max())
+        np.fill_diagonal(factor.lu, np.where(np.abs(pivots) < tiny, tiny, pivots))
+        null = []
+        for adjoint in (False, True):
+            x = np.ones(len(factor.lu), dtype=complex)
+            for _ in range(2):
+                x = factor.solve(x / np.linalg.norm(x), adjoint)
+            null.append((x / np.linalg.norm(x)).reshape(len(self.index), self.system.n))
+        return null[0], null[1].conj()
+
+    def widened(self, phi: ComplexArray) -> ComplexArray:
+        """A vector of fewer waves with zeros for the others."""
+        more = (len(self.index) - len(phi)) // 2
+        return np.pad(phi, ((more, more), (0, 0)))
+
+    def continued(self, s: complex, phi: ComplexArray, transposed: bool = False) -> ComplexArray:
+        """A null vector of fewer waves with the first-order answer of the others."""
+        wide = self.widened(phi)
+        more = (len(self.index) - len(phi)) // 2
+        outside = np.r_[:more, len(wide) - more : len(wide)]
+        blocks = self.diagonal(s)[outside]
+        drive = -self.coupled(s, wide, transposed)[outside]
+        wide[outside] = np.linalg.solve(blocks.transpose(0, 2, 1) if transposed else blocks, drive[:, :, None])[:, :, 0]
+        return wide
+
+    def rayleigh(self, s: complex, psi: ComplexArray, phi: ComplexArray) -> tuple[complex, float]:
+        """The root near s of the two-sided quotient `psi^T P(s) phi = 0`, and its rounding error."""
+        index = self.index[:, None]
+        steady, unit = self.coupled(0.0, phi), self.coupled(1.0, phi)
+        square = complex((psi * phi).sum())
+        slope = complex((psi * (2.0 * index * phi + phi @ self.damping.T + unit - steady)).sum())
+        terms = psi * (index**2 * phi + index * (phi @ self.damping.T) + phi @ self.stiffness.T + steady)
+        constant = complex(terms.sum())
+        root = s
+        for _ in range(3):
+            rate = 2.0 * square * root + slope
+            if rate == 0.0:
+                return s, math.inf
+            root -= (square * root**2 + slope * root + constant) / rate
+        spread = float(np.abs(terms).sum()) + abs(square * root**2) + abs(slope * root)
+        return root, 1e-15 * spread / abs(2.0 * square * root + slope)
+
+
+def in_strip(values: ComplexArray, harmonics: int) -> tuple[np.ndarray, float]:
+    """Indices of all eigenvalues in the strip between two cuts, and the width of the gap they are in (0 to 1).
+
+    The cut is in the middle of the widest gap of `Im s mod 1`, seen in the inner half of the series, where eigenvalues
+    are good. The caller must check that as many lie inside as there are exponents.
+    """
+    height = values.imag
+    inner = height[np.abs(height) <= max(1.0, 0.5 * harmonics)]
+    around = np.sort(np.mod(inner, 1.0))
+    if not around.size:
+        return np.zeros(0, dtype=int), 0.0
+    gaps = np.diff(np.append(around, around[0] + 1.0))
+    widest = int(np.argmax(gaps))
+    cut = (around[widest] + 0.5 * gaps[widest]) % 1.0
+    return np.flatnonzero((height > cut - 1.0) & (height <= cut)), float(gaps[widest])
+
+
+def smallest_imaginary(values: ComplexArray, count: int) -> np.ndarray:
+    """Moore (2005): the eigenvalues of smallest `|Im s|`."""
+    return np.argsort(np.abs(values.imag), kind="stable")[:count]
+
+
+def most_central(vectors: ComplexArray, count: int) -> np.ndarray:
+    """Lazarus & Thomas (2010), in the form of Guillot et al. (2020), Eq. (26).
+
+    The eigenvectors whose mean harmonic `|sum_k k |phi_k|| / sum_k |phi_k|` is smallest; vectors has shape (waves k =
+    -H .. H, DOFs, eigenvalues).
+    """
+    weights = np.linalg.norm(vectors, axis=1)
+    harmonic = np.arange(len(weights)) - len(weights) // 2
+    return np.argsort(np.abs(harmonic @ weights) / weights.sum(axis=0), kind="stable")[:count]
+
+
+def same_exponents(a: ComplexArray, b: ComplexArray) -> bool:
+    """True if a has each of the exponents b once, up to shifts by i: each is the nearest of another one."""
+    difference = a[:, None] - b[None, :]
+    distance: Array = np.abs(difference - 1j * np.round(difference.imag))
+    return len(a) == len(b) and sorted(distance.argmin(axis=1)) == list(range(len(b)))
+
+
+def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
+    """Multipliers by Hill's method; `selection` is "strip", "imaginary" or "symmetry"."""
+    harmonics = state.basis.harmonics
+    solved = Variational.of(state, 2 * harmonics)
+    count = 2 * solved.n
+    name = "Hill" if selection == "strip" else f"Hill, selection by {selection}"
+    highest = float(np.abs(solved.mean_exponents().imag).max())
+    if harmonics * solved.rate < _REACH * highest:
+        return FloquetResult.inapplicable(
+            count,
+            name,
+            f"Hill's method needs harmonics up to twice the highest natural frequency, {highest:.4g}: the motion's "
+            f"{harmonics} reach {harmonics * solved.rate:.4g}, {math.ceil(_REACH * highest / solved.rate)} would do",
+        )
+    size = count * (2 * harmonics + 1)
+    if size > _LARGEST:
+        return FloquetResult.inapplicable(
+            count, name, f"A Hill problem of {size} unknowns is larger than {_LARGEST}: use the monodromy matrix"
+        )
+    values = exponents(solved, harmonics)
+    strip, gap = in_strip(values, harmonics)
+    checks = {"inside the strip": float(len(strip)), "expected": float(count), "gap": gap}
+    if len(strip) != count:
+        return FloquetResult.inapplicable(
+            count,
+            name,
+            f"{len(strip)} of Hill's eigenvalues lie in a strip that must hold {count}: with {harmonics} harmonics "
+            "they are not good enough, more are needed",
+            checks,
+        )
+    chosen, note = strip, ""
+    if selection == "imaginary":
+        chosen = smallest_imaginary(values, count)
+    elif selection == "symmetry":
+        chosen = most_central(_vectors(solved, harmonics, values), count)
+    if not same_exponents(values[chosen], values[strip]):
+        note = f"Selection by {selection} takes an exponent twice and misses another: its multipliers are not those"
+    s, spread = _second_level(state, solved, values[chosen])
+    mu = np.exp(2.0 * math.pi * s)
+    # exponents are known to `spread`, multipliers relative to their size
+    errors = np.abs(mu) * np.expm1(np.minimum(2.0 * math.pi * spread, 700.0)) + 1e-14 * np.abs(mu)
+    if note:
+        errors = np.full(count, np.inf)
+    else:
+        mu, errors = _closed(mu, errors)
+        errors, checks["Liouville"] = liouville(mu, errors, solved.decay)
+    order = np.argsort(-np.abs(mu), kind="stable")
+    return FloquetResult(mu[order], errors[order], name, note, checks)
+
+
+def _vectors(system: Variational, harmonics: int, values: ComplexArray) -> ComplexArray:
+    """Right eigenvectors of some eigenvalues, shape (waves, n, len(values))."""
+    waves = _Waves(system, harmonics)
+    return np.stack([waves.vectors(s)[0] for s in values], axis=-1)
+
+
+def _second_level(state: BalanceState, solved: Variational, values: ComplexArray) -> tuple[ComplexArray, Array]:
+    """The exponents with 2 H + 1 harmonics of motion and perturbation, and how far they may be off."""
+    inner, outer = state.basis.harmonics, 2 * state.basis.harmonics + 1
+    motion, alternative = refined(state)
+    first, second = _Waves(solved, inner), _Waves(Variational.of(motion, 2 * outer), outer)
+    other = None if alternative is None else _Waves(Variational.of(alternative, 2 * outer), outer)
+    moved, spread = np.empty_like(values), np.empty(len(values))
+    for j, s in enumerate(values):
+        twin = _conjugate(values[:j], s)
+        if twin is not None:
+            moved[j], spread[j] = moved[twin].conjugate(), spread[twin]
+            continue
+        phi, psi = first.vectors(s)
+        # the same vectors without their continuation show what the motion alone does, to be cancelled by the rest
+        middle = second.rayleigh(s, second.widened(psi), second.widened(phi))[0]
+        psi, phi = second.continued(s, psi, transposed=True), second.continued(s, phi)
+        better, rounding = second.rayleigh(s, psi, phi)
+        parts = abs(better - s) + _CANCELLED * (abs(middle - s) + abs(better - middle)) + rounding
+        if other is not None:
+            parts += abs(other.rayleigh(s, psi, phi)[0] - better)
+        near = _distance(values, j)
+        if not abs(better - s) < 0.3 * near:
+            # two exponents about to meet: first order means nothing, they move by about the root
+            better, parts = s, 2.0 * math.sqrt(near * parts) if math.isfinite(parts) else math.inf
+        moved[j], spread[j] = better, parts
+    return moved, spread
+
+
+def _conjugate(values: ComplexArray, s: complex) -> int | None:
+    """The index of an eigenvalue whose conjugate is s up to a shift by i, to rounding."""
+    difference = values.conj() - s
+    difference -= 1j * np.round(difference.imag)
+    same = np.flatnonzero(np.abs(difference) < 1e-9)
+    return int(same[0]) if same.size else None
+
+
+def _distance(values: ComplexArray, j: int) -> float:
+    """Distance of an exponent from the nearest other one, shifts by i aside."""
+    difference = np.delete(values, j) - values[j]
+    return float(np.abs(difference - 1j * np.round(difference.imag)).min(initial=1.0))
+
+
+def _closed(mu: ComplexArray, errors: Array) -> tuple[ComplexArray, Array]:
+    """The set closed under conjugation, as it must be: truncation leaves a negative real one with an Im of 1e-6."""
+    distance = np.abs(mu[:, None] - mu[None, :].conj())
+    partner = distance.argmin(axis=1)
+    mutual = partner[partner] == np.arange(len(mu))
+    closed = np.where(mutual, 0.5 * (mu + mu[partner].conj()), mu)
+    return closed, errors + np.abs(closed - mu)

@@ -1,0 +1,262 @@
+"""The methods that a user can ask for, as objects: `so.stability(orbit, method=...)` and `stability=...` of the verbs.
+
+A method takes one solved motion's equations and returns a `FloquetResult`. Along a curve it is asked twice: `along` for
+the multipliers that tests of neighbouring points compare, on every point that is tried, and `settled` for the verdict
+of a point that was accepted. For most methods that is the same; arbitration asks its witnesses only there.
+
+Arbitration: where a multiplier lies closer to the unit circle than its error estimate, other methods follow, the
+cheapest first, until the verdict is clear. A multiplier lies where the discs (estimate, error) of the methods overlap:
+the smallest disc around the overlap is what they say together. An overlap much narrower than either disc is not
+believed: the radius stays above half the smaller one. Discs that do not overlap contradict each other; then the disc
+around both is kept, which seldom decides, and the result says who said what.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from suboctave.errors import ConvergenceError, InputError, shortened, suggest
+from suboctave.floquet.hill import hill_multipliers
+from suboctave.floquet.koopman_hill import koopman_hill_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult, written
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.interruption import check_time
+
+SELECTIONS = ("strip", "imaginary", "symmetry")
+#: least radius of a joint estimate in units of the better single one
+_BELIEVED = 0.5
+#: rows of a witness's matrix up to which it is asked along a curve, where nobody waits for this one point
+_UNBIDDEN = 700
+
+
+class StabilityMethod(ABC):
+    """One way to the multipliers of a motion."""
+
+    name: ClassVar[str]
+    #: whether `along` gives the multipliers of the monodromy matrix
+    follows_monodromy: ClassVar[bool] = False
+
+    @abstractmethod
+    def multipliers(self, state: BalanceState) -> FloquetResult:
+        """Multipliers, error estimates and verdict of a solved motion, over the motion's own period."""
+
+    def along(self, state: BalanceState) -> FloquetResult:
+        """The same along a curve, where something must be said at every point."""
+        result = self.multipliers(state)
+        if result.applicable:
+            return result
+        instead = floquet_multipliers(state)
+        return replace(instead, note=f"{result.note}; multipliers of the monodromy matrix instead", stands_in=True)
+
+    def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
+        """The verdict on a point of a curve, from the `result` of `along` there."""
+        return result
+
+
+@dataclass(frozen=True)
+class Monodromy(StabilityMethod):
+    """Multipliers as eigenvalues of the monodromy matrix, a product of matrix exponentials over one period."""
+
+    name: ClassVar[str] = "monodromy"
+    follows_monodromy: ClassVar[bool] = True
+
+    def multipliers(self, state: BalanceState) -> FloquetResult:
+        """See `StabilityMethod.multipliers`."""
+        return floquet_multipliers(state)
+
+
+@dataclass(frozen=True)
+class Hill(StabilityMethod):
+    """Multipliers as eigenvalues in the frequency domain; see `suboctave.floquet.hill`.
+
+    selection
+        Which eigenvalues count: "strip" (checks itself), or as the literature does it, "imaginary" (smallest imaginary
+        parts) and "symmetry" (most central eigenvectors). The last two are there for comparison: they fail beside every
+        period doubling, and the result says so where they do.
+    """
+
+    selection: str = "strip"
+    name: ClassVar[str] = "hill"
+
+    def __post_init__(self) -> None:
+        if self.selection not in SELECTIONS:
+            raise InputError(f"unknown selection {self.selection!r}{suggest(str(self.selection), SELECTIONS)}")
+
+    def multipliers(self, state: BalanceState) -> FloquetResult:
+        """See `StabilityMethod.multipliers`."""
+        return hill_multipliers(state, self.selection)
+
+
+@dataclass(frozen=True)
+class KoopmanHill(StabilityMethod):
+    """Multipliers of `C exp(H T) W`, H Hill's matrix: no selection; see `suboctave.floquet.koopman_hill`.
+
+    subharmonic
+        With the waves of half the base frequency besides: half as many harmonics reach the same accuracy.
+    """
+
+    subharmonic: bool = True
+    name: ClassVar[str] = "koopman-hill"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.subharmonic, bool):
+            raise InputError(f"subharmonic must be True or False, not {self.subharmonic!r}")
+
+    def multipliers(self, state: BalanceState) -> FloquetResult:
+        """See `StabilityMethod.multipliers`."""
+        return koopman_hill_multipliers(state, self.subharmonic)
+
+
+@dataclass(frozen=True)
+class Arbitration(StabilityMethod):
+    """The monodromy matrix, and its witnesses where it leaves the verdict open: the default.
+
+    witnesses
+        Methods to ask, the cheapest first.
+    """
+
+    witnesses: tuple[StabilityMethod, ...] = (Hill(), KoopmanHill())
+    name: ClassVar[str] = "arbitration"
+    follows_monodromy: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.witnesses, Sequence):
+            raise InputError(f"witnesses must be several methods, as (Hill(),), not {shortened(self.witnesses)}")
+        for witness in self.witnesses:
+            if not isinstance(witness, StabilityMethod) or isinstance(witness, Arbitration):
+                raise InputError(f"a witness must be a method such as Hill() or KoopmanHill(), not {witness!r}")
+
+    def multipliers(self, state: BalanceState) -> FloquetResult:
+        """See `StabilityMethod.multipliers`."""
+        return self._weighed(state, floquet_multipliers(state), math.inf)
+
+    def along(self, state: BalanceState) -> FloquetResult:
+        """The monodromy matrix alone."""
+        return floquet_multipliers(state)
+
+    def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
+        """The verdict, with witnesses where it is open and they cost little."""
+        return self._weighed(state, result, _UNBIDDEN)
+
+    def _weighed(self, state: BalanceState, result: FloquetResult, limit: float) -> FloquetResult:
+        if result.decided:
+            return result
+        if result.undamped:
+            return replace(
+                result, note="Undamped: multipliers stay on the unit circle, and nothing settles the verdict"
+            )
+        size = len(result.multipliers) * (2 * state.basis.harmonics + 1)
+        if size > limit:
+            skipped = f"Witnesses, with matrices of {size} rows, are not asked along a curve, but by so.stability"
+            return replace(result, note=f"{_open(result)}. {skipped}")
+        results, joint, contradictions = [result], result, []
+        for witness in self.witnesses:
+            check_time()
+            other = _witnessed(witness, state)
+            results.append(other)
+            if not other.applicable:
+                continue
+            joint, contradiction = combined(joint, other)
+            contradictions += [contradiction] if contradiction else []
+            if joint.decided:
+                break
+        return replace(joint, note=_explanation(state, results, joint, contradictions), witnesses=tuple(results))
+
+
+def _witnessed(witness: StabilityMethod, state: BalanceState) -> FloquetResult:
+    """A witness's multipliers; inapplicable where the motion with more harmonics leaves the range of the forces."""
+    try:
+        return witness.multipliers(state)
+    except ConvergenceError as failure:
+        return FloquetResult.inapplicable(2 * state.balance.system.n, witness.name, str(failure))
+
+
+def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:
+    """What two methods say together, and a sentence if they contradict each other."""
+    from scipy.optimize import linear_sum_assignment
+
+    # relative to the errors, so that small multipliers with many digits are paired as well as large ones
+    scale = a.errors[:, None] + b.errors[None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cost = np.nan_to_num(np.abs(a.multipliers[:, None] - b.multipliers[None, :]) / scale, nan=1e300, posinf=1e300)
+    partner = linear_sum_assignment(np.minimum(cost, 1e300))[1]
+    mu, errors = a.multipliers.copy(), a.errors.copy()
+    contradiction = ""
+    for i, j in enumerate(partner):
+        mu[i], errors[i], consistent = _overlap(mu[i], errors[i], b.multipliers[j], b.errors[j])
+        if not consistent and not contradiction:
+            contradiction = (
+                f"{a.method} and {b.method} contradict each other: {written(a.multipliers[i], a.errors[i])} against "
+                f"{written(b.multipliers[j], b.errors[j])}"
+            )
+    order = np.argsort(-np.abs(mu), kind="stable")
+    return FloquetResult(mu[order], errors[order], f"{a.method} + {b.method}"), contradiction
+
+
+def _overlap(p: complex, a: float, q: complex, b: float) -> tuple[complex, float, bool]:
+    """Centre and radius of the smallest disc around the overlap of two discs; around both where there is none."""
+    if b > a:
+        p, a, q, b = q, b, p, a
+    d = abs(q - p)
+    if d > a + b:
+        radius = 0.5 * (d + a + b)
+        return (p + (radius - a) / d * (q - p), radius, False) if math.isfinite(radius) else (q, b, True)
+    if d * d <= a * a - b * b or not math.isfinite(a):
+        # the smaller disc's whole width lies inside the larger one
+        return q, b, True
+    along = (d * d + a * a - b * b) / (2.0 * d)
+    radius = math.sqrt(max(0.0, a * a - along * along))
+    return p + along / d * (q - p), max(radius, _BELIEVED * b), True
+
+
+def _explanation(
+    state: BalanceState, results: Sequence[FloquetResult], joint: FloquetResult, contradictions: Sequence[str]
+) -> str:
+    """How the verdict came about, or what keeps it open and what would settle it."""
+    first, others = results[0], results[1:]
+    witnesses = [r.method for r in others if r.applicable]
+    if joint.decided:
+        settled = f"{' and '.join(witnesses)} settle{'s' if len(witnesses) == 1 else ''} it"
+        return ". ".join([_open(first), *contradictions, settled])
+    sentences = [_open(joint), *contradictions, *(r.note for r in others if not r.applicable)]
+    sentences.append(
+        f"More harmonics than the motion's {state.basis.harmonics} would settle it, or shooting (so.verify), unless "
+        "the motion is itself a bifurcation point"
+    )
+    return ". ".join(sentences)
+
+
+def _open(result: FloquetResult) -> str:
+    """Which multiplier leaves the verdict open."""
+    distance = np.abs(result.multipliers) - 1.0
+    i = int(np.argmin(np.abs(distance) - result.errors))
+    side = "inside" if distance[i] < 0.0 else "outside"
+    where = f"multiplier {written(result.multipliers[i], result.errors[i])}, {abs(distance[i]):.1e} {side} the circle"
+    return f"Undecided by {result.method}: {where}"
+
+
+METHODS: dict[str, StabilityMethod] = {
+    method.name: method for method in (Arbitration(), Monodromy(), Hill(), KoopmanHill())
+}
+
+
+def method_of(given: StabilityMethod | str | None) -> StabilityMethod:
+    """The method that a user asked for: an object, its name, or None for the default."""
+    if given is None:
+        return METHODS[Arbitration.name]
+    if isinstance(given, str):
+        if given not in METHODS:
+            raise InputError(f"unknown stability method {given!r}{suggest(given, METHODS)}")
+        return METHODS[given]
+    if isinstance(given, type) and issubclass(given, StabilityMethod):
+        raise InputError(f"give an object, {given.__name__}(), instead of the class")
+    if not isinstance(given, StabilityMethod):
+        raise InputError(f"a stability method is Monodromy(), Hill(), KoopmanHill() or a name, not {given!r}")
+    return given

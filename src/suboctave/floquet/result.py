@@ -1,0 +1,129 @@
+"""What a stability method says of a motion: multipliers, how far each may be off, and the verdict that follows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.lazy import lazy
+
+#: logarithm of the product of all multipliers below which a motion counts as undamped
+_UNDAMPED = 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FloquetResult:
+    """Floquet multipliers of a motion over its own period.
+
+    multipliers
+        Shape (2 n,), complex, by descending modulus; nan where the method is not applicable.
+    errors
+        Estimated error of each, shape (2 n,): of the method, of the harmonics that the motion neglects, of rounding.
+    method
+        The method, or methods, that they come from.
+    note
+        A sentence where there is something to say: why the method is not applicable, what keeps the verdict undecided,
+        which methods contradict each other. Empty otherwise.
+    checks
+        What the method found when it checked itself, by name.
+    witnesses
+        The results that were weighed against each other, in the order asked; empty if one method was enough.
+    stands_in
+        True where the method asked for was not applicable on a curve and the monodromy matrix stands in for it.
+    """
+
+    multipliers: ComplexArray
+    errors: Array
+    method: str = "monodromy"
+    note: str = ""
+    checks: Mapping[str, float] = field(default_factory=dict)
+    witnesses: tuple[FloquetResult, ...] = ()
+    stands_in: bool = False
+
+    @classmethod
+    def inapplicable(
+        cls, count: int, method: str, note: str, checks: Mapping[str, float] | None = None
+    ) -> FloquetResult:
+        """The result of a method that cannot say anything of a motion with `count` multipliers, and why."""
+        return cls(np.full(count, np.nan, dtype=complex), np.full(count, np.inf), method, note, checks or {})
+
+    @property
+    def applicable(self) -> bool:
+        """False if the method could not say anything; `note` says why."""
+        return bool(np.isfinite(self.multipliers).all())
+
+    @property
+    def error(self) -> float:
+        """Largest error estimate among the multipliers that decide (modulus above one half)."""
+        deciding = np.abs(self.multipliers) > 0.5
+        return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
+
+    @lazy
+    def _verdict(self) -> tuple[float, bool, int, float]:
+        # largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
+        # the distance of the nearest one; there are few: numbers are quicker than arrays
+        beyond = [abs(mu) - 1.0 for mu in self.multipliers.tolist()]
+        decided = all(abs(b) > error for b, error in zip(beyond, self.errors.tolist(), strict=True))
+        largest = math.nan if any(map(math.isnan, beyond)) else max(beyond)
+        return largest, decided, sum(b > 0.0 for b in beyond), min(map(abs, beyond))
+
+    @property
+    def margin(self) -> float:
+        """Largest modulus minus one: negative if stable."""
+        return self._verdict[0]
+
+    @property
+    def stable(self) -> bool:
+        """True if all multipliers lie inside the unit circle."""
+        return self.margin < 0.0
+
+    @property
+    def decided(self) -> bool:
+        """True if no multiplier is closer to the unit circle than its error estimate."""
+        return self._verdict[1]
+
+    @property
+    def undamped(self) -> bool:
+        """True if the product of all multipliers is one to rounding: pairs then stay on the unit circle."""
+        return abs(float(np.log(np.maximum(np.abs(self.multipliers), 1e-300)).sum())) < _UNDAMPED
+
+    @property
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle."""
+        return self._verdict[2]
+
+    @property
+    def clearance(self) -> float:
+        """Distance of the multiplier nearest to the unit circle from it."""
+        return self._verdict[3]
+
+    @property
+    def unstable_pairs(self) -> int:
+        """Number of complex-conjugate pairs outside the unit circle."""
+        mu = self.multipliers[np.abs(self.multipliers) > 1.0]
+        return int(np.count_nonzero(mu.imag > 0.0))
+
+    def __repr__(self) -> str:
+        if not self.applicable:
+            return f"FloquetResult: not applicable ({self.method}). {self.note}"
+        count, outside = len(self.multipliers), self.unstable
+        verdict = "stable" if self.stable else f"unstable, {outside} of {count} outside" if outside else "not stable"
+        doubt = "" if self.decided else ", UNDECIDED"
+        shown = [written(mu, error) for mu, error in zip(self.multipliers[:4], self.errors, strict=False)]
+        more = f", ... ({count} in all)" if count > 4 else ""
+        note = f". {self.note}" if self.note else ""
+        return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
+
+
+def written(mu: complex, error: float) -> str:
+    """A multiplier with the digits that its error leaves, and the error."""
+    size, digits = max(abs(mu), 1e-300), 6
+    if 0.0 < error < 1.0:
+        digits = min(12, max(4, 2 + math.floor(math.log10(size)) - math.floor(math.log10(error))))
+    real = f"{mu.real:#.{digits}g}"
+    text = real if abs(mu.imag) <= max(error, 1e-12 * size) else f"({real}{mu.imag:+#.{digits}g}i)"
+    return f"{text} +- {error:.1g}"

@@ -1,0 +1,121 @@
+"""Channels: elements that act along one direction and read the same displacements, on a motion.
+
+    F = sum over channels d_out f,    dF/dX = d_out sum_i [T(f_ui) + T(f_vi) omega D] d_i^T
+
+with f_ui, f_vi the derivatives by the displacement along input i and by its rate. All of an element that reads one
+displacement share the channel of its direction, `d_1 = d_out`; an element with several inputs, corners in its velocity
+or time has its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.lazy import lazy
+
+__all__ = ["Channel", "Group"]
+
+_NO_SPECTRUM = np.zeros(0, dtype=complex)
+
+
+def _packed(direction: Array) -> tuple[NDArray[np.intp], Array]:
+    dofs = np.flatnonzero(direction)
+    return dofs, direction[dofs].copy()
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Elements that act along the same direction and read the same displacements, in the unknown DOFs.
+
+    direction, inputs
+        d_out (size,) and the d_i (m, size).
+    members
+        The elements, by their number in the system.
+    moving
+        Whether the force of any depends on velocity.
+    """
+
+    direction: Array
+    inputs: Array
+    members: tuple[int, ...]
+    moving: bool
+
+    @lazy
+    def outgoing(self) -> tuple[NDArray[np.intp], Array]:
+        """Where the direction is not zero, and its entries there."""
+        return _packed(self.direction)
+
+    @lazy
+    def incoming(self) -> list[tuple[NDArray[np.intp], Array]]:
+        """The same of every input."""
+        return [_packed(one) for one in self.inputs]
+
+
+class Channel:
+    """The laws of a group along a motion."""
+
+    def __init__(self, group: Group, along: Along, laws: list[LawAlong]) -> None:
+        self.group, self.along, self.laws = group, along, laws
+        self.out, self.ins = group.direction, group.inputs
+        self.count, self.moving = len(group.inputs), along.moving
+
+    @lazy
+    def spectra(self) -> ComplexArray:
+        """Fourier coefficients of f and f_q, (1 + Q, top + 1)."""
+        out = np.zeros((1 + self.along.size, self.along.top + 1), dtype=complex)
+        for law in self.laws:
+            law.add_spectra(out)
+        return out
+
+    def stiffness(self, i: int) -> ComplexArray:
+        """Fourier coefficients of f_ui."""
+        spectrum: ComplexArray = self.spectra[1 + i]
+        return spectrum
+
+    def damping(self, i: int) -> ComplexArray:
+        """Fourier coefficients of f_vi, empty for laws without velocity."""
+        return self.spectra[1 + self.count + i] if self.moving else _NO_SPECTRUM
+
+    @lazy
+    def second(self) -> list[Second]:
+        """Second derivatives."""
+        return [part for law in self.laws for part in law.second() if len(part.zr)]
+
+    @lazy
+    def third(self) -> list[Third]:
+        """Third derivatives."""
+        return [part for law in self.laws for part in law.third() if len(part.zr)]
+
+    def change(self, rates: Mapping[int, Array]) -> ComplexArray:
+        """What changes of elements' coefficients, `rates` (nc,) by element, do to f and f_q, (1 + Q, top + 1)."""
+        out = np.zeros((1 + self.along.size, self.along.top + 1), dtype=complex)
+        for law in self.laws:
+            law.add_change(dict(rates), out)
+        return out
+
+    def members(self) -> Iterator[tuple[Member, LawAlong]]:
+        """Every element with the law that it is part of."""
+        for law in self.laws:
+            for member in law.members:
+                yield member, law
+
+    def coefficient_spectra(self, member: Member, law: LawAlong) -> CoefficientSpectra:
+        """Derivatives by the coefficients of one element; kept."""
+        if member.number not in self._by_coefficients:
+            self._by_coefficients[member.number] = law.coefficient_spectra(member)
+        return self._by_coefficients[member.number]
+
+    @lazy
+    def _by_coefficients(self) -> dict[int, CoefficientSpectra]:
+        return {}
+
+    def reaching(self, top: int) -> Channel:
+        """The same with Fourier coefficients up to `top`."""
+        along = self.along.reaching(top)
+        return Channel(self.group, along, [law.reaching(along, law.members) for law in self.laws])

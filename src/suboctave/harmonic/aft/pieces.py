@@ -1,0 +1,262 @@
+"""Exact contact: piecewise-linear laws, integrated in closed form over the contact intervals.
+
+A piece of stiffness k, gap b and side +-1 has the force `k (u - b) chi`, chi the indicator of `side (u - b) > 0`: no
+sampling, no regularisation. f_uu is a comb of Dirac functions at the crossings, with weight `side k / |du/dtau|`. With
+rates k', b' of stiffness and gap the force changes by `(k' (u - b) - k b') chi`, its slope by `k' chi - side k b' delta
+(u - b)`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from suboctave.compiled import kernel
+from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.quadrature import search_grid
+from suboctave.harmonic.trigonometric import FAST, crossings_of, jet, motion, spectra
+from suboctave.lazy import lazy
+from suboctave.model.elements.smoothness import PiecewiseLinear
+
+__all__ = ["Pieces", "contact_spectrum", "product_spectrum"]
+
+
+class Pieces(LawAlong):
+    """All pieces along one direction: stiffness, gap, side, (P, 3)."""
+
+    def __init__(self, along: Along, members: tuple[Member, ...], pieces: Array) -> None:
+        super().__init__(along, members)
+        self.pieces = pieces
+
+    def reaching(self, along: Along, members: tuple[Member, ...]) -> Pieces:
+        """See `LawAlong.reaching`."""
+        return Pieces(along, members, self.pieces)
+
+    def add_spectra(self, out: ComplexArray) -> None:
+        """See `LawAlong.add_spectra`."""
+        grid = search_grid(self.along.high)
+        add_pieces(self.along.motion, self.pieces, grid.zr, grid.zi, out[0], out[1])
+
+    @lazy
+    def _corners(self) -> Array:
+        grid = search_grid(self.along.high)
+        corners: Array = corner_weights(self.along.motion, self.pieces, grid.zr, grid.zi)
+        return corners
+
+    def second(self) -> list[Second]:
+        """See `LawAlong.second`."""
+        zr, zi, second, _, _ = self._corners
+        return [Second(zr, zi, self.along.in_displacement(second, 2))]
+
+    def third(self) -> list[Third]:
+        """See `LawAlong.third`."""
+        zr, zi, _, third, slope = self._corners
+        return [Third(zr, zi, self.along.in_displacement(third, 3), self.along.in_displacement(slope, 3))]
+
+    def coefficient_spectra(self, member: Member) -> CoefficientSpectra:
+        """See `LawAlong.coefficient_spectra`."""
+        along, c, count = self.along, member.coefficients, len(member.coefficients)
+        assert isinstance(member.kind, PiecewiseLinear)
+        grid = search_grid(along.high)
+        values = motion(along.motion, grid.zr, grid.zi)
+        force = np.zeros((count, along.top + 1), dtype=complex)
+        tangent = np.zeros((count, along.size, along.top + 1), dtype=complex)
+        second = np.zeros((count, count, along.top + 1), dtype=complex)
+        for piece in member.kind.pieces:
+            i, j, gap = piece.stiffness, piece.gap, float(c[piece.gap])
+            tau, above = crossings_of(along.motion, gap, values)
+            whole = contact_spectrum(tau, above, piece.side, along.top + along.high)
+            chi = whole[: along.top + 1]
+            zr, zi, weights, _, _ = corner_weights(along.motion, np.array([[1.0, gap, 1.0]]), grid.zr, grid.zi)
+            comb = piece.side * c[i] * spectra(np.ones((1, len(zr))), weights, zr, zi, along.top)[0]
+            force[i] += product_spectrum(along.motion, gap, whole, along.top)
+            force[j] -= c[i] * chi
+            tangent[i, 0] += chi
+            tangent[j, 0] -= comb
+            second[i, j] -= chi
+            second[j, i] -= chi
+            second[j, j] += comb
+        return CoefficientSpectra(force, tangent, second)
+
+    def add_change(self, rates: dict[int, Array], out: ComplexArray) -> None:
+        """See `LawAlong.add_change`."""
+        rows = []
+        for member in self.members:
+            if member.number in rates:
+                assert isinstance(member.kind, PiecewiseLinear)
+                own, by = member.coefficients.tolist(), rates[member.number].tolist()
+                rows += [(own[p.stiffness], own[p.gap], p.side, by[p.stiffness], by[p.gap]) for p in member.kind.pieces]
+        if rows:
+            grid = search_grid(self.along.high)
+            add_changed_pieces(self.along.motion, np.array(rows), grid.zr, grid.zi, out[0], out[1])
+
+
+@kernel()
+def contact_spectrum(tau, above, side, top):
+    """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
+
+    chi_q = 1/(2 pi) int chi exp(-i q tau): sums of exp(-i q tau_i) / q over the ends of the contact intervals.
+    """
+    out = np.zeros(top + 1, dtype=np.complex128)
+    active = above == (side > 0)
+    n = tau.shape[0]
+    if n == 0:
+        out[0] = 1.0 if active else 0.0
+        return out
+    scale = 1.0 / (2.0 * math.pi)
+    length = 2.0 * math.pi if active else 0.0
+    state = active
+    for i in range(n):
+        sign = 1.0 if state else -1.0  # +1: a contact ends here, -1: one begins
+        length += sign * tau[i]
+        zr = math.cos(tau[i])
+        zi = -math.sin(tau[i])
+        pr = zr
+        pi = zi
+        for q in range(1, top + 1):
+            f = sign * scale / q
+            out[q] += complex(-f * pi, f * pr)  # i/q * exp(-i q tau), the antiderivative at an end
+            t = pr * zr - pi * zi
+            pi = pr * zi + pi * zr
+            pr = t
+        state = not state
+    out[0] = length * scale
+    return out
+
+
+@kernel(fastmath=FAST)
+def product_spectrum(c, shift, chi, top):
+    """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
+    H.
+    """
+    high = c.shape[0] - 1
+    # chi_q for q = -H .. top + H, negative ones by conjugation
+    xr = np.empty(top + 2 * high + 1)
+    xi = np.empty(top + 2 * high + 1)
+    for q in range(-high, top + high + 1):
+        xr[q + high] = chi[q].real if q >= 0 else chi[-q].real
+        xi[q + high] = chi[q].imag if q >= 0 else -chi[-q].imag
+    re = np.empty(top + 1)
+    im = np.empty(top + 1)
+    mean = c[0].real - shift
+    for k in range(top + 1):
+        re[k] = mean * xr[k + high]
+        im[k] = mean * xi[k + high]
+    for m in range(1, high + 1):
+        # x_m = c_m / 2 and x_-m its conjugate
+        a = 0.5 * c[m].real
+        b = 0.5 * c[m].imag
+        # views, whose indices the compiler knows to be positive
+        pr, pi = xr[high - m : high - m + top + 1], xi[high - m : high - m + top + 1]
+        qr, qi = xr[high + m : high + m + top + 1], xi[high + m : high + m + top + 1]
+        for k in range(top + 1):
+            re[k] += a * (pr[k] + qr[k]) + b * (qi[k] - pi[k])
+            im[k] += a * (pi[k] + qi[k]) + b * (pr[k] - qr[k])
+    out = np.empty(top + 1, dtype=np.complex128)
+    for k in range(top + 1):
+        out[k] = complex(re[k], im[k])
+    return out
+
+
+@kernel()
+def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
+    """Add the Fourier coefficients of piecewise-linear laws to force and stiffness (top + 1,), in place.
+
+    Parameters
+    ----------
+    c
+        Complex coefficients of the relative displacement (H + 1,).
+    pieces
+        Stiffness, gap and side of every piece, (P, 3).
+    grid_r, grid_i
+        Equidistant points on the circle for the search for crossings.
+    """
+    top = force.shape[0] - 1
+    high = c.shape[0] - 1
+    values = motion(c, grid_r, grid_i)
+    slope = np.zeros(top + high + 1, dtype=np.complex128)
+    touching = False
+    for p in range(pieces.shape[0]):
+        k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
+        found, above = crossings_of(c, gap, values)
+        if found.shape[0] == 0 and above != (side > 0):
+            continue
+        touching = True
+        chi = contact_spectrum(found, above, side, top + high)
+        for q in range(top + high + 1):
+            slope[q] += k * chi[q]
+        for q in range(top + 1):
+            force[q] -= k * gap * chi[q]
+    if touching:
+        product = product_spectrum(c, 0.0, slope, top)
+        for q in range(top + 1):
+            force[q] += product[q]
+            stiffness[q] += slope[q]
+
+
+@kernel()
+def add_changed_pieces(c, pieces, grid_r, grid_i, force, stiffness):
+    """Add what changes of piecewise-linear laws do to the spectra of force and stiffness (top + 1,), in place.
+
+    c: complex coefficients of the displacement (H + 1,); pieces: stiffness, gap, side, rates of stiffness and gap
+    (P, 5); grid: equidistant points on the circle for the search for crossings.
+    """
+    top, high = force.shape[0] - 1, c.shape[0] - 1
+    values = motion(c, grid_r, grid_i)
+    largest = 1e-300
+    for h in range(high + 1):
+        largest = max(largest, abs(c[h]))
+    for p in range(pieces.shape[0]):
+        k, gap, side, by_stiffness, by_gap = pieces[p]
+        found, above = crossings_of(c, gap, values)
+        if found.shape[0] == 0 and above != (side > 0):
+            continue
+        chi = contact_spectrum(found, above, side, top + high)
+        for q in range(top + 1):
+            force[q] -= k * by_gap * chi[q]
+            stiffness[q] += by_stiffness * chi[q]
+        if by_stiffness != 0.0:
+            product = product_spectrum(c, gap, chi, top)
+            for q in range(top + 1):
+                force[q] += by_stiffness * product[q]
+        if by_gap == 0.0:
+            continue
+        for i in range(found.shape[0]):
+            zr, zi = math.cos(found[i]), math.sin(found[i])
+            _value, speed, _bend = jet(c, zr, zi)
+            # kept from zero where the motion grazes: the derivative does not exist there
+            weight = side * k * by_gap / (2.0 * math.pi * max(abs(speed), 1e-12 * largest))
+            pr, pi = weight, 0.0
+            for q in range(top + 1):
+                stiffness[q] -= complex(pr, pi)
+                pr, pi = pr * zr + pi * zi, pi * zr - pr * zi
+
+
+@kernel()
+def corner_weights(c, pieces, grid_r, grid_i):
+    """Instants at which the gaps of piecewise-linear pieces (stiffness, gap, side) are crossed: cosines, sines, and the
+    weights there, (5, N); `f_uu` has `side stiffness / |u'|`, |u'| kept from zero where the motion grazes.
+    """
+    values = motion(c, grid_r, grid_i)
+    largest = 1e-300
+    for h in range(c.shape[0]):
+        largest = max(largest, abs(c[h]))
+    out = np.empty((5, 4 * grid_r.shape[0] * max(1, pieces.shape[0])))
+    count = 0
+    for p in range(pieces.shape[0]):
+        found, _above = crossings_of(c, pieces[p, 1], values)
+        for i in range(found.shape[0]):
+            zr, zi = math.cos(found[i]), math.sin(found[i])
+            _value, speed, bend = jet(c, zr, zi)
+            if abs(speed) < 1e-12 * largest:
+                speed = 1e-12 * largest
+            weight = pieces[p, 2] * pieces[p, 0] / abs(speed)
+            out[0, count] = zr
+            out[1, count] = zi
+            out[2, count] = weight
+            out[3, count] = weight * bend / (speed * speed)
+            out[4, count] = -weight / speed
+            count += 1
+    return np.ascontiguousarray(out[:, :count])

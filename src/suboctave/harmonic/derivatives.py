@@ -1,0 +1,275 @@
+"""Second and third derivatives of the harmonic-balance equations, analytic.
+
+*Along directions*: changes of the coefficients together with changes of omega and of parameters, to second order. With
+`v = omega D u`, the change of an element's velocity along a direction a is `v_a = omega D u_a + omega_a D u`, and to
+second order `v_ab = omega_a D u_b + omega_b D u_a`; hence, with q_a = (u_a, v_a) the change of what a law reads,
+
+    F''[a, b] = < sum_rs f_rs q_a,r q_b,s + sum_i f_vi (v_ab)_i >  + terms with the element's coefficients,
+    R''[a, b] = A''[a, b] X + A'[a] X_b + A'[b] X_a + B''[a, b] S + B'[a] S'[b] + B'[b] S'[a] + B S''[a, b].
+
+*Along perturbations of any shift* (`waves`), omega and the parameters kept: `R'' = B(f w0) F''` and `R''' = B(f w0)
+F'''`, the Fourier coefficients of `f_qq[a, b]` and `f_qqq[a, b, c]` along the motion, at the sums of the frequencies
+that go in. Both are weights at instants: see `aft.law`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.galerkin import toeplitz
+from suboctave.harmonic.linear_part import apply_blocks
+from suboctave.harmonic.trigonometric import motion, spectra, wave_sums
+from suboctave.harmonic.waves import Frequencies, Kind, Waves, fourier
+
+__all__ = ["Direction", "Multilinear", "change_at", "second_derivative", "third_derivative"]
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction in which motion, omega and parameters change.
+
+    x
+        Change of the coefficients, shape (2 H + 1, size).
+    rates
+        Changes of "omega" and of parameters, by name; absent means zero.
+    """
+
+    x: Array
+    rates: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def omega(self) -> float:
+        """Change of omega."""
+        return self.rates.get("omega", 0.0)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Changes of the parameters that are not zero."""
+        return {k: r for k, r in self.rates.items() if k != "omega" and r != 0.0}
+
+
+def change_at(channel: Channel, a: Direction, zr: Array, zi: Array) -> Array:
+    """Change of q along a direction at instants, (Q, N)."""
+    along = channel.along
+    values = np.array([motion(to_complex(a.x @ d), zr, zi) for d in channel.ins])
+    if not channel.moving:
+        return values[:, 0]
+    rates = along.rate * values[:, 1]
+    if a.omega:
+        rates += a.omega / along.nu * np.array([motion(one, zr, zi)[1] for one in along.motions])
+    return np.concatenate((values[:, 0], rates))
+
+
+def _unbalanced_along(state: BalanceState, a: Direction) -> Array:
+    """S'[a], shape (2 H + 1, size)."""
+    result = (state.force_jacobian @ a.x.ravel()).reshape(a.x.shape)
+    for name, rate in a.rates.items():
+        if rate != 0.0:
+            change = state.unbalanced_by(name)
+            if change is not None:
+                result = result + rate * change
+    return result
+
+
+def _unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
+    """S''[a, b], shape (2 H + 1, size)."""
+    result = np.zeros_like(state.x)
+    for channel in state.channels:
+        force = _force_second(state, channel, a, b) + _by_coefficients(state, channel, a, b)
+        result += np.multiply.outer(force, channel.out)
+    for first, one in a.rates.items():
+        for second, two in b.rates.items():
+            if one * two != 0.0:
+                values = {**state.values, "omega": state.omega}
+                result -= one * two * state.balance.loads.value(values, state.balance.size, (first, second))
+    return result
+
+
+def _force_second(state: BalanceState, channel: Channel, a: Direction, b: Direction) -> Array:
+    """F''[a, b] along d_out at fixed coefficients, shape (2 H + 1,)."""
+    basis, high = state.basis, state.basis.harmonics
+    result = np.zeros(basis.size)
+    for zr, zi, weights in channel.second:
+        q_a, q_b = change_at(channel, a, zr, zi), change_at(channel, b, zr, zi)
+        total = np.einsum("rsn,rn,sn->n", weights, q_a, q_b)
+        result += spectrum_to_real(spectra(total[None], np.ones_like(zr), zr, zi, high)[0], high)
+    if channel.moving and (a.omega or b.omega):
+        for i, d in enumerate(channel.ins):
+            change = basis.derivative(a.omega * (b.x @ d) + b.omega * (a.x @ d))
+            result += toeplitz(channel.damping(i), high) @ change
+    return result
+
+
+def _by_coefficients(state: BalanceState, channel: Channel, a: Direction, b: Direction) -> Array:
+    """What changes of elements' coefficients add to F''[a, b] along d_out, shape (2 H + 1,)."""
+    basis, high = state.basis, state.basis.harmonics
+    result = np.zeros(basis.size)
+    if not (a.parameters or b.parameters):
+        return result
+    for member, law in channel.members():
+        rates_a, rates_b = (member.element.parameter_rates(state.values, one.parameters) for one in (a, b))
+        if not (rates_a.any() or rates_b.any()):
+            continue
+        by = channel.coefficient_spectra(member, law)
+        for rates, other in ((rates_a, b), (rates_b, a)):
+            if not rates.any():
+                continue
+            for i, d in enumerate(channel.ins):
+                result += toeplitz(rates @ by.tangent[:, i], high) @ (other.x @ d)
+                if channel.moving:
+                    change = state.omega * basis.derivative(other.x @ d) + other.omega * basis.derivative(state.x @ d)
+                    result += toeplitz(rates @ by.tangent[:, channel.count + i], high) @ change
+        spectrum = np.einsum("i,j,ijq->q", rates_a, rates_b, by.curvature)
+        bent = member.element.parameter_curvature(state.values, a.parameters, b.parameters)
+        result += spectrum_to_real(spectrum + bent @ by.force, high)
+    return result
+
+
+def _linear_change(state: BalanceState, a: Direction, compliance: bool) -> ComplexArray | None:
+    """A'[a] or B'[a] per harmonic, None if zero."""
+    linear, freq = state.linear, state.frequencies
+    by = linear.compliance_by if compliance else linear.stiffness_by
+    plain = linear.compliance if compliance else linear.stiffness
+    total = None
+    if a.omega:
+        slope = plain(freq, 1)
+        if slope is not None:
+            total = a.omega * state.basis.multiples[:, None, None] * slope
+    for name, rate in a.parameters.items():
+        block = by(freq, (name,))
+        if block is not None:
+            total = rate * block if total is None else total + rate * block
+    return total
+
+
+def _linear_second(state: BalanceState, a: Direction, b: Direction, compliance: bool) -> ComplexArray | None:
+    """A''[a, b] or B''[a, b] per harmonic, None if zero."""
+    linear, freq = state.linear, state.frequencies
+    m = state.basis.multiples[:, None, None]
+    by = linear.compliance_by if compliance else linear.stiffness_by
+    plain = linear.compliance if compliance else linear.stiffness
+    terms: list[tuple[ComplexArray | None, float | Array]] = []
+    if a.omega and b.omega:
+        terms.append((plain(freq, 2), a.omega * b.omega * m**2))
+    for one, other in ((a, b), (b, a)):
+        if one.omega:
+            terms += [(by(freq, (name,), 1), one.omega * rate * m) for name, rate in other.parameters.items()]
+    for first, rate in a.parameters.items():
+        terms += [(by(freq, (first, second)), rate * other) for second, other in b.parameters.items()]
+    blocks = [factor * block for block, factor in terms if block is not None]
+    return sum(blocks[1:], blocks[0]) if blocks else None
+
+
+def second_derivative(state: BalanceState, a: Direction, b: Direction) -> Array:
+    """R''[a, b], shape (dimension,)."""
+    result = np.zeros_like(state.x)
+    for block, vector in (
+        (_linear_second(state, a, b, False), state.x),
+        (_linear_change(state, a, False), b.x),
+        (_linear_change(state, b, False), a.x),
+    ):
+        if block is not None:
+            result += apply_blocks(block, vector)
+    s_ab = _unbalanced_second(state, a, b)
+    if state.compliance is None:
+        return (result + s_ab).ravel()
+    result += apply_blocks(state.compliance, s_ab)
+    second = _linear_second(state, a, b, True)
+    if second is not None:
+        result += apply_blocks(second, state.unbalanced)
+    for one, other in ((a, b), (b, a)):
+        block = _linear_change(state, one, True)
+        if block is not None:
+            result += apply_blocks(block, _unbalanced_along(state, other))
+    return result.ravel()
+
+
+def third_derivative(state: BalanceState, a: Array, b: Array, c: Array) -> Array:
+    """R'''[a, b, c] along changes of the coefficients, (2 H + 1, size) each; shape (dimension,)."""
+    first, second, third = (Waves.of(state, Kind.INTEGER, one) for one in (a, b, c))
+    at = Frequencies.of(state, Kind.INTEGER)
+    return Multilinear(state).third(first, second, third, at).vector(Kind.INTEGER)
+
+
+class Multilinear:
+    """The second and third derivatives at one motion, along perturbations of any shift."""
+
+    def __init__(self, state: BalanceState) -> None:
+        self.state = state
+
+    def second(self, a: Waves, b: Waves, out: Frequencies) -> Waves:
+        """R''[a, b] at the frequencies `out`."""
+        shift = _shift(out, a, b)
+        total = np.zeros((out.count, self.state.balance.size), dtype=complex)
+        for channel in self.state.channels:
+            for zr, zi, weights in channel.second:
+                values = self._all_values(channel, (a, b), zr, zi)
+                products = np.einsum("rsn,rn,sn->n", weights, *values)
+                total += np.multiply.outer(_project(products, zr, zi, shift, out.count), channel.out)
+        return Waves(self._response(total, out), out)
+
+    def third(self, a: Waves, b: Waves, c: Waves, out: Frequencies) -> Waves:
+        """R'''[a, b, c] at the frequencies `out`."""
+        shift = _shift(out, a, b, c)
+        total = np.zeros((out.count, self.state.balance.size), dtype=complex)
+        for channel in self.state.channels:
+            for zr, zi, weights, corners in channel.third:
+                values = self._all_values(channel, (a, b, c), zr, zi)
+                plain = _trilinear(weights, *values)
+                spectrum = np.zeros(out.count, dtype=complex)
+                if corners is not None:
+                    slopes = self._all_values(channel, (a.slope, b.slope, c.slope), zr, zi)
+                    x, y, z = values
+                    plain = plain + _trilinear(corners, slopes[0], y, z)
+                    plain += _trilinear(corners, x, slopes[1], z) + _trilinear(corners, x, y, slopes[2])
+                    own = _project(_trilinear(corners, x, y, z), zr, zi, shift, out.count)
+                    spectrum -= 1j * out.values * own
+                spectrum += _project(plain, zr, zi, shift, out.count)
+                total += np.multiply.outer(spectrum, channel.out)
+        return Waves(self._response(total, out), out)
+
+    def _all_values(self, channel: Channel, waves: tuple[Waves, ...], zr: Array, zi: Array) -> list[ComplexArray]:
+        """Changes of q along perturbations at instants, (Q, N) each; the same wave is evaluated once."""
+        values = {key: self.values(channel, one, zr, zi) for key, one in {id(one): one for one in waves}.items()}
+        return [values[id(one)] for one in waves]
+
+    def values(self, channel: Channel, a: Waves, zr: Array, zi: Array) -> ComplexArray:
+        """Change of q along a perturbation at instants, (Q, N), without the factor of its lowest wave."""
+        rows = (a.amplitudes @ channel.ins.T).T
+        if channel.moving:
+            rows = np.concatenate((rows, 1j * self.state.rate * a.at.values * rows))
+        values: ComplexArray = wave_sums(np.ascontiguousarray(rows), zr, zi)
+        return values
+
+    def _response(self, force: ComplexArray, out: Frequencies) -> ComplexArray:
+        compliance = self.state.linear.compliance(out.values * self.state.rate)
+        return force if compliance is None else np.einsum("fij,fj->fi", compliance, force)
+
+
+def _trilinear(weights: Array, a: ComplexArray, b: ComplexArray, c: ComplexArray) -> ComplexArray:
+    if len(weights) == 1:
+        return weights[0, 0, 0] * a[0] * b[0] * c[0]
+    result: ComplexArray = np.einsum("rsn,rn,sn->n", np.einsum("rstn,tn->rsn", weights, c), a, b)
+    return result
+
+
+def _shift(out: Frequencies, *waves: Waves) -> int:
+    """By how many whole frequencies the lowest of a product lies above the lowest wanted."""
+    exact = sum(one.at.lowest for one in waves) - out.lowest
+    shift = round(exact)
+    if abs(exact - shift) > 1e-6:
+        raise ValueError("the product of these waves has other frequencies than those requested")
+    return shift
+
+
+def _project(values: ComplexArray, zr: Array, zi: Array, shift: int, count: int) -> ComplexArray:
+    """Fourier coefficients `1/(2 pi) sum_j values_j z_j^(shift - k)`, k = 0 .. count - 1."""
+    turned = values * (zr + 1j * zi) ** shift
+    spectrum: ComplexArray = fourier(turned[None], np.ones_like(zr), zr, zi, count - 1)[0]
+    return spectrum

@@ -1,0 +1,249 @@
+"""What is fixed of harmonic balance along a curve: channels of the elements, laws at parameter values, loads, weights.
+
+    R(X, omega, parameters) = A X + B S,    S = F(X, omega) - P(omega),
+
+with A, B from the linear part (stiffness form: A = Z, B = I, so that `R = Z X + F - P`), F the Fourier coefficients
+of the element forces (Galerkin projection) and P those of the loads. `evaluation` evaluates them at a motion. Method:
+Cameron & Griffin, J. Appl. Mech. 56 (1989) 149-154 (alternating frequency/time).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import InputError
+from suboctave.harmonic.aft.channel import Group
+from suboctave.harmonic.aft.law import Member
+from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.loads import LoadSpectrum
+from suboctave.harmonic.quadrature import search_grid
+from suboctave.lazy import lazy
+from suboctave.model.elements.base import BaseElement
+from suboctave.model.elements.coupled import CoupledElement, as_coupled
+from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, Sampling
+from suboctave.model.system import System
+
+_Same = TypeVar("_Same", bound="Equations")
+
+
+class Laws:
+    """The laws of all elements at parameter values: one by one, and sorted for every group of one displacement."""
+
+    def __init__(self, members: list[Member], groups: list[DirectionLaws]) -> None:
+        self.members, self.groups = members, groups
+
+    @lazy
+    def packed(self) -> PackedLaws:
+        """The groups' laws that are known in closed form, as arrays."""
+        return PackedLaws.of(self.groups)
+
+
+class Equations:
+    """Harmonic balance of a system in a basis, without a motion; parameters as in `evaluation.HarmonicBalance`."""
+
+    def __init__(
+        self,
+        system: System,
+        basis: HarmonicBasis,
+        values: Mapping[str, float] | None = None,
+        linear: LinearPart | None = None,
+        samples: tuple[int | None, ...] | None = None,
+    ) -> None:
+        self.system = system
+        self.values: Mapping[str, float] = dict(system.parameters if values is None else values)
+        self.linear: LinearPart = StructuralMatrices(system, self.values) if linear is None else linear
+        self.size = self.linear.size
+        #: parameters that the linear part depends on
+        self.matrix_names = system.mass.names | system.damping.names | system.stiffness.names
+        #: elements that share the displacement along one direction, and those with channels of their own
+        self.groups = self._grouped()
+        self.own = [self._own_channel(i, e) for i, e in enumerate(system.elements) if e.own_nodes]
+        #: whether any force depends on velocity
+        self.any_moving = any(group.moving for group in self.groups)
+        self._load_shapes = [self.linear.retain(c.direction) for c in system.load_components()]
+        self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
+        self._load_order = sorted(self.load_names)
+        #: names that every element's coefficients depend on
+        self._names = [tuple(sorted({n for c in e.coefficients for n in c.names})) for e in system.elements]
+        self._all_names = sorted({name for names in self._names for name in names})
+        #: of every element: values of its names, and what it is there; of all elements: the same
+        self._members: dict[int, tuple[tuple[float, ...], Member]] = {}
+        self._laws: tuple[tuple[float, ...], Laws] | None = None
+        self._write_in(basis, (None,) * len(system.elements) if samples is None else samples)
+
+    def _write_in(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> None:
+        """What depends on the basis and the samples."""
+        self.basis = basis
+        self.samples = samples
+        self.dimension = self.size * basis.size
+        #: highest Fourier coefficient of the tangent that the integer and the half-odd basis need
+        self.top = 2 * basis.harmonics + 1
+        self.loads = LoadSpectrum(self.system, basis, self._load_shapes)
+        self._load: tuple[tuple[float, ...], Array] | None = None
+        self._row_weights: dict[int, Array] = {}
+
+    def _grouped(self) -> list[Group]:
+        alike: dict[bytes, tuple[Array, list[int]]] = {}
+        for i, element in enumerate(self.system.elements):
+            if not element.own_nodes:
+                d = np.asarray(self.linear.retain(element.direction(self.system.n)), dtype=float)
+                alike.setdefault(d.tobytes(), (d, []))[1].append(i)
+        elements = self.system.elements
+        return [
+            Group(d, d[None], tuple(members), any(elements[i].depends_on_velocity for i in members))
+            for d, members in alike.values()
+        ]
+
+    def _own_channel(self, i: int, element: BaseElement) -> Group:
+        n = self.system.n
+        out = np.asarray(self.linear.retain(element.direction(n)), dtype=float)
+        inputs = np.array([self.linear.retain(d) for d in as_coupled(element).inputs(n)], dtype=float)
+        return Group(out, inputs, (i,), element.depends_on_velocity)
+
+    @lazy
+    def directions(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Where forces act, packed channel by channel: where each begins, its DOFs, its entries there."""
+        packed = [group.outgoing for group in [*self.groups, *self.own]]
+        return (
+            np.cumsum([0] + [len(dofs) for dofs, _ in packed]),
+            np.concatenate([np.zeros(0, dtype=np.int64)] + [dofs for dofs, _ in packed]),
+            np.concatenate([np.zeros(0)] + [entries for _, entries in packed]),
+        )
+
+    @property
+    def steady(self) -> bool:
+        """Whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X."""
+        return not (self.any_moving or self.own or "omega" in self.load_names)
+
+    def with_samples(self: _Same, samples: tuple[int | None, ...]) -> _Same:
+        """The same equations with other frozen sample counts."""
+        return self if samples == self.samples else self._like(self.basis, samples)
+
+    def with_basis(self: _Same, basis: HarmonicBasis) -> _Same:
+        """The same equations in another basis."""
+        return self if basis == self.basis else self._like(basis, self.samples)
+
+    def _like(self: _Same, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> _Same:
+        # the same mapping of values too: so a motion's values are known to be its own, with what the laws are there
+        _ = self._scales, self.highest_load, self.directions
+        other = type(self).__new__(type(self))
+        own = _OF_BASIS if samples == self.samples else _OF_BASIS | {"_own_laws"}
+        for name, value in vars(self).items():
+            if name not in own:
+                setattr(other, name, value)
+        if samples != self.samples:
+            other._members, other._laws = {}, None
+        other._write_in(basis, samples)
+        return other
+
+    def shaped(self, vector: Array) -> Array:
+        """A vector of the equations' dimension as coefficients, shape (2 H + 1, size)."""
+        return vector.reshape(self.basis.size, self.size)
+
+    def per_unknown(self, scale: Array) -> Array:
+        """A factor per DOF, (size,), for every unknown, shape (dimension,)."""
+        return np.tile(scale, self.basis.size)
+
+    def laws(self, values: Mapping[str, float]) -> Laws:
+        """The laws of all elements at parameter values."""
+        if values is self.values:
+            return self._own_laws
+        key = tuple([values[name] for name in self._all_names])
+        if self._laws is None or self._laws[0] != key:
+            self._laws = key, self._laws_at(values)
+        return self._laws[1]
+
+    @lazy
+    def _own_laws(self) -> Laws:
+        return self._laws_at(self.values)
+
+    def _laws_at(self, values: Mapping[str, float]) -> Laws:
+        members = []
+        for i, element in enumerate(self.system.elements):
+            key = tuple([values[name] for name in self._names[i]])
+            cached = self._members.get(i)
+            if cached is None or cached[0] != key:
+                c = element.coefficient_values(values)
+                cached = self._members[i] = key, Member(i, element, element.sampling(c), c, self.samples[i])
+            members.append(cached[1])
+        return Laws(members, [DirectionLaws.of(tuple([members[i] for i in group.members])) for group in self.groups])
+
+    @lazy
+    def settled(self) -> bool:
+        """True if no element needs a number of samples."""
+        kinds: list[Sampling] = [member.kind for member in self.laws(self.values).members]
+        blind = AdaptiveSampling | CornerSampling
+        return all(s is None for s in self.samples) and not any(isinstance(kind, blind) for kind in kinds)
+
+    @lazy
+    def highest_load(self) -> int:
+        """Highest harmonic of omega that is loaded, or that an element depends on; 0 without."""
+        times = [e.time_harmonic for e in self.system.elements if isinstance(e, CoupledElement)]
+        return max([c.harmonic for c in self.system.load_components()] + times, default=0)
+
+    def load(self, values: Mapping[str, float], omega: float) -> Array:
+        """Load coefficients P, shape (2 H + 1, size)."""
+        if values is self.values and "omega" not in self.load_names:
+            return self._own_load
+        key = tuple([omega if n == "omega" else values[n] for n in self._load_order])
+        if self._load is None or self._load[0] != key:
+            self._load = (key, self.loads.value({**values, "omega": omega}, self.size))
+        return self._load[1]
+
+    @lazy
+    def _own_load(self) -> Array:
+        return self.loads.value(self.values, self.size)
+
+    def elements_with(self, name: str) -> tuple[int, ...]:
+        """The elements that have a parameter in a coefficient."""
+        return tuple(i for i, names in enumerate(self._names) if name in names)
+
+    @lazy
+    def grid(self) -> Array:
+        """Points on the circle for searches along a motion: cosines and sines, (2, N)."""
+        nodes = search_grid(self.basis.harmonics)
+        return np.array((nodes.zr, nodes.zi))
+
+    @lazy
+    def _scales(self) -> tuple[Array, Array]:
+        mass = self.linear.equation_of_motion()[0]
+        shapes = np.array([self.linear.expand(unit) for unit in np.eye(self.size)])
+        mobility = np.einsum("ij,ji->i", shapes, np.linalg.solve(mass, shapes.T))
+        if not np.all(mobility > 0.0):
+            raise InputError("every unknown DOF needs a mass behind it")
+        weight = 1.0 / np.sqrt(mobility)
+        return weight, 1.0 / weight
+
+    def scales(self) -> tuple[Array, Array]:
+        """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_i)` and its inverse.
+
+        `m_i` is the mass that a DOF shows to a sudden force, `1 / (M^-1)_ii`. The weights make norms independent of
+        the units of single DOFs. Shape (size,) each.
+        """
+        return self._scales
+
+    def row_weights(self, rows: int) -> Array:
+        """The weights of residual entries (`scales`) for as many rows of an operator."""
+        weights = self._row_weights.get(rows)
+        if weights is None:
+            weights = self._row_weights[rows] = np.tile(self.scales()[1], rows // self.size)
+        return weights
+
+    def logarithm_of_masses(self, rows: int) -> float:
+        """Sum of the logarithms of `sqrt(m_i)` (`scales`) over as many rows of an operator."""
+        return rows // self.size * float(np.log(self.scales()[0]).sum())
+
+    @lazy
+    def column_weights(self) -> Array:
+        """The weights of displacements (`scales`) for all coefficients, shape (dimension,)."""
+        return self.per_unknown(self.scales()[0])
+
+
+#: what a basis and samples have their own of
+_OF_BASIS = frozenset({"_own_load", "settled", "grid", "column_weights", "completed"})

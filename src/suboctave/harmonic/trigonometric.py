@@ -1,0 +1,483 @@
+"""Motions as trigonometric polynomials: values, Fourier coefficients, crossings of a level, extrema.
+
+A motion along one direction is `u(tau) = Re sum_k c_k exp(i k tau)`, k = 0 .. H. Points on the unit circle are handed
+over as `z = exp(i tau)`, split into real and imaginary part: powers of `z` replace trigonometric functions. Compiled
+inner loops; arrays in, arrays out.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from suboctave.compiled import kernel
+
+#: flags under which the compiler may reorder sums, for loops in vector registers
+FAST = {"reassoc", "contract", "nsz"}
+#: points that are dealt with together, so that the nearest cache holds all of it
+_STRETCH = 256
+
+
+@kernel(fastmath=FAST)
+def _horner(c, co, si, x, y):
+    """`sum_k c_k z^k` at the points z into x + i y, but for the last step where the number of harmonics is odd.
+
+    Returns 1 if that step, `z (x + i y) + c_0`, is left to the caller, who may need its real part only; else 0.
+    """
+    top = c.shape[0] - 1
+    a, b = c[top].real, c[top].imag
+    for j in range(x.shape[0]):
+        x[j] = a
+        y[j] = b
+    # two harmonics at a time: what is between them stays in registers
+    k = top - 1
+    while k > 0:
+        a, b, d, e = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
+        for j in range(x.shape[0]):
+            t = x[j] * co[j] - y[j] * si[j] + a
+            u = x[j] * si[j] + y[j] * co[j] + b
+            x[j] = t * co[j] - u * si[j] + d
+            y[j] = t * si[j] + u * co[j] + e
+        k -= 2
+    return k + 1
+
+
+@kernel(fastmath=FAST)
+def displacement(c, zr, zi, out):
+    """Values of `Re sum_k c_k z^k` at the points z, into `out` (N,)."""
+    imaginary = np.empty(_STRETCH)
+    for begin in range(0, zr.shape[0], _STRETCH):
+        x, co, si = out[begin : begin + _STRETCH], zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH]
+        y = imaginary[: x.shape[0]]
+        if _horner(c, co, si, x, y) == 1:
+            a = c[0].real
+            for j in range(x.shape[0]):
+                x[j] = x[j] * co[j] - y[j] * si[j] + a
+
+
+@kernel()
+def slope(c, factor):
+    """Complex coefficients `factor i k c_k` of the derivative with respect to tau, times a factor."""
+    out = np.empty_like(c)
+    for k in range(c.shape[0]):
+        out[k] = complex(-factor * k * c[k].imag, factor * k * c[k].real)
+    return out
+
+
+@kernel()
+def motion(c, zr, zi):
+    """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
+    out = np.empty((2, zr.shape[0]))
+    displacement(c, zr, zi, out[0])
+    displacement(slope(c, 1.0), zr, zi, out[1])
+    return out
+
+
+@kernel(fastmath=FAST)
+def spectra(values, weights, zr, zi, top):
+    """Fourier coefficients `1/(2 pi) sum_j weights_j values[r, j] z_j^-q`, q = 0 .. top; shape (R, top + 1)."""
+    rows, n = values.shape
+    out = np.zeros((rows, top + 1), dtype=np.complex128)
+    real, imaginary = np.empty(_STRETCH), np.empty(_STRETCH)
+    scale = 1.0 / (2.0 * math.pi)
+    # two rows at a time, which share the powers of z; a last one alone is its own neighbour
+    for r in range(0, rows, 2):
+        s = min(r + 1, rows - 1)
+        for begin in range(0, n, _STRETCH):
+            end = begin + _STRETCH
+            f, g, w, co, si = (
+                values[r, begin:end],
+                values[s, begin:end],
+                weights[begin:end],
+                zr[begin:end],
+                zi[begin:end],
+            )
+            x, y = real[: w.shape[0]], imaginary[: w.shape[0]]
+            for j in range(w.shape[0]):
+                x[j] = w[j] * scale
+                y[j] = 0.0
+            # two harmonics at a time: what is between them stays in registers
+            for q in range(0, top + 1, 2):
+                fr = fi = gr = gi = hr = hi = kr = ki = 0.0
+                for j in range(w.shape[0]):
+                    a, b, c, d = x[j], y[j], co[j], si[j]
+                    fr += f[j] * a
+                    fi += f[j] * b
+                    gr += g[j] * a
+                    gi += g[j] * b
+                    e = a * c - b * d
+                    b = a * d + b * c
+                    hr += f[j] * e
+                    hi += f[j] * b
+                    kr += g[j] * e
+                    ki += g[j] * b
+                    x[j] = e * c - b * d
+                    y[j] = e * d + b * c
+                out[r, q] += complex(fr, -fi)
+                if s > r:
+                    out[s, q] += complex(gr, -gi)
+                if q < top:
+                    out[r, q + 1] += complex(hr, -hi)
+                    if s > r:
+                        out[s, q + 1] += complex(kr, -ki)
+    return out
+
+
+@kernel(fastmath=FAST)
+def wave_sums(coefficients, zr, zi):
+    """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
+    rows, n = coefficients.shape[0], zr.shape[0]
+    out = np.empty((rows, n), dtype=np.complex128)
+    real, imaginary = np.empty(_STRETCH), np.empty(_STRETCH)
+    for r in range(rows):
+        c = coefficients[r]
+        for begin in range(0, n, _STRETCH):
+            co, si, sums = zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH], out[r, begin : begin + _STRETCH]
+            x, y = real[: co.shape[0]], imaginary[: co.shape[0]]
+            if _horner(c, co, si, x, y) == 1:
+                a, b = c[0].real, c[0].imag
+                for j in range(x.shape[0]):
+                    sums[j] = complex(x[j] * co[j] - y[j] * si[j] + a, x[j] * si[j] + y[j] * co[j] + b)
+            else:
+                for j in range(x.shape[0]):
+                    sums[j] = complex(x[j], y[j])
+    return out
+
+
+@kernel()
+def jet(c, zr, zi):
+    """Value, first and second derivative of `Re sum_k c_k z^k` with respect to tau at one point."""
+    pr = pi = dr = di = sr = 0.0
+    si = 0.0
+    for k in range(c.shape[0] - 1, -1, -1):
+        a = c[k].real
+        b = c[k].imag
+        t = pr * zr - pi * zi + a
+        pi = pr * zi + pi * zr + b
+        pr = t
+        t = dr * zr - di * zi + k * a
+        di = dr * zi + di * zr + k * b
+        dr = t
+        t = sr * zr - si * zi + k * k * a
+        si = sr * zi + si * zr + k * k * b
+        sr = t
+    return pr, -di, -sr
+
+
+@kernel()
+def _refine(c, lo, hi, flo, level):
+    """A root of the motion minus `level` in the bracket (lo, hi), by Newton's method kept inside the bracket."""
+    tau = 0.5 * (lo + hi)
+    last = hi - lo
+    for _ in range(100):
+        x, d, _s = jet(c, math.cos(tau), math.sin(tau))
+        f = x - level
+        if f == 0.0:
+            return tau
+        if (f > 0.0) == (flo > 0.0):
+            lo = tau
+        else:
+            hi = tau
+        new = tau - f / d if d != 0.0 else np.inf
+        if not (lo < new < hi):
+            # a step out of the bracket that rounding alone explains: the root is here
+            if abs(new - tau) < 1e-14 * max(1.0, abs(tau)) or hi - lo < 4e-16 * max(1.0, abs(tau)):
+                return tau
+            new = 0.5 * (lo + hi)
+        step = abs(new - tau)
+        # converging quadratically: the step after one of 1e-8 is below rounding
+        if step < 1e-15 * max(1.0, abs(tau)) or (step < 1e-8 and step < 1e-4 * last):
+            x, d, _s = jet(c, math.cos(new), math.sin(new))
+            if d != 0.0 and abs(x - level) < abs(d) * 1e-12:
+                new -= (x - level) / d
+            return new
+        last = step
+        tau = new
+    return tau
+
+
+@kernel()
+def _search(c, level, lo, hi, f0, d0, f1, d1, found, count):
+    """Append the crossings of `level` in (lo, hi), an interval with one extremum at most; returns the new count.
+
+    f, d: the motion minus level and its derivative at both ends.
+    """
+    if (f0 > 0.0) != (f1 > 0.0):
+        found[count] = _refine(c, lo, hi, f0, level)
+        return count + 1
+    if not ((f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0)):
+        return count
+    # an extremum towards the level lies in between: does it reach across?
+    if min(abs(f0), abs(f1)) > (hi - lo) * (abs(d0) + abs(d1)):
+        return count
+    first, last = lo, hi
+    tau = lo + (hi - lo) * d0 / (d0 - d1)
+    for _ in range(60):
+        x, d, s = jet(c, math.cos(tau), math.sin(tau))
+        if (x - level > 0.0) != (f0 > 0.0):
+            break
+        if (d > 0.0) == (d0 > 0.0):
+            lo = tau
+        else:
+            hi = tau
+        new = tau - d / s if s != 0.0 else 0.5 * (lo + hi)
+        if not (lo < new < hi):
+            new = 0.5 * (lo + hi)
+        if abs(new - tau) < 1e-14:
+            break
+        tau = new
+    x, d, s = jet(c, math.cos(tau), math.sin(tau))
+    if (x - level > 0.0) != (f0 > 0.0):
+        found[count] = _refine(c, first, tau, f0, level)
+        found[count + 1] = _refine(c, tau, last, x - level, level)
+        count += 2
+    return count
+
+
+@kernel()
+def crossings_of(c, level, values):
+    """`crossings`, from value and derivative of the motion (2, N) on a uniform grid that starts at tau = 0."""
+    n = values.shape[1]
+    h = 2.0 * math.pi / n
+    found = np.empty(4 * n)
+    # not a literal, for which the search would be compiled twice
+    count = np.int64(0)
+    for j in range(n):
+        f0 = values[0, j] - level
+        f1 = values[0, (j + 1) % n] - level
+        d0 = values[1, j]
+        d1 = values[1, (j + 1) % n]
+        near = min(abs(f0), abs(f1)) <= h * (abs(d0) + abs(d1))
+        if d0 * d1 > 0.0 and near:
+            # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
+            mean = (f1 - f0) / h
+            a = 3.0 * (d0 + d1 - 2.0 * mean)
+            b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
+            # its extremum towards zero lies inside, and is less than half of the lesser slope at the ends
+            if a * d0 > 0.0 and 0.0 < -b / a < 2.0 and abs(d0) - b * b / (4.0 * abs(a)) < 0.5 * min(abs(d0), abs(d1)):
+                lo, hi = j * h, (j + 1) * h
+                tau = lo - 0.5 * h * b / a
+                x, d, s = jet(c, math.cos(tau), math.sin(tau))
+                new = tau - 0.5 * h * h * s / a
+                if lo < new < hi:
+                    tau = new
+                    x, d, s = jet(c, math.cos(tau), math.sin(tau))
+                if d * d0 < 0.0:
+                    count = _search(c, level, lo, tau, f0, d0, x - level, d, found, count)
+                    count = _search(c, level, tau, hi, x - level, d, f1, d1, found, count)
+                    continue
+        if (f0 > 0.0) != (f1 > 0.0) or (near and d0 * d1 < 0.0):
+            count = _search(c, level, j * h, (j + 1) * h, f0, d0, f1, d1, found, count)
+    return found[:count], values[0, 0] - level > 0.0
+
+
+@kernel()
+def crossings(c, level, zr, zi):
+    """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
+
+    Sampled on the uniform grid z; a pair hidden between two samples is looked for at every extremum near the level
+    (whose parabola comes within half its own rise of it), and two extrema between two samples where the cubic through
+    them slows down. Exact up to rounding.
+    """
+    return crossings_of(c, level, motion(c, zr, zi))
+
+
+@kernel()
+def peak(c, samples):
+    """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
+
+    Every sample interval that may hold an extremum large enough is searched by Newton's method on the derivative.
+    """
+    n = samples
+    h = 2.0 * math.pi / n
+    zr, zi = np.empty(n), np.empty(n)
+    for j in range(n):
+        zr[j], zi[j] = math.cos(j * h), math.sin(j * h)
+    values = motion(c, zr, zi)
+    x, d = values[0], values[1]
+    best = -1.0
+    for j in range(n):
+        if abs(x[j]) > best:
+            best = abs(x[j])
+            where = j * h
+            value = x[j]
+    floor = best
+    for j in range(n):
+        m = (j + 1) % n
+        if (d[j] > 0.0) == (d[m] > 0.0):
+            continue
+        # within the interval x rises at most by h |d| above its ends
+        if max(abs(x[j]), abs(x[m])) + h * (abs(d[j]) + abs(d[m])) < floor:
+            continue
+        lo = j * h
+        hi = (j + 1) * h
+        sign = d[j] > 0.0
+        tau = lo + h * d[j] / (d[j] - d[m])
+        for _ in range(60):
+            v, g, b = jet(c, math.cos(tau), math.sin(tau))
+            if (g > 0.0) == sign:
+                lo = tau
+            else:
+                hi = tau
+            new = tau - g / b if b != 0.0 else 0.5 * (lo + hi)
+            if not (lo <= new <= hi):
+                new = 0.5 * (lo + hi)
+            done = abs(new - tau) < 1e-13
+            tau = new
+            if done:
+                break
+        v, g, b = jet(c, math.cos(tau), math.sin(tau))
+        if abs(v) > best:
+            best = abs(v)
+            where = tau
+            value = v
+    return best, where, value
+
+
+@kernel()
+def _turn(c, lo, hi, rises, first):
+    """The extremum in (lo, hi), before which the motion rises or falls: tau, value, second derivative."""
+    t = first
+    x = s = 0.0
+    for _ in range(60):
+        x, d, s = jet(c, math.cos(t), math.sin(t))
+        if (d > 0.0) == rises:
+            lo = t
+        else:
+            hi = t
+        new = t - d / s if s != 0.0 else 0.5 * (lo + hi)
+        if not (lo <= new <= hi):
+            new = 0.5 * (lo + hi)
+        # an error e of the instant is one of s e^2 / 2 in the value
+        done = abs(new - t) < 1e-9
+        t = new
+        if done:
+            break
+    # the sign that alternates, where rounding hides it
+    return t, x, -abs(s) if rises else abs(s)
+
+
+@kernel()
+def extrema(c, zr, zi):
+    """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative, (3, m); ascending in
+    tau.
+
+    Brackets of the derivative's zeros on the uniform grid z, then safeguarded Newton. A pair hidden between two samples
+    is looked for where the cubic through them nearly turns. Maxima and minima alternate, so that their number is even.
+    """
+    n = zr.shape[0]
+    h = 2.0 * math.pi / n
+    values = motion(c, zr, zi)
+    found = np.empty((3, 2 * n))
+    tau, value, curve = found[0], found[1], found[2]
+    count = 0
+    for j in range(n):
+        d0 = values[1, j]
+        d1 = values[1, (j + 1) % n]
+        lo = j * h
+        hi = lo + h
+        if (d0 > 0.0) != (d1 > 0.0):
+            tau[count], value[count], curve[count] = _turn(c, lo, hi, d0 > 0.0, lo + h * d0 / (d0 - d1))
+            count += 1
+            continue
+        # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
+        mean = (values[0, (j + 1) % n] - values[0, j]) / h
+        a = 3.0 * (d0 + d1 - 2.0 * mean)
+        b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
+        if not (a * d0 > 0.0 and 0.0 < -b / a < 2.0) or abs(d0) - b * b / (4.0 * abs(a)) > 0.5 * min(abs(d0), abs(d1)):
+            continue
+        middle = lo - 0.5 * h * b / a
+        _, d, s = jet(c, math.cos(middle), math.sin(middle))
+        new = middle - 0.5 * h * h * s / a
+        if lo < new < hi:
+            middle = new
+            _, d, s = jet(c, math.cos(middle), math.sin(middle))
+        if d * d0 < 0.0:
+            for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
+                tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
+                count += 1
+    return found[:, :count].copy()
+
+
+@kernel()
+def _level_count(x, level):
+    """How often the motion crosses a level, from its extrema."""
+    crossed = 0
+    for i in range(x.shape[0]):
+        if (x[i] > level) != (x[(i + 1) % x.shape[0]] > level):
+            crossed += 1
+    return crossed
+
+
+@kernel()
+def _smoothed(x, wanted):
+    """Indices of `wanted` extrema: neighbouring pairs are dropped, the least different first, ripples that have just
+    come or are about to go.
+    """
+    m = x.shape[0]
+    index = np.empty(m, dtype=np.int64)
+    for i in range(m):
+        index[i] = i
+    while m > wanted:
+        best = 0
+        least = np.inf
+        for i in range(m):
+            difference = abs(x[index[i]] - x[index[(i + 1) % m]])
+            if difference < least:
+                least = difference
+                best = i
+        other = (best + 1) % m
+        kept = 0
+        for i in range(m):
+            if i != best and i != other:
+                index[kept] = index[i]
+                kept += 1
+        m = kept
+    return index
+
+
+@kernel()
+def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
+    """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).
+
+    Extrema are paired in their cyclic order, so that two that pass at once in opposite senses are both seen. Returns
+    pairs of indices, shape (m, 2), the number m of them that count, and how often each motion crosses its level. If the
+    crossings differ by other than what the pairs explain, extrema have come or gone as well.
+    """
+    crossed_a = _level_count(xa, level_a)
+    crossed_b = _level_count(xb, level_b)
+    wanted = min(xa.shape[0], xb.shape[0])
+    found = np.empty((wanted, 2), dtype=np.int64)
+    count = 0
+    if wanted == 0:
+        return found, count, crossed_a, crossed_b
+    ia = _smoothed(xa, wanted)
+    ib = _smoothed(xb, wanted)
+    # maxima to maxima
+    first = 0 if (sa[ia[0]] < 0.0) == (sb[ib[0]] < 0.0) else 1
+    best = first
+    least = np.inf
+    for shift in range(first, wanted, 2):
+        total = 0.0
+        for i in range(wanted):
+            way = abs(ta[ia[i]] - tb[ib[(i + shift) % wanted]])
+            total += min(way, 2.0 * math.pi - way)
+        if total < least:
+            least = total
+            best = shift
+    for i in range(wanted):
+        p = ia[i]
+        q = ib[(i + best) % wanted]
+        if (xa[p] > level_a) != (xb[q] > level_b):
+            found[count, 0] = p
+            found[count, 1] = q
+            count += 1
+    return found, count, crossed_a, crossed_b
+
+
+@kernel()
+def pass_by(ta, xa, sa, level_a, tb, xb, sb, level_b):
+    """Whether `passages` finds anything: extrema that pass a level, or a level crossed more or less often."""
+    _, count, crossed_a, crossed_b = passages(ta, xa, sa, level_a, tb, xb, sb, level_b)
+    return count > 0 or crossed_a != crossed_b

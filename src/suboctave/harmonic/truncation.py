@@ -1,0 +1,200 @@
+"""How many harmonics a motion needs: the energy of the force that the basis neglects.
+
+The element forces of a truncated motion have harmonics beyond the basis. To first order the motion they would excite
+is `x_k = -A(k w0)^-1 B(k w0) f_k`; its size relative to the motion is the truncation estimate stated on every orbit.
+It is the criterion of Ferri & Leamy (AIAA 2009-2667) carried from forces to displacements, so that it is
+dimensionless and weighs what matters.
+
+The harmonics k of a motion of nu load periods fall into classes by gcd(k, nu): those of the load, those that came with
+the first doubling, with the second, and so on. All end at the same frequency: the place at which the motion was born
+depends on it, since the equations within the youngest class are those of its parent's J_half there.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from suboctave.errors import InputError, check_numbers
+from suboctave.harmonic.basis import Array, HarmonicBasis, to_complex
+from suboctave.harmonic.evaluation import BalanceState, length
+
+#: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
+_MOST_UNKNOWNS = 4000
+#: numbers of harmonics (of omega) that adaptive selection chooses from
+_LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
+#: ratio of neighbouring highest harmonics for sub-harmonic motions, whose steps need not be whole multiples of omega
+_FINER = 1.05
+#: share of the tolerance that a new choice for sub-harmonic motions aims at
+_AIM = 0.6
+
+
+@dataclass(frozen=True)
+class AdaptiveHarmonics:
+    """Harmonics chosen at every step so that the neglected part of the motion stays below a tolerance.
+
+    tolerance
+        Largest neglected motion relative to the motion along a curve.
+    event_tolerance
+        The same for located bifurcations, which are solved again with more harmonics.
+    minimum, maximum
+        Bounds on the highest harmonic of omega; at the maximum the estimate is stated and the curve goes on.
+    """
+
+    tolerance: float = 1e-5
+    event_tolerance: float = 3e-7
+    minimum: int = 5
+    maximum: int = 127
+
+    def __post_init__(self) -> None:
+        check_numbers(**vars(self))
+        if not (0.0 < self.event_tolerance <= self.tolerance < 0.1):
+            raise InputError(
+                f"need 0 < event_tolerance <= tolerance < 0.1, got {self.event_tolerance:g} and {self.tolerance:g}"
+            )
+        if not 1 <= self.minimum <= self.maximum <= _LADDER[-1]:
+            raise InputError(
+                f"need 1 <= minimum <= maximum <= {_LADDER[-1]} harmonics, got {self.minimum} and {self.maximum}"
+            )
+
+
+def motion_size(state: BalanceState) -> float:
+    """Size of a motion with the DOF weights of `HarmonicBalance.scales`."""
+    return length(state.x * state.balance.scales()[0])
+
+
+def truncation(state: BalanceState) -> float:
+    """Estimated size of the neglected harmonics relative to the motion."""
+    tail, size = state.tails
+    if size == 0.0:
+        return 0.0
+    return float(tail[state.basis.harmonics])
+
+
+def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, ...]:
+    """Numbers of harmonics of omega to choose from."""
+    basis = state.basis
+    return _rungs(options, basis.harmonics, basis.nu, state.balance.size, state.balance.highest_load)
+
+
+@lru_cache(maxsize=256)
+def _rungs(options: AdaptiveHarmonics, high: int, nu: int, size: int, highest_load: int) -> tuple[int, ...]:
+    lowest = max(options.minimum, highest_load)
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / size - 1) / (2 * nu)))
+    return tuple(h for h in _LADDER if lowest <= h <= most) or (max(lowest, high // nu),)
+
+
+def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
+    """A basis with half as many harmonics again, where the options allow it, else the present ones."""
+    nu, high = state.basis.nu, state.basis.harmonics
+    wanted = next((h for h in _ladder(options, state) if h * nu >= 1.5 * high), None)
+    return state.basis if wanted is None else HarmonicBasis(wanted * nu, nu)
+
+
+def _expected(tail: Array, high: int, bound: float) -> float:
+    """Harmonic beyond which less than `bound` is left, if the harmonics beyond H go on falling like a power.
+
+    Contacts make them fall like k^-3 or k^-4; smooth laws do so faster than any power.
+    """
+    middle = (3 * high + 1) // 2
+    near, far = tail[high] ** 2 - tail[middle] ** 2, tail[middle] ** 2
+    if not near > far > 0.0:
+        return 2.0 * high
+    # amplitudes k^-p: sums of squares over (H, 3 H / 2] and (3 H / 2, 2 H + 1]
+    power = min(40.0, max(2.0, math.log(near / far) / (2.0 * math.log(1.4))))
+    slope = 2.0 * power - 1.0
+    rest = near / (1.0 - 1.5**-slope)
+    return float(high * (rest / bound**2) ** (1.0 / slope))
+
+
+def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
+    """The basis a motion needs for a tolerance: the present one where that will do, with some hysteresis."""
+    basis = state.basis
+    if basis.nu > 1:
+        return _of_subharmonics(state, options, tolerance)
+    high = basis.harmonics
+    tail, size = state.tails
+    if size == 0.0:
+        return basis
+    ladder = _ladder(options, state)
+
+    def sufficient(bound: float) -> int:
+        for h in ladder:
+            if h < 2 * high and tail[h] <= bound:
+                return h
+        least = max(2.0 * high, min(_expected(tail, high, bound), 2.5 * high))
+        return next((h for h in ladder if h >= least), ladder[-1])
+
+    if tail[high] > tolerance:
+        wanted = sufficient(0.5 * tolerance)
+        return basis if wanted <= high else HarmonicBasis(wanted)
+    fewer = bisect_left(ladder, high) - 1
+    if fewer < 0 or tail[ladder[fewer]] > 0.2 * tolerance:
+        return basis
+    wanted = sufficient(0.2 * tolerance)
+    return HarmonicBasis(wanted) if wanted < high else basis
+
+
+@lru_cache(maxsize=256)
+def _fine_rungs(nu: int, lowest: float, most: float) -> tuple[int, ...]:
+    rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
+    return tuple(r for r in rungs if lowest <= r <= most)
+
+
+def _of_subharmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
+    """`choose_harmonics` for motions of several load periods."""
+    basis, high, nu = state.basis, state.basis.harmonics, state.basis.nu
+    beyond = _class_tails(state)
+    if beyond is None:
+        return basis
+    total = np.sqrt(np.sum(beyond**2, axis=0))
+    lowest = max(options.minimum, state.balance.highest_load)
+    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
+    rungs = _fine_rungs(nu, lowest * nu, most * nu) or (max(lowest * nu, high),)
+    if total[high] > tolerance:
+        wanted = _needed(beyond, total, high, _AIM * tolerance, rungs)
+        return HarmonicBasis(wanted, nu) if wanted > high else basis
+    if total[int(0.9 * high)] > _AIM * tolerance:
+        return basis
+    wanted = _needed(beyond, total, high, _AIM * tolerance, rungs)
+    return HarmonicBasis(wanted, nu) if 2 * wanted + 1 < 0.9 * basis.size else basis
+
+
+def _class_tails(state: BalanceState) -> Array | None:
+    """What each class of harmonics has beyond k = 0 .. 2 H + 1 relative to the motion, (classes, 2 H + 2); None at
+    rest.
+    """
+    nu, weight = state.basis.nu, state.balance.scales()[0]
+    amplitudes = np.concatenate((to_complex(state.x), state.neglected)) * weight
+    squares = np.sum(amplitudes.real**2 + amplitudes.imag**2, axis=1)
+    size = float(squares[: state.basis.harmonics + 1].sum())
+    if size == 0.0:
+        return None
+    divisor = np.gcd(np.arange(len(squares)), nu)
+    classes = np.array([np.where(divisor == d, squares, 0.0) for d in range(1, nu + 1) if nu % d == 0])
+    sums = np.cumsum(classes[:, ::-1], axis=1)[:, ::-1] / size
+    tails: Array = np.sqrt(np.column_stack((sums[:, 1:], np.zeros(len(sums)))))
+    return tails
+
+
+def _needed(beyond: Array, total: Array, high: int, bound: float, rungs: tuple[int, ...]) -> int:
+    """Highest harmonic beyond which less than `bound` is neglected in all, by the tails of all classes."""
+
+    def rung(end: int) -> int:
+        return rungs[min(bisect_left(rungs, end), len(rungs) - 1)]
+
+    share = bound
+    while True:
+        ends = [min(2 * high, rung(int(np.argmax(b <= share)))) for b in beyond]
+        neglected = math.hypot(*[float(b[end]) for b, end in zip(beyond, ends, strict=True)])
+        if neglected <= bound or share < bound / math.sqrt(len(beyond)):
+            break
+        share *= 0.9
+    end = max(ends)
+    if end >= 2 * high:
+        end = round(max(2 * high, min(_expected(total, high, bound), 2.5 * high)))
+    return rung(end)

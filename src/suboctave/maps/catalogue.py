@@ -1,0 +1,335 @@
+"""Curves of bifurcations over omega and a design parameter, each once, and the branches that lead to them.
+
+Responses at values of the parameter, followed from both ends of the range with what bifurcates from them, meet
+bifurcations. Each is followed over the parameter unless it lies on a curve that is known. Through a limit point of such
+a curve a branch can be followed at any value that the curve reaches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from suboctave.analysis.diagram import Followed, diagram_of
+from suboctave.analysis.frequency_response import continue_branch
+from suboctave.analysis.options import SearchOptions, handed_on, settings_of
+from suboctave.analysis.subharmonics import Seeds, isolated_branches
+from suboctave.analysis.switching import switch_branch
+from suboctave.analysis.track import track
+from suboctave.bifurcation import Bifurcation
+from suboctave.continuation import NewtonOptions
+from suboctave.curves.discretisation import Harmonics, make_curve, own_linear_part, rule_of
+from suboctave.curves.identity import gap_to, lies_on
+from suboctave.curves.junction import period_name
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.starts import start_point
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.truncation import truncation
+from suboctave.interruption import Interruption, pass_on
+from suboctave.maps.inputs import check_count
+from suboctave.maps.pieces import MonotonePiece, pieces_of
+from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
+from suboctave.model.system import System
+from suboctave.results.branch import Branch
+from suboctave.results.diagram import BifurcationDiagram
+from suboctave.results.tracked_branch import TrackedBranch
+
+__all__ = ["Catalogue", "SearchRange", "branch_through", "carrier_of", "motion_near"]
+
+#: share of the range of omega by which branches are followed beyond what they are to hold
+_MARGIN = 0.02
+#: frequencies of one bifurcation located twice differ by less, relatively
+_SAME_OMEGA = 2e-5
+#: share of a closed branch's length by which points are beside a bifurcation, not at it
+_CLEAR = 1e-4
+
+
+class SearchRange(NamedTuple):
+    """The range of omega of a search, ascending, and the wider ones in which curves are followed for it."""
+
+    low: float
+    high: float
+
+    @property
+    def around(self) -> tuple[float, float]:
+        """An octave more on both sides, for what leads into the range from outside."""
+        return 0.5 * self.low, 2.0 * self.high
+
+    def holding(self, places: Iterable[float]) -> SearchRange:
+        """The range, wider where places lie outside or close to its ends; not beyond half its lower end."""
+        inside = list(places)
+        margin = _MARGIN * (max(self.high, *inside) - min(self.low, *inside)) if inside else 0.0
+        low = min([self.low, *(place - margin for place in inside)])
+        return SearchRange(max(low, 0.5 * min([self.low, *inside])), max([self.high, *(p + margin for p in inside)]))
+
+
+@dataclass(eq=False)
+class Catalogue:
+    """What is known of the bifurcations of a system over omega and a design parameter.
+
+    system, name, bounds, omega
+        What is examined, `bounds` and `omega` ascending.
+    harmonics, options
+        For the verbs that follow branches.
+    most
+        Curves after which no more are followed.
+    curves, pieces
+        The curves of bifurcations over the parameter, and their monotone pieces.
+    notes
+        What could not be settled.
+    report
+        Where progress is reported to.
+    interruption
+        What stopped the work before its end.
+    """
+
+    system: System
+    name: str
+    bounds: tuple[float, float]
+    omega: SearchRange
+    harmonics: Harmonics
+    options: SearchOptions
+    most: int
+    curves: list[TrackedBranch] = field(default_factory=list)
+    pieces: list[MonotonePiece] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    report: Callable[[float, str], None] | None = None
+    interruption: Interruption | None = None
+    _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
+
+    @classmethod
+    def checked(
+        cls,
+        system: System,
+        name: str,
+        bounds: Any,
+        omega: Any,
+        harmonics: Harmonics,
+        most: int,
+        options: SearchOptions,
+    ) -> Catalogue:
+        """An empty one for what a verb was given; InputError for what cannot be."""
+        check_parameter(system, name)
+        if name == "omega":
+            raise InputError("the design parameter is one of the system's: omega varies anyway, it is the other axis")
+        low, high = sorted(check_bounds(system, name, bounds))
+        within = SearchRange(*sorted(check_range("omega", omega, positive=True)))
+        check_system(system, within)
+        rule_of(harmonics)
+        settings_of(system, options)
+        return cls(system, name, (low, high), within, harmonics, handed_on(options), check_count("max_curves", most, 1))
+
+    @property
+    def span(self) -> float:
+        """Width of the parameter's range."""
+        return self.bounds[1] - self.bounds[0]
+
+    @property
+    def limit_points(self) -> list[MonotonePiece]:
+        """The pieces of curves of limit points."""
+        return [piece for piece in self.pieces if piece.kind == "LP"]
+
+    def note(self, text: str) -> None:
+        """Something that could not be settled, listed once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def progress(self, share: float, where: str) -> None:
+        """Report how far the work has come."""
+        if self.report is not None:
+            self.report(share, where)
+
+    def at(self, value: float) -> System:
+        """The system at a value of the parameter."""
+        return self.system.with_parameters({self.name: value})
+
+    # ------------------------------------------------------------------------------------------------------ branches
+    def responses(self, value: float, omega: tuple[float, float], followed: Followed) -> Iterator[BifurcationDiagram]:
+        """The response at a value with what bifurcates from it; that from the other end as well if it is another."""
+        low, high = omega
+        for ends in ((high, low), (low, high)):
+            try:
+                diagram = diagram_of(self.at(value), ends, self.harmonics, followed, self.options)
+            except ConvergenceError as failure:
+                self.note(f"at {self.name} = {value:.6g}: {failure}")
+                continue
+            self.note_failures(diagram, value)
+            yield diagram
+            root = diagram.root.branch
+            if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
+                return
+
+    def resonant(
+        self, value: float, order: int, seeds: Seeds, known: Sequence[Branch], share: float = 0.0
+    ) -> list[Branch]:
+        """Branches of a period at a value that a search among resonances meets, without those that are known.
+
+        `share` of the work, for progress.
+        """
+        where = f"searching {period_name(order)} motions at {self.name} = {value:.6g}"
+        self.progress(share, where)
+        try:
+            return isolated_branches(
+                self.at(value), self.omega, order, known, self.harmonics, seeds=seeds, **self.options
+            )
+        except ConvergenceError as failure:
+            self.note(f"{where}: {failure}")
+            return []
+
+    def note_failures(self, diagram: BifurcationDiagram, value: float) -> None:
+        """Note the branches of a diagram that could not be followed, and stop where it was interrupted."""
+        pass_on(diagram.interruption)
+        for node in diagram:
+            for item, why in node.failures:
+                self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+
+    def carrier(self, branch: Branch, value: float, attached: Iterable[Branch]) -> Branch | None:
+        """As `carrier_of`; None, with a note, where that cannot be decided."""
+        try:
+            return carrier_of(branch, attached, self.options)
+        except (ConvergenceError, InputError) as failure:
+            self.note(f"whether a closed branch at {self.name} = {value:.6g} is isolated is open: {failure}")
+            return None
+
+    # -------------------------------------------------------------------------------------------------------- curves
+    def add(self, curve: TrackedBranch) -> list[MonotonePiece]:
+        """A curve in (omega, parameter) becomes known; its pieces."""
+        self.curves.append(curve)
+        pieces = pieces_of(curve, self.name)
+        self.pieces += pieces
+        return pieces
+
+    def piece_of(self, item: Bifurcation, value: float) -> MonotonePiece | None:
+        """The known piece that a bifurcation at a value of the parameter, or its mirror image, lies on: the nearest."""
+        gaps = [
+            (gap, piece)
+            for piece in self.pieces
+            if piece.kind == item.kind and piece.nu == item.orbit.basis.nu and piece.contains(value)
+            if (gap := gap_to(item.orbit, piece.nodes, self.name, images=True)) is not None
+        ]
+        return min(gaps, key=lambda pair: pair[0])[1] if gaps else None
+
+    def known(self, item: Bifurcation, value: float) -> MonotonePiece | None:
+        """The piece that a bifurcation lies on, followed over the parameter if it is new; None if that fails."""
+        piece = self.piece_of(item, value)
+        if piece is not None or self._is_lost(item, value):
+            return piece
+        where = f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}"
+        if len(self.curves) >= self.most:
+            self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
+            return None
+        self.progress(-1.0, where)
+        try:
+            curve = track(item, self.name, self.bounds, omega=self.omega.around, **self.options)
+            pass_on(curve.interruption)
+            self.add(curve)
+            piece = self.piece_of(item, value)
+            if piece is None:
+                self.note(f"the {where} is not on its curve")
+        except (ConvergenceError, InputError) as failure:
+            self.note(f"the {where} could not be followed over {self.name}: {failure}")
+        if piece is None:
+            self._lost.append((value, item))
+        return piece
+
+    def _is_lost(self, item: Bifurcation, value: float) -> bool:
+        return any(
+            v == value and b.kind == item.kind and abs(b.omega - item.omega) <= _SAME_OMEGA * item.omega
+            for v, b in self._lost
+        )
+
+
+def branch_through(
+    limit_point: Bifurcation,
+    omega: SearchRange,
+    name: str,
+    pieces: Iterable[MonotonePiece],
+    options: SearchOptions,
+) -> Branch:
+    """The branch over omega through a limit point, in a range that holds the limit points of pieces at that value."""
+    value = limit_point.parameter(name)
+    places = [float(piece.across(value)) for piece in pieces if piece.contains(value)]
+    return continue_branch(limit_point, "omega", omega.holding([*places, limit_point.omega]), **options)
+
+
+def motion_near(orbit: PeriodicOrbit, system: System, omega: float) -> PeriodicOrbit:
+    """The motion of a system near another one, at a frequency.
+
+    Raises
+    ------
+    ConvergenceError
+        Where Newton's method arrives at none there.
+    """
+    linear = own_linear_part(orbit)
+    if linear is not None:
+        linear = linear.rebuilt(dict(system.parameters))
+    nu = orbit.basis.nu
+    harmonics: Harmonics = orbit.adaptive or max(1, orbit.basis.harmonics // nu)
+    start = make_curve(system, "omega", omega, omega, harmonics, nu, linear)
+    point = start_point(start, omega, orbit, NewtonOptions())
+    curve = point.curve
+    assert isinstance(curve, MotionProblem)
+    x, reached, values = curve.split(point.u)
+    if abs(reached - omega) > 1e-9 * omega:
+        raise ConvergenceError(f"next to a limit point the nearest motion lies at omega = {reached:.6g}")
+    error = truncation(curve.balance.at(x, reached, values))
+    residual = float(point.evaluation.error)
+    return PeriodicOrbit(curve.balance, x.copy(), reached, dict(values), residual, error, start.adaptive)
+
+
+# ------------------------------------------------------------------------------------------------------ closed branches
+def carrier_of(branch: Branch, attached: Iterable[Branch], options: SearchOptions) -> Branch | None:
+    """Of the closed branches that one is connected with by branch points that on which the others hang; None if one of
+    them is not closed, or meets a branch that leads to the ends of the range, as those `attached` do.
+
+    Branches meet at branch points, and where motions of twice the period lead from doublings of the one to elsewhere.
+    A loop hangs on another if it turns back where it meets it, as what leaves a pitchfork does.
+
+    Raises
+    ------
+    ConvergenceError, InputError
+        If what crosses one of them at a branch point cannot be followed.
+    """
+    met, connected = list(attached), [branch]
+    for one in connected:  # which grows on the way
+        if not one.closed or one.departs is not None or one.arrives is not None:
+            return None
+        if any(_links(other, one) for other in met):
+            return None
+        for item in one.bifurcations["BP"]:
+            if any(lies_on(item.orbit, other.points) for other in met):
+                return None
+            if any(lies_on(item.orbit, other.points) for other in connected if other is not one):
+                continue
+            crossing = switch_branch(item, **options)
+            pass_on(crossing.interruption)
+            if not any(lies_on(crossing.points[len(crossing) // 2].orbit, other.points) for other in connected):
+                connected.append(crossing)
+    crossed = (one for one in connected if not any(_turns_back(one, item) for item in one.bifurcations["BP"]))
+    return next(crossed, branch)
+
+
+def _links(doubled: Branch, branch: Branch) -> bool:
+    """Whether a branch of twice the period has one end, not both, at a period doubling of another branch."""
+    first, last = doubled.options["bounds"][doubled.name]
+    doublings = branch.bifurcations["PD"]
+    ends = [
+        any(junction.same_place(item, abs(last - first), beside) for item in doublings)
+        for junction, beside in doubled.junctions
+        if junction.nu == branch.nu
+    ]
+    return sum(ends) == 1
+
+
+def _turns_back(branch: Branch, item: Bifurcation) -> bool:
+    """Whether a closed branch lies on one side, in omega, of a bifurcation that it passes."""
+    whole = float(branch.arclength[-1])
+    ahead = (branch.arclength - item.arclength) % whole
+    # points right beside it are off by less than its frequency is known
+    clear = np.flatnonzero((ahead > _CLEAR * whole) & (ahead < (1.0 - _CLEAR) * whole))
+    after, before = clear[np.argmin(ahead[clear])], clear[np.argmax(ahead[clear])]
+    return bool((branch.omega[after] - item.omega) * (branch.omega[before] - item.omega) > 0.0)

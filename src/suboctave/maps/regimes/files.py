@@ -1,0 +1,130 @@
+"""Regime maps as datasets that a file can hold, and back.
+
+The head holds `RegimeMap.to_table()`, one row for each place on a border. The curves of bifurcations are the groups
+`curve_0`, ...; the branches that stable arcs are stretches of `branch_0`, .... The JSON in `record` says the rest: the
+strips, their slices and the arcs of these, each by the branch and the indices of its points, with two edges, of which
+a border is named by its number among those of all curves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from suboctave.errors import InputError
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.maps.catalogue import Catalogue, SearchRange
+from suboctave.maps.files import map_datasets, map_record, options_of, piece_number
+from suboctave.maps.pieces import MonotonePiece, pieces_of
+from suboctave.maps.regimes.arcs import Arc, Edge
+from suboctave.maps.regimes.map import RegimeMap
+from suboctave.maps.regimes.slices import Slice
+from suboctave.maps.regimes.strips import Strip
+from suboctave.results.branch import Branch
+from suboctave.results.tracked_branch import TrackedBranch
+from suboctave.store.registry import Codec, register
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["regime_map_from_datasets", "regime_map_to_datasets"]
+
+
+def regime_map_to_datasets(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
+    """The head under the name "", curves and branches under names of their own."""
+    pieces = _pieces(regimes.curves, regimes.parameter)
+    slices = list(dict.fromkeys(strip.slice for strip in regimes.strips if strip.slice is not None))
+    places: dict[int, tuple[str, int]] = {}
+    branches: dict[str, Branch] = {f"curve_{i}": curve for i, curve in enumerate(regimes.curves)}
+    used = {id(point) for each in slices for arc in each.arcs for point in arc.points}
+    for branch in (branch for each in slices for branch, _ in each.branches):
+        points = {id(point): i for i, point in enumerate(branch.points)}
+        if used.isdisjoint(points):
+            continue
+        name = f"branch_{len(branches) - len(regimes.curves)}"
+        branches[name] = branch
+        places |= {key: (name, i) for key, i in points.items()}
+    record = {
+        "parameter": regimes.parameter,
+        "bounds": tuple(regimes.bounds),
+        "omega": tuple(regimes.omega),
+        "options": options_of(regimes.options),
+        "depth": regimes.depth,
+        "resolution": regimes.resolution,
+        "notes": regimes.notes,
+        "interruption": regimes.interruption,
+        "slices": [
+            {"value": each.value, "arcs": [_written(arc, places, pieces) for arc in each.arcs]} for each in slices
+        ],
+        "strips": [
+            (s.low, s.high, None if s.slice is None else slices.index(s.slice), s.examined) for s in regimes.strips
+        ],
+    }
+    return map_datasets(regimes.system, regimes.to_table(), record, branches, regimes.seconds)
+
+
+def _pieces(curves: Sequence[TrackedBranch], parameter: str) -> list[MonotonePiece]:
+    return [piece for curve in curves for piece in pieces_of(curve, parameter)]
+
+
+def _written(arc: Arc, places: Mapping[int, tuple[str, int]], pieces: Sequence[MonotonePiece]) -> dict[str, Any]:
+    points = [places[id(point)] for point in arc.points]
+    return {
+        "nu": arc.nu,
+        "isolated": arc.isolated,
+        "followed": arc.followed,
+        "branch": points[0][0] if points else None,
+        "points": [index for _, index in points],
+        "edges": [
+            (e.omega, None if e.border is None else piece_number(e.border, pieces), e.kind, e.bound) for e in arc.edges
+        ],
+    }
+
+
+def regime_map_from_datasets(
+    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
+) -> RegimeMap:
+    """The map that `regime_map_to_datasets` wrote; InputError where the datasets are not those of one."""
+    try:
+        record, system, branches, seconds = map_record(groups, {}, allow_code, linear)
+        curves: list[Any] = [branch for name, branch in branches.items() if name.startswith("curve_")]
+        pieces = _pieces(curves, record["parameter"])
+        catalogue = Catalogue(
+            system, record["parameter"], record["bounds"], SearchRange(*record["omega"]), "adaptive", record["options"],
+            len(curves), curves, pieces, list(record["notes"]), interruption=record["interruption"],
+        )  # fmt: skip
+        slices = [
+            Slice(
+                given["value"],
+                catalogue,
+                2 ** record["depth"],
+                branches=[
+                    (branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name
+                ],
+                arcs=[_arc(arc, branches, pieces) for arc in given["arcs"]],
+            )
+            for given in record["slices"]
+        ]
+        strips = [
+            Strip(low, high, None if number is None else slices[number], examined)
+            for low, high, number, examined in record["strips"]
+        ]
+        regimes = RegimeMap(catalogue, strips, record["depth"], record["resolution"])
+    except InputError:  # which is a ValueError
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"this is no regime map of suboctave: {type(error).__name__}: {error}") from None
+    regimes.seconds = seconds
+    return regimes
+
+
+def _arc(given: Mapping[str, Any], branches: Mapping[str, Branch], pieces: Sequence[MonotonePiece]) -> Arc:
+    first, last = (
+        Edge(omega, None if number is None else pieces[number], kind, bound)
+        for omega, number, kind, bound in given["edges"]
+    )
+    points = tuple(branches[given["branch"]].points[i] for i in given["points"])
+    return Arc(given["nu"], given["isolated"], (first, last), points, given["followed"])
+
+
+register(Codec("regime map", RegimeMap, regime_map_to_datasets, regime_map_from_datasets))

@@ -1,0 +1,265 @@
+"""The contract of an element: a force `f(u, v; c)` along one direction of the structure.
+
+An element acts on the relative displacement `u = d . x` and velocity `v = d . x'` with the force `d f(u, v; c)` on the
+left-hand side of the equation of motion. Its coefficients `c` are numbers or expressions in the system's parameters. A
+new element is a subclass that passes its coefficients to `Element.__init__` and provides the laws below as pure
+functions of arrays; `check_derivatives` compares them with finite differences. Forces that depend on several
+displacements, or on time, are in `coupled`.
+"""
+
+from __future__ import annotations
+
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from suboctave.errors import InputError, located
+from suboctave.model.description import Recorded
+from suboctave.model.differences import central_difference, step_of
+from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
+from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling
+from suboctave.model.expressions.coefficients import Coefficient, coefficient
+
+__all__ = ["Array", "BaseElement", "Dof", "Element", "Place"]
+
+Array: TypeAlias = NDArray[np.float64]
+Dof: TypeAlias = int | Sequence[int]
+
+
+class Place:
+    """Where something acts: `dof=i` along `e_i`, `dof=(i, j)` along `e_i - e_j`, or any `direction` vector."""
+
+    def __init__(self, owner: str, dof: Dof | None, direction: ArrayLike | None) -> None:
+        self.owner = owner
+        if (dof is None) == (direction is None):
+            raise InputError(f"{owner} needs either dof= (one index, or a pair) or direction= (a vector), not both")
+        with located("dof"):
+            self.dofs: tuple[int, ...] = () if dof is None else self._read_dofs(dof)
+        with located("direction"):
+            self.vector: Array | None = None if direction is None else self._read_vector(direction)
+
+    def _read_dofs(self, dof: Dof) -> tuple[int, ...]:
+        given: Any = dof
+        entries = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
+        try:
+            dofs = tuple(operator.index(entry) for entry in entries)
+        except TypeError:
+            raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}") from None
+        if len(dofs) not in (1, 2) or any(isinstance(entry, bool) for entry in entries):
+            raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}")
+        if min(dofs) < 0:
+            raise InputError(f"{self.owner}: dof {min(dofs)} is negative; degrees of freedom count from 0")
+        if len(set(dofs)) < len(dofs):
+            raise InputError(f"{self.owner}: dof={dofs} couples a degree of freedom with itself")
+        return dofs
+
+    def _read_vector(self, direction: ArrayLike) -> Array:
+        try:
+            vector = np.array(direction, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            vector = np.zeros(0)
+        if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
+            raise InputError(f"{self.owner}: direction must be a vector of finite numbers, not all zero")
+        vector.setflags(write=False)
+        return vector
+
+    def direction(self, n: int) -> Array:
+        """The direction (n,) in a structure of n degrees of freedom; an `InputError` if it does not fit."""
+        if self.vector is not None:
+            if len(self.vector) != n:
+                text = f"{self.owner}: direction has {len(self.vector)} entries, the structure {n} DOFs"
+                raise InputError(text, ("direction",))
+            return self.vector.copy()
+        if max(self.dofs) >= n:
+            there = "only DOF 0" if n == 1 else f"DOFs 0 to {n - 1}"
+            raise InputError(f"{self.owner}: dof {max(self.dofs)} does not exist; the structure has {there}", ("dof",))
+        result = np.zeros(n)
+        for dof, sign in zip(self.dofs, (1.0, -1.0), strict=False):
+            result[dof] = sign
+        return result
+
+    def __str__(self) -> str:
+        if self.vector is not None:
+            shown = ", ".join(f"{entry:g}" for entry in self.vector[:4]) + (", ..." if len(self.vector) > 4 else "")
+            return f"direction=[{shown}]"
+        return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
+
+
+class BaseElement(Recorded, ABC, family="element"):
+    """What all elements have in common: where they act, and their coefficients. Immutable by convention.
+
+    own_nodes
+        Whether it is integrated at instants of its own, chosen for it alone (`sampling` tells them), instead of
+        together with the others along the same direction.
+    """
+
+    coefficient_names: tuple[str, ...] = ()
+    depends_on_velocity: bool = False
+    depends_on_time: bool = False
+    own_nodes: bool = False
+
+    def __init__(
+        self,
+        dof: Dof | None = None,
+        coefficients: Sequence[float | str | Coefficient] = (),
+        *,
+        direction: ArrayLike | None = None,
+    ) -> None:
+        kind = type(self).__name__
+        self.place = Place(kind, dof, direction)
+        if len(coefficients) != len(self.coefficient_names):
+            raise InputError(f"{kind} takes {len(self.coefficient_names)} coefficients, got {len(coefficients)}")
+        read = []
+        for name, source in zip(self.coefficient_names, coefficients, strict=True):
+            try:
+                read.append(coefficient(source))
+            except InputError as error:
+                raise InputError(f"{kind}({self.place}), {name}: {error}", (name,)) from None
+        self.coefficients: tuple[Coefficient, ...] = tuple(read)
+        self._constant = np.array([c.value({}) if c.constant else np.nan for c in read])
+        self._varying = tuple((i, c) for i, c in enumerate(read) if not c.constant)
+
+    @property
+    def label(self) -> str:
+        """How messages name this element."""
+        return f"{type(self).__name__}({self.place})"
+
+    def direction(self, n: int) -> Array:
+        """The vector (n,) with `u = direction . x`."""
+        return self.place.direction(n)
+
+    def coefficient_values(self, values: Mapping[str, float]) -> Array:
+        """The coefficients (nc,) at these values of the parameters."""
+        c = self._constant.copy()
+        for i, source in self._varying:
+            c[i] = source.value(values)
+        return c
+
+    def parameter_rates(self, values: Mapping[str, float], rates: Mapping[str, float]) -> Array:
+        """First change of the coefficients along parameter changes, shape (nc,)."""
+        result = np.zeros(len(self.coefficients))
+        for i, source in self._varying:
+            for name, rate in rates.items():
+                if name in source.names:
+                    result[i] += source.derivative(name).value(values) * rate
+        return result
+
+    def parameter_curvature(self, values: Mapping[str, float], a: Mapping[str, float], b: Mapping[str, float]) -> Array:
+        """Second change of the coefficients along two parameter changes, shape (nc,)."""
+        result = np.zeros(len(self.coefficients))
+        for i, source in self._varying:
+            for first in source.names.intersection(a):
+                slope = source.derivative(first)
+                for second in slope.names.intersection(b):
+                    result[i] += slope.derivative(second).value(values) * a[first] * b[second]
+        return result
+
+    def level_rates(self, c: Array) -> Array:
+        """Derivatives of the levels at which the law has corners or is sharp by its coefficients, (levels, nc).
+
+        Points before velocities. What `sampling` says are the levels alone, hence differences of fourth order in steps
+        of 1e-3 of a coefficient: exact for levels that are polynomials of it, to about 1e-12 else. Zero where the
+        number of levels changes.
+        """
+
+        def levels(at: Array) -> Array:
+            kind = self.sampling(at)
+            return np.array([*getattr(kind, "points", ()), *getattr(kind, "velocities", ())])
+
+        rates = np.zeros((len(levels(c)), len(c)))
+        for i, value in enumerate(c):
+            h = 1e-3 * (abs(float(value)) or 1.0)
+            near = []
+            for share in (1.0, -1.0, 2.0, -2.0):
+                moved = c.copy()
+                moved[i] += share * h
+                near.append(levels(moved))
+            if {len(there) for there in near} == {len(rates)}:
+                rates[:, i] = (8.0 * (near[0] - near[1]) - (near[2] - near[3])) / (12.0 * h)
+        return rates
+
+    def check(self, values: Mapping[str, float], first: bool) -> None:
+        """Refuse coefficients that make no sense at a system's parameters.
+
+        Called with `first=True` when a system is made, with False when it is given other parameters.
+        """
+
+    @abstractmethod
+    def sampling(self, c: Array) -> Sampling:
+        """How smooth the law is at these coefficients."""
+
+    def batch_form(self, c: Array) -> BatchForm:
+        """The law as code for the integration of many trajectories; default: `tangent` is called back."""
+        return CalledBack(self, c)
+
+    def __repr__(self) -> str:
+        shown = [str(self.place)]
+        shown += [f"{name}={c.text}" for name, c in zip(self.coefficient_names, self.coefficients, strict=True)]
+        return f"{type(self).__name__}({', '.join(shown + self._options())})"
+
+    def _options(self) -> list[str]:
+        return []
+
+
+class Element(BaseElement):
+    """A nonlinear force along one direction. Subclasses are immutable by convention.
+
+    A subclass sets `coefficient_names` (on the class, or on the object before `Element.__init__`) and, if its force
+    depends on velocity, `depends_on_velocity = True`. Below, `u`, `v` are arrays (N,) and `c` is (nc,).
+    """
+
+    @abstractmethod
+    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array | None]:
+        """`(f, f_u, f_v)`, (N,) each; `f_v` is None for a law without velocity."""
+
+    @abstractmethod
+    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array | None, Array | None]:
+        """`(f_uu, f_uv, f_vv)`, (N,) each; the last two are None for a law without velocity."""
+
+    @abstractmethod
+    def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array | None]:
+        """`(f_c, f_uc, f_vc)`, (nc, N) each; `f_vc` is None for a law without velocity."""
+
+    def coefficient_change(self, u: Array, v: Array, c: Array, rates: Array) -> tuple[Array, Array, Array | None]:
+        """What a change of the coefficients, `rates` (nc,), does to `(f, f_u, f_v)`, (N,) each."""
+        f_c, f_uc, f_vc = self.coefficient_tangent(u, v, c)
+        return rates @ f_c, rates @ f_uc, None if f_vc is None else rates @ f_vc
+
+    def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
+        """Rates of the numbers of a law that is a sum of arctan steps, in their places, along a change of the
+        coefficients, `rates` (nc,); None where they are not known.
+        """
+        return None
+
+    @abstractmethod
+    def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
+        """`f_cc`, (nc, nc, N)."""
+
+    def batch_form(self, c: Array) -> BatchForm:
+        """See `BaseElement.batch_form`; default: the law that `sampling` declares."""
+        return super().batch_form(c) if self.depends_on_velocity else form_of_sampling(self, c)
+
+    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, Array | None, Array | None, Array | None]:
+        """`(f_uuu, f_uuv, f_uvv, f_vvv)`, (N,) each; the last three are None for a law without velocity.
+
+        Unless a subclass knows better: differences of `curvature`, good for about eight digits of smooth laws.
+        """
+        kind = self.sampling(c)
+        narrow = min(kind.widths, default=np.inf) if isinstance(kind, SharpSampling) else np.inf
+        f_uuu = central_difference(lambda h: self.curvature(u + h, v, c)[0], step_of(u, narrow))
+        if not self.depends_on_velocity:
+            return f_uuu, None, None, None
+        slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
+        by_v = central_difference(lambda h: np.array(self.curvature(u, v + h, c)), step_of(v, slow))
+        return f_uuu, by_v[0], by_v[1], by_v[2]
+
+
+def required(owner: str, **given: Any) -> None:
+    """Refuse arguments that were left out (they follow the optional `dof`, so Python cannot)."""
+    missing = [name for name, value in given.items() if value is None]
+    if missing:
+        raise InputError(f"{owner} needs {' and '.join(missing)}")

@@ -1,0 +1,341 @@
+"""The batch form of a law: text of scalar code, for integrators that are generated for one system.
+
+An element's `batch_form` gives its law with all derivatives, as Newton's method needs it, or with the corners frozen:
+what lies beyond a corner is then a flag that an integrator of high order sets, and the force is smooth across the
+corner. A law without a batch form of its own is called back, which is slower by a factor of a thousand.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.model.elements.smoothness import (
+    CornerSampling,
+    PiecewiseLinear,
+    PolynomialSampling,
+    Sampling,
+    SharpSampling,
+)
+
+__all__ = [
+    "BatchForm",
+    "CalledBack",
+    "Names",
+    "QuadraticForm",
+    "Tangent",
+    "TanhForm",
+    "WrittenForm",
+    "form_of_sampling",
+    "switches",
+]
+
+
+Array = NDArray[np.float64]
+
+
+class _Element(Protocol):
+    """What a form needs of its element."""
+
+    def sampling(self, c: Array) -> Sampling: ...
+
+
+@dataclass(frozen=True)
+class Names:
+    """What the arguments of a law are called: displacements, rates, their rates, numbers, and a prefix for new
+    names."""
+
+    q: Sequence[str]
+    r: Sequence[str]
+    number: Callable[[int], str]
+    prefix: str
+    on: Callable[[int], str] = lambda i: f"on[{i}]"
+    a: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Lines of code, then the expressions of the force and of its derivatives ("" where they are zero)."""
+
+    lines: list[str]
+    force: str
+    by_q: list[str]
+    by_r: list[str]
+
+
+class BatchForm(ABC):
+    """The law of one element as code.
+
+    `count` numbers depend on the parameters, `corners` are places that an integrator may locate; `has_code` is False
+    where the element's `tangent` is called back instead.
+    """
+
+    count: int = 0
+    corners: int = 0
+    has_code = True
+
+    @abstractmethod
+    def numbers(self, c: Array) -> list[float]:
+        """The numbers of the code, from the coefficients of the element."""
+
+    @abstractmethod
+    def tangent(self, names: Names) -> Tangent:
+        """Force and derivatives."""
+
+    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
+        """Force and, with `slopes`, derivatives while no flag `names.on(i)` changes (1.0 beyond the corner, where its
+        margin is positive).
+        """
+        return self.tangent(names)
+
+    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
+        """Lines of code, then what changes sign at corner i, and its rate."""
+        raise IndexError(i)
+
+
+class PolynomialForm(BatchForm):
+    """`sum_p c_p u^p`."""
+
+    def __init__(self, element: _Element, degree: int) -> None:
+        self.element = element
+        self.count = degree + 1
+
+    def numbers(self, c: Array) -> list[float]:
+        sampling = self.element.sampling(c)
+        assert isinstance(sampling, PolynomialSampling)
+        assert sampling.coefficients is not None
+        return list(sampling.coefficients)
+
+    def tangent(self, names: Names) -> Tangent:
+        top, u = self.count - 1, names.q[0]
+        force, slope = names.number(top), f"{float(top)} * {names.number(top)}"
+        for power in range(top - 1, -1, -1):
+            force = f"({force}) * {u} + {names.number(power)}"
+            if power:
+                slope = f"({slope}) * {u} + {float(power)} * {names.number(power)}"
+        return Tangent([], force, [slope], [""])
+
+
+class ArctanForm(BatchForm):
+    """`constant + slope u + sum_i k_i / pi [y_i atan(s_i y_i) - ln(1 + (s_i y_i)^2) / (2 s_i)]`, y_i = u - b_i."""
+
+    def __init__(self, element: _Element, steps: int) -> None:
+        self.element = element
+        self.steps = self.corners = steps
+        self.count = 2 + 4 * steps
+
+    def numbers(self, c: Array) -> list[float]:
+        sampling = self.element.sampling(c)
+        assert isinstance(sampling, SharpSampling)
+        assert sampling.steps is not None
+        out = [sampling.constant, sampling.slope]
+        for point, width, step in zip(sampling.points, sampling.widths, sampling.steps, strict=True):
+            out += [point, 1.0 / width, step / math.pi, 0.5 * step * width / math.pi]
+        return out
+
+    def tangent(self, names: Names) -> Tangent:
+        u, c, p = names.q[0], names.number, names.prefix
+        lines, force, slope = [], f"{c(0)} + {c(1)} * {u}", c(1)
+        for i in range(self.steps):
+            b = 2 + 4 * i
+            lines.append(f"{p}y{i} = {u} - {c(b)}")
+            lines.append(f"{p}a{i}, {p}l{i} = arctan_log({c(b + 1)} * {p}y{i})")
+            force += f" + ({c(b + 2)} * {p}y{i} * {p}a{i} - {c(b + 3)} * {p}l{i})"
+            slope += f" + {c(b + 2)} * {p}a{i}"
+        return Tangent(lines, force, [slope], [""])
+
+    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
+        return [], f"{names.q[0]} - {names.number(2 + 4 * i)}", names.r[0]
+
+
+class PiecesForm(BatchForm):
+    """Springs on half-lines, `k_i (u - b_i)` where `side_i (u - b_i) > 0`."""
+
+    def __init__(self, element: _Element, sides: Sequence[int]) -> None:
+        self.element = element
+        self.sides = tuple(sides)
+        self.corners = len(self.sides)
+        self.count = 2 * self.corners
+
+    def numbers(self, c: Array) -> list[float]:
+        sampling = self.element.sampling(c)
+        assert isinstance(sampling, PiecewiseLinear)
+        return [float(c[index]) for piece in sampling.pieces for index in (piece.stiffness, piece.gap)]
+
+    def tangent(self, names: Names) -> Tangent:
+        lines, force, slope = [], [], []
+        p = names.prefix
+        for i, side in enumerate(self.sides):
+            k, y = names.number(2 * i), f"{p}y{i}"
+            beyond = f"{y} > 0.0" if side > 0 else f"{y} < 0.0"
+            lines.append(f"{y} = {names.q[0]} - {names.number(2 * i + 1)}")
+            force.append(f"({k} * {y} if {beyond} else 0.0)")
+            slope.append(f"({k} if {beyond} else 0.0)")
+        return Tangent(lines, " + ".join(force), [" + ".join(slope)], [""])
+
+    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
+        u, c = names.q[0], names.number
+        stiffness = [f"{names.on(i)} * {c(2 * i)}" for i in range(self.corners)]
+        force = " + ".join(f"{k} * ({u} - {c(2 * i + 1)})" for i, k in enumerate(stiffness))
+        return Tangent([], force, [" + ".join(stiffness)], [""])
+
+    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
+        sign = "" if self.sides[i] > 0 else "-"
+        return [], f"{sign}({names.q[0]} - {names.number(2 * i + 1)})", f"{sign}{names.r[0]}"
+
+
+class QuadraticForm(BatchForm):
+    """`c v |v|`."""
+
+    count = corners = 1
+
+    def numbers(self, c: Array) -> list[float]:
+        return [float(c[0])]
+
+    def tangent(self, names: Names) -> Tangent:
+        c, v = names.number(0), names.r[0]
+        return Tangent([], f"{c} * {v} * abs({v})", [""], [f"2.0 * {c} * abs({v})"])
+
+    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
+        c, v, sign = names.number(0), names.r[0], f"(2.0 * {names.on(0)} - 1.0)"
+        return Tangent([], f"{sign} * {c} * {v} * {v}", [""], [f"{sign} * 2.0 * {c} * {v}"])
+
+    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
+        return [], names.r[0], names.a[0]
+
+
+class TanhForm(BatchForm):
+    """`force tanh(v / velocity)`."""
+
+    count = 2
+
+    def numbers(self, c: Array) -> list[float]:
+        return [float(c[0]), 1.0 / float(c[1])]
+
+    def tangent(self, names: Names) -> Tangent:
+        t = f"{names.prefix}t"
+        force, sharp = names.number(0), names.number(1)
+        return Tangent(
+            [f"{t} = tanh({names.r[0]} * {sharp})"],
+            f"{force} * {t}",
+            [""],
+            [f"{force} * {sharp} * (1.0 - {t} * {t})"],
+        )
+
+
+class WrittenForm(BatchForm):
+    """A force given as text, from its SymPy expression."""
+
+    def __init__(self, law: Any) -> None:
+        from suboctave.model.expressions.derivatives import CORNER_FUNCTIONS
+
+        self.law = law
+        self.count = len(law.c)
+        self.moving = law.depends_on_velocity
+        states = {*law.q, law.phase}
+        atoms = law.expression.atoms(*CORNER_FUNCTIONS)
+        self.places = sorted({atom.args[0] for atom in atoms if atom.free_symbols & states}, key=str)
+        self.corners = len(self.places)
+
+    def numbers(self, c: Array) -> list[float]:
+        return [float(value) for value in c]
+
+    def _states(self, names: Names) -> list[str]:
+        return [*names.q, *(names.r if self.moving else ())]
+
+    def _code(self, parts: list[Any], names: Names, flags: dict[str, str] | None = None) -> tuple[list[str], list[str]]:
+        return self.law.scalar_code(parts, self._states(names), names.number, names.prefix, flags or {})
+
+    def tangent(self, names: Names) -> Tangent:
+        return self._tangent(self.law.expression, names, {}, True)
+
+    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
+        expression, flags = self._frozen(names)
+        return self._tangent(expression, names, flags, slopes)
+
+    def _tangent(self, f: Any, names: Names, flags: dict[str, str], slopes: bool) -> Tangent:
+        count = self.law.count
+        lines, (force, *by) = self._code([f, *(f.diff(a) for a in self.law.q if slopes)], names, flags)
+        by = by or [""] * count
+        return Tangent(lines, force, by[:count], by[count:] if self.moving and slopes else [""] * count)
+
+    def _frozen(self, names: Names) -> tuple[Any, dict[str, str]]:
+        """The expression with flags for what lies beyond its corners, and the code of the flags."""
+        import sympy
+
+        from suboctave.model.expressions.derivatives import Modulus, Ramp, Sign, Step
+
+        if self.law.rough:  # a power of a half that begins at a corner does not go on beyond it
+            return self.law.expression, {}
+        swaps: dict[Any, Any] = {}
+        flags: dict[str, str] = {}
+        for i, a in enumerate(self.places):
+            on = sympy.Symbol(f"(on {i})")
+            flags[on.name] = names.on(i)
+            swaps |= {Ramp(a): a * on, Step(a): on}
+            swaps |= {Modulus(a): a * (2 * on - 1), Sign(a): 2 * on - 1}
+        return self.law.expression.xreplace(swaps), flags
+
+    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
+        place = self.places[i]
+        rates = [*names.r, *(names.a if self.moving else ())]
+        parts = [place, *(place.diff(q) for q in self.law.q), place.diff(self.law.phase)]
+        lines, texts = self._code(parts, names)
+        terms = [f"({slope}) * {rate}" for slope, rate in zip(texts[1:-1], rates, strict=True) if slope != "0.0"]
+        if texts[-1] != "0.0":
+            terms.append(f"({texts[-1]}) * omega")
+        return lines, texts[0], " + ".join(terms) or "0.0"
+
+
+class CalledBack(BatchForm):
+    """A law that only its element knows: its `tangent` is called.
+
+    Its corners, if it declares any of its (first) displacement, are located.
+    """
+
+    has_code = False
+
+    def __init__(self, element: _Element, c: Array) -> None:
+        self.element = element
+        self.corners = len(switches(element.sampling(c), c))
+        self.count = self.corners + len(c)
+
+    def numbers(self, c: Array) -> list[float]:
+        places = [place for place, _, _ in switches(self.element.sampling(c), c)] + [math.inf] * self.corners
+        return [*places[: self.corners], *(float(value) for value in c)]
+
+    def tangent(self, names: Names) -> Tangent:
+        raise TypeError("a law that is called back has no code")
+
+    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
+        return [], f"{names.q[0]} - {names.number(i)}", names.r[0]
+
+
+def switches(sampling: Sampling, c: Array) -> list[tuple[float, int, float | None]]:
+    """Displacements at which a law changes or is sharp: (place, side, stiffness of the piece beyond it).
+
+    A piece acts while `side (u - place) > 0`; without a stiffness the law is smooth but for the place itself.
+    """
+    if isinstance(sampling, PiecewiseLinear):
+        return [(float(c[piece.gap]), piece.side, float(c[piece.stiffness])) for piece in sampling.pieces]
+    if isinstance(sampling, SharpSampling | CornerSampling):
+        return [(float(place), 1, None) for place in sampling.points]
+    return []
+
+
+def form_of_sampling(element: _Element, c: Array) -> BatchForm:
+    """The law of one displacement as its smoothness class gives it, else called back."""
+    sampling = element.sampling(c)
+    if isinstance(sampling, PolynomialSampling) and sampling.coefficients is not None:
+        return PolynomialForm(element, sampling.degree)
+    if isinstance(sampling, SharpSampling) and sampling.steps is not None:
+        return ArctanForm(element, len(sampling.steps))
+    if isinstance(sampling, PiecewiseLinear):
+        return PiecesForm(element, [piece.side for piece in sampling.pieces])
+    return CalledBack(element, c)

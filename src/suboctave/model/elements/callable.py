@@ -1,0 +1,229 @@
+"""Forces given as Python functions: `Callable(0, lambda x, v, k: k * np.sinh(x), {"k": "k0"})`."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections.abc import Callable as Function, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError, shortened
+from suboctave.model.differences import central_difference, step_of
+from suboctave.model.elements.base import Array, Dof, Element, required
+from suboctave.model.elements.smoothness import AdaptiveSampling
+from suboctave.model.expressions.coefficients import Coefficient
+
+__all__ = ["Callable"]
+
+Number = float | str | Coefficient
+#: step of complex differences
+_COMPLEX = 1e-30
+_CHECKED, _AGREE = 9, 1e-6
+#: by which factors that step is shortened until two differences agree, which they do not while a corner lies between
+_SHORTER = (1.0, 0.1, 0.01)
+#: scales of the motions at which given derivatives are checked: what is sharp about zero is seen at the small ones
+_SCALES = (1.0, 0.1, 0.01, 0.001)
+#: how far given derivatives may be from differences, relative to the largest force and slope
+_GIVEN = 1e-5
+#: held while the filters of warnings are changed, which are those of the process
+_filtering = threading.RLock()
+
+
+class Callable(Element):
+    """A force given as a Python function `f(x, v, *coefficients)` of arrays (N,), at `dof` or along `direction`.
+
+    `coefficients` are handed over after displacement and velocity, in their order: `{name: number or expression}`.
+    `derivatives` may give `(f_x, f_v)` as a function of the same arguments; they are held against differences where
+    these settle, which they do not across a corner (`x |x|`). Otherwise they are taken by complex steps, exact to
+    rounding, if the function is found to bear them, else by differences of fourth order (`accuracy` tells, relative to
+    the force's own scale: 1e-15 or about 1e-10). Second derivatives are differences of the first, good for about nine
+    (six) digits: enough for Newton's method at bifurcations, not for normal forms of high order.
+
+    The function must be smooth or at least continuous, depend on its arguments alone, and return real arrays of the
+    shape of x. It is called often; a law that can be written as text is faster as `Expression`.
+    """
+
+    depends_on_velocity = True
+
+    def __init__(
+        self,
+        dof: Dof | None = None,
+        function: Function[..., Any] | None = None,
+        coefficients: Mapping[str, Number] | None = None,
+        derivatives: Function[..., tuple[Any, Any]] | None = None,
+        *,
+        direction: ArrayLike | None = None,
+    ) -> None:
+        required("Callable", function=function)
+        for what, given in (("function", function), ("derivatives", derivatives)):
+            if given is not None and not callable(given):
+                raise InputError(f"Callable: {what} must be a function of arrays, not {given!r}")
+        named: Sequence[str] = tuple(coefficients or {})
+        self.coefficient_names = tuple(named)
+        super().__init__(dof, list((coefficients or {}).values()), direction=direction)
+        assert function is not None
+        self.function, self.derivatives = function, derivatives
+        self._complex = False
+        self._complex = derivatives is None and self._bears_complex()
+
+    @property
+    def label(self) -> str:
+        """How messages name this element."""
+        return f"Callable({self.place}, {getattr(self.function, '__name__', 'function')})"
+
+    @property
+    def accuracy(self) -> float:
+        """Relative accuracy of the first derivatives."""
+        return 1e-15 if self._complex or self.derivatives is not None else 1e-10
+
+    def check(self, values: Mapping[str, float], first: bool) -> None:
+        """Refuse a function that fails, or does not return finite numbers, or derivatives that are not its own."""
+        if not first:
+            return
+        u, v = self._draws()
+        c = self.coefficient_values(values)
+        f = self._value(u, v, c)
+        if not np.all(np.isfinite(f)):
+            raise InputError(f"{self.label}: the force is not finite for displacements and velocities between -1 and 1")
+        if self.derivatives is not None:
+            scales = np.repeat(_SCALES, len(u))
+            self._check_given(scales * np.tile(u, len(_SCALES)), scales * np.tile(v, len(_SCALES)), c)
+
+    def _check_given(self, u: Array, v: Array, c: Array) -> None:
+        """Refuse derivatives that are not those of the force wherever differences settle: not across a corner."""
+        f = self._value(u, v, c)
+        finer = [self._differences(u, v, c, factor) for factor in _SHORTER]
+        for i, (name, given) in enumerate(zip("xv", self._given(u, v, c), strict=True)):
+            if not np.all(np.isfinite(given)):
+                raise InputError(f"{self.label}: f_{name} from derivatives= is not finite between -1 and 1")
+            steps = np.array([pair[i] for pair in finer])
+            apart = np.abs(np.diff(steps, axis=0))
+            best = np.argmin(apart, axis=0)
+            settled, doubt = (np.take_along_axis(x, best[None], axis=0)[0] for x in (steps[1:], apart))
+            size = max(float(np.abs(f).max()), float(np.nanmax(np.abs(given))))
+            wrong = np.flatnonzero(np.abs(given - settled) > _GIVEN * size + doubt)
+            if wrong.size:
+                k = wrong[0]
+                raise InputError(
+                    f"{self.label}: f_{name} from derivatives= is not the derivative of the force: at x = {u[k]:.4g}, "
+                    f"v = {v[k]:.4g} it gives {given[k]:.6g}, differences give {settled[k]:.6g}"
+                )
+
+    def _draws(self) -> tuple[Array, Array]:
+        angles = np.arange(1, _CHECKED + 1)
+        return np.sin(1.3 * angles), np.cos(2.1 * angles)
+
+    def _bears_complex(self) -> bool:
+        """Whether complex arguments give what differences give, and the same real part."""
+        u, v = self._draws()
+        c = np.where(np.isnan(self._constant), 0.7, self._constant)
+        try:
+            with _filtering, np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
+                real = np.asarray(self.function(u, v, *c))
+                for arguments in ((u + 1j * _COMPLEX, v), (u, v + 1j * _COMPLEX)):
+                    got = np.asarray(self.function(*arguments, *c))
+                    if got.shape != u.shape or not np.allclose(got.real, real, rtol=1e-12, atol=0.0, equal_nan=True):
+                        return False
+                self._complex = True
+                exact = self._slopes(u, v, c)
+                self._complex = False
+                rough = self._slopes(u, v, c)
+        except Exception:  # the user's function may raise anything on complex numbers
+            return False
+        size = float(np.nanmax(np.abs(real), initial=0.0)) + max(
+            float(np.nanmax(np.abs(r), initial=0.0)) for r in rough
+        )
+        # a function that drops imaginary parts has slopes of zero; corners between the points may disagree elsewhere
+        return all(float(np.nanmedian(np.abs(a - b))) <= _AGREE * size for a, b in zip(exact, rough, strict=True))
+
+    def _value(self, u: Array, v: Array, c: Array) -> Array:
+        try:
+            f = np.asarray(self.function(u, v, *c))
+            if f.dtype.kind not in "biufc":
+                raise TypeError(f"it returned {shortened(f.tolist())}, no numbers")
+        except Exception as error:
+            raise InputError(f"{self.label}: the function failed with {type(error).__name__}: {error}") from error
+        if np.iscomplexobj(f) or f.shape != u.shape:
+            if f.shape == () and not np.iscomplexobj(f):
+                return np.full(u.shape, float(f))
+            raise InputError(
+                f"{self.label}: the function must return real arrays of shape {u.shape}, not {f.dtype} {f.shape}"
+            )
+        return f.astype(float)
+
+    def _given(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
+        assert self.derivatives is not None
+        try:
+            f_u, f_v = self.derivatives(u, v, *c)
+            return np.broadcast_to(np.asarray(f_u, float), u.shape), np.broadcast_to(np.asarray(f_v, float), u.shape)
+        except Exception as error:
+            raise InputError(
+                f"{self.label}: derivatives= must return (f_x, f_v), two real arrays of shape {u.shape}; "
+                f"{type(error).__name__}: {error}"
+            ) from error
+
+    def _slopes(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
+        """`(f_u, f_v)`."""
+        if self.derivatives is not None:
+            return self._given(u, v, c)
+        if self._complex:
+            h = _COMPLEX
+            return (
+                np.imag(self.function(u + 1j * h, v, *c)) / h * np.ones_like(u),
+                np.imag(self.function(u, v + 1j * h, *c)) / h * np.ones_like(u),
+            )
+        return self._differences(u, v, c)
+
+    def _differences(self, u: Array, v: Array, c: Array, factor: float = 1.0) -> tuple[Array, Array]:
+        """`(f_u, f_v)` by differences of the force, their steps shortened by a factor."""
+        return (
+            central_difference(lambda h: self._value(u + h, v, c), factor * step_of(u)),
+            central_difference(lambda h: self._value(u, v + h, c), factor * step_of(v)),
+        )
+
+    def sampling(self, c: Array) -> AdaptiveSampling:
+        """Nothing is known of a function."""
+        return AdaptiveSampling()
+
+    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `Element.tangent`."""
+        return (self._value(u, v, c), *self._slopes(u, v, c))
+
+    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `Element.curvature`; by differences."""
+        f_uu = central_difference(lambda h: self._slopes(u + h, v, c)[0], step_of(u))
+        f_uv = central_difference(lambda h: self._slopes(u, v + h, c)[0], step_of(v))
+        f_vv = central_difference(lambda h: self._slopes(u, v + h, c)[1], step_of(v))
+        return f_uu, f_uv, f_vv
+
+    def _shifted(self, c: Array, i: int, h: float) -> Array:
+        moved = c.copy()
+        moved[i] += h
+        return moved
+
+    def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `Element.coefficient_tangent`; by differences."""
+        out = np.zeros((3, len(c), len(u)))
+        for i, value in enumerate(c):
+
+            def law(h: float, i: int = i) -> Array:
+                moved = self._shifted(c, i, h)
+                return np.array([self._value(u, v, moved), *self._slopes(u, v, moved)])
+
+            out[:, i] = central_difference(law, step_of(value))
+        return out[0], out[1], out[2]
+
+    def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
+        """See `Element.coefficient_curvature`; by differences."""
+        out = np.zeros((len(c), len(c), len(u)))
+        for i, value in enumerate(c):
+
+            def law(h: float, i: int = i) -> Array:
+                return self.coefficient_tangent(u, v, self._shifted(c, i, h))[0]
+
+            out[i] = central_difference(law, step_of(value))
+        return 0.5 * (out + out.transpose(1, 0, 2))

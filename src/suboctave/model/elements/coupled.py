@@ -1,0 +1,131 @@
+"""The contract of forces that depend on several displacements and velocities, or on time: `f(q, theta; c)`.
+
+A coupled element acts along its own direction d_out with the force `f`, on the left-hand side of the equation of
+motion. It reads the displacements `u_i = d_i . x` along its inputs d_1 .. d_m and, if it depends on velocity, their
+rates v_i: together `q = (u_1, .., u_m, v_1, .., v_m)`. Time enters as the phase of the load, `theta = omega t`, and
+periodically: `f(q, theta + 2 pi) = f(q, theta)`. That is parametric excitation: stiffness that varies in time.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError
+from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Place
+from suboctave.model.expressions.coefficients import Coefficient
+
+__all__ = ["CoupledElement", "as_coupled", "reads"]
+
+
+class CoupledElement(BaseElement):
+    """A nonlinear force along one direction that depends on several displacements and velocities, or on time.
+
+    `inputs`: one entry per displacement that the force reads: a DOF, a pair `(i, j)` for `x_i - x_j`, or a vector (with
+    decimal points or as an array: two whole numbers are a pair). A subclass provides the laws below as pure functions
+    of q (Q, N), theta (N,) and c (nc,); Q is m, or 2 m for a law that `depends_on_velocity`. `time_harmonic` is the
+    highest multiple of the load's frequency in a law that `depends_on_time`.
+    """
+
+    own_nodes = True
+    time_harmonic: int = 0
+
+    def __init__(
+        self,
+        dof: Dof | None = None,
+        inputs: Sequence[Dof | ArrayLike] = (),
+        coefficients: Sequence[float | str | Coefficient] = (),
+        *,
+        direction: ArrayLike | None = None,
+    ) -> None:
+        super().__init__(dof, coefficients, direction=direction)
+        if not len(inputs):
+            raise InputError(f"{self.label} needs inputs: the displacements that its force depends on")
+        self.count = len(inputs)
+        self.input_places = tuple(_input_place(self.label, given) for given in inputs)
+
+    def inputs(self, n: int) -> Array:
+        """Directions (m, n) of the displacements that the force reads."""
+        return np.array([place.direction(n) for place in self.input_places])
+
+    @abstractmethod
+    def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
+        """`(f, f_q)`, shapes (N,), (Q, N)."""
+
+    @abstractmethod
+    def curvature(self, q: Array, theta: Array, c: Array) -> Array:
+        """`f_qq`, (Q, Q, N)."""
+
+    @abstractmethod
+    def third(self, q: Array, theta: Array, c: Array) -> Array:
+        """`f_qqq`, (Q, Q, Q, N)."""
+
+    @abstractmethod
+    def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
+        """`(f_c, f_qc)`, shapes (nc, N), (nc, Q, N)."""
+
+    @abstractmethod
+    def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
+        """`f_cc`, (nc, nc, N)."""
+
+
+def _input_place(owner: str, given: Any) -> Place:
+    is_vector = isinstance(given, np.ndarray) or (
+        isinstance(given, Sequence) and any(not isinstance(entry, int | np.integer) for entry in given)
+    )
+    return Place(f"{owner}, inputs", None, given) if is_vector else Place(f"{owner}, inputs", given, None)
+
+
+class _OneInput:
+    """An element with one input in the form of a coupled one: q = (u,) or (u, v)."""
+
+    time_harmonic = 0
+
+    def __init__(self, element: Element) -> None:
+        self.element = element
+        self.count = 1
+        self._moving = element.depends_on_velocity
+
+    def inputs(self, n: int) -> Array:
+        return self.element.direction(n)[None]
+
+    def _state(self, q: Array) -> tuple[Array, Array]:
+        return q[0], q[1] if self._moving else np.zeros_like(q[0])
+
+    def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
+        f, *rest = self.element.tangent(*self._state(q), c)
+        return f, np.array(rest[: 1 + self._moving])
+
+    def curvature(self, q: Array, theta: Array, c: Array) -> Array:
+        f_uu, f_uv, f_vv = self.element.curvature(*self._state(q), c)
+        return np.array([[f_uu, f_uv], [f_uv, f_vv]]) if self._moving else np.array([[f_uu]])
+
+    def third(self, q: Array, theta: Array, c: Array) -> Array:
+        f_uuu, f_uuv, f_uvv, f_vvv = self.element.third(*self._state(q), c)
+        if not self._moving:
+            return np.array([[[f_uuu]]])
+        return np.array([[[f_uuu, f_uuv], [f_uuv, f_uvv]], [[f_uuv, f_uvv], [f_uvv, f_vvv]]])
+
+    def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
+        f_c, *rest = self.element.coefficient_tangent(*self._state(q), c)
+        return f_c, np.stack([np.asarray(part) for part in rest[: 1 + self._moving]], axis=1)
+
+    def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
+        return self.element.coefficient_curvature(*self._state(q), c)
+
+
+def reads(element: BaseElement, n: int) -> Array:
+    """The direction (n,) of the displacement that an element's gaps and corners are places of."""
+    return element.inputs(n)[0] if isinstance(element, CoupledElement) else element.direction(n)
+
+
+def as_coupled(element: BaseElement) -> CoupledElement | _OneInput:
+    """Any element in the form of a coupled one."""
+    if isinstance(element, CoupledElement):
+        return element
+    assert isinstance(element, Element)
+    return _OneInput(element)

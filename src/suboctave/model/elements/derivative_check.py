@@ -1,0 +1,283 @@
+"""Are the derivatives of an element those of its force? Finite differences answer, for whoever writes an element."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError, check_numbers, shortened
+from suboctave.model.differences import STEP, central_difference, step_of
+from suboctave.model.elements.base import Array, BaseElement, Element
+from suboctave.model.elements.coupled import CoupledElement, as_coupled
+from suboctave.model.elements.smoothness import (
+    CornerSampling,
+    PiecewiseLinear,
+    PolynomialSampling,
+    SharpSampling,
+    SharpVelocitySampling,
+)
+
+__all__ = ["DerivativeReport", "check_derivatives"]
+
+Tensor = Callable[[Array, Array], Array]
+#: distance from a corner, in steps: differences reach two of them. Half powers that begin there are steep beside it
+_BESIDE, _BESIDE_ROUGH = 4.0, 100.0
+
+
+@dataclass(frozen=True)
+class DerivativeReport:
+    """Worst error of every derivative, relative to the largest value it takes; `ok` if none exceeds `rtol`.
+
+    `errors` maps names such as "f_u" or "f_c[gap]" to errors; `messages` lists what is wrong beyond numbers (shapes,
+    values that are not finite, a missing `f_v`).
+    """
+
+    element: str
+    rtol: float
+    errors: Mapping[str, float]
+    messages: tuple[str, ...] = field(default=())
+
+    @property
+    def ok(self) -> bool:
+        """Whether every derivative is right."""
+        return not self.messages and all(error <= self.rtol for error in self.errors.values())
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    def __str__(self) -> str:
+        lines = [f"{self.element}: derivatives {'agree' if self.ok else 'DO NOT agree'} with finite differences"]
+        width = max((len(name) for name in self.errors), default=0)
+        for name, error in self.errors.items():
+            mark = "" if error <= self.rtol else f"   more than {self.rtol:g}"
+            lines.append(f"  {name:<{width}}  {error:.1e}{mark}")
+        return "\n".join(lines + [f"  {message}" for message in self.messages])
+
+    __repr__ = __str__
+
+
+def check_derivatives(
+    element: BaseElement,
+    parameters: Mapping[str, float] | None = None,
+    u: ArrayLike | None = None,
+    v: ArrayLike | None = None,
+    rtol: float = 1e-6,
+) -> DerivativeReport:
+    """Compare every derivative that an element provides with central differences of fourth order.
+
+    `u`, `v` (N,): where to look (default: around the gaps or sharp points, on both sides of each). Those closer to
+    a corner of a piecewise-linear law than the step are left out. `parameters` gives the element's expressions their
+    numbers. Errors are relative to the largest value that the derivative takes there; `rtol` bounds them. Of a coupled
+    element, u and v are (m, N), one row per input.
+    """
+    if not isinstance(element, BaseElement):
+        raise InputError(f"the first argument must be an element such as CubicSpring(..), not {shortened(element)}")
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
+    check_numbers(**{str(name): value for name, value in (parameters or {}).items()})
+    c = element.coefficient_values(parameters or {})
+    at = _one_input(element, c, u, v) if isinstance(element, Element) else _coupled(element, c, u, v)
+    messages = _wrong_shapes(element, at, c)
+    errors = {} if messages else {**_derivative_errors(element, at, c), **_smoothness_errors(element, at, c)}
+    return DerivativeReport(repr(element), rtol, errors, tuple(messages))
+
+
+@dataclass(frozen=True)
+class _Places:
+    """States q (Q, N) and phases (N,) at which derivatives are compared, steps of q and of the coefficients.
+
+    Of an element with one input, q is displacement and velocity, whether it depends on that or not.
+    """
+
+    q: Array
+    theta: Array
+    steps: list[float]
+    coefficient_steps: list[float]
+
+
+def _one_input(element: Element, c: Array, u: ArrayLike | None, v: ArrayLike | None) -> _Places:
+    """Around the gaps or sharp points, on both sides of each; those beside a corner are left out."""
+    kind = element.sampling(c)
+    points = list(kind.points) if isinstance(kind, SharpSampling | CornerSampling) else []
+    if isinstance(kind, PiecewiseLinear):
+        points = [float(c[piece.gap]) for piece in kind.pieces]
+    widths = list(kind.widths) if isinstance(kind, SharpSampling) else []
+    reach = max([abs(point) for point in points] + [0.0]) or max(widths, default=1.0)
+    if u is None:
+        near = [width * np.geomspace(0.1, 30.0, 9) for width in widths]
+        beside = [side for point, d in zip(points, near, strict=False) for side in (point - d, point + d)]
+        u = np.concatenate([np.linspace(-2.1, 2.3, 23) * reach, *beside])
+    x = np.asarray(u, dtype=float).ravel()
+    rate = reach * np.cos(1.0 + 2.7 * np.arange(len(x))) if v is None else np.asarray(v, dtype=float).ravel()
+    if len(rate) != len(x) or not len(x) or not (np.all(np.isfinite(x)) and np.all(np.isfinite(rate))):
+        raise InputError(f"u and v must be finite and of equal length, not {len(x)} and {len(rate)} entries")
+    length = min([*widths, float(np.max(np.abs(x))) or 1.0])
+    q: Array = np.array([x, rate])
+    if isinstance(kind, CornerSampling):
+        speeds = list(kind.velocities)
+        q = _away_from(q, 1, speeds, _BESIDE * STEP * max(map(abs, [*speeds, *rate])))
+    if isinstance(kind, PiecewiseLinear | CornerSampling):
+        q = _away_from(q, 0, points, _BESIDE * STEP * max(length, reach))
+    slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
+    steps = []
+    for value in c:
+        own = abs(float(value)) or reach
+        # a gap moves the whole law: its step follows the width of the law, not its own size
+        steps.append(STEP * (min(length, own) if value in points else own))
+    return _Places(q, np.zeros(q.shape[1]), [STEP * length, step_of(q[1], slow)], steps)
+
+
+def _coupled(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | None) -> _Places:
+    """Around the first input's corners; u, v (m, N), one row per input."""
+    assert isinstance(element, CoupledElement)
+    m, count = len(element.input_places), np.arange(1, 24)
+    kind = element.sampling(c)
+    corners = kind if isinstance(kind, CornerSampling) else CornerSampling()
+    reach, fast = (max([abs(p) for p in some] + [0.0]) or 1.0 for some in (corners.points, corners.velocities))
+    rows = [2.1 * reach * np.sin((1.3 + 0.7 * i) * count + i) for i in range(m)] if u is None else [*np.atleast_2d(u)]
+    if element.depends_on_velocity:
+        own = [1.7 * fast * np.cos((1.7 + 0.6 * i) * count) for i in range(m)]
+        rows += own if v is None else [*np.atleast_2d(v)]
+    if len({len(row) for row in rows}) != 1 or not np.all(np.isfinite(np.concatenate(rows))):
+        raise InputError("u and v must be finite, with one row of equal length per input")
+    q: Array = np.array(rows, dtype=float)
+    for row, levels in ((0, corners.points), (m, corners.velocities)):
+        if levels:
+            margin = (_BESIDE_ROUGH if corners.rough else _BESIDE) * STEP * float(np.max(np.abs(q[row])))
+            q = _away_from(q, row, list(levels), margin)
+    steps = [STEP * (abs(float(value)) or 1.0) for value in c]
+    return _Places(q, 0.37 + 0.9 * np.arange(q.shape[1], dtype=float), [step_of(row) for row in q], steps)
+
+
+def _away_from(q: Array, row: int, levels: list[float], margin: float) -> Array:
+    far = np.all([np.abs(q[row] - level) > margin for level in levels], axis=0) if levels else np.full(q.shape[1], True)
+    if not np.any(far):
+        raise InputError("every place given lies on a corner of the law; give some away from it")
+    return q[:, far].copy()
+
+
+def _wrong_shapes(element: BaseElement, at: _Places, c: Array) -> list[str]:
+    """What is wrong with derivatives beyond numbers."""
+    n, nc, size = at.q.shape[1], len(c), len(at.q)
+    expected: list[tuple[str, Any, tuple[int, ...], bool]]
+    if isinstance(element, Element):
+        u, v = at.q
+        moving = element.depends_on_velocity
+        groups = (
+            ("f f_u f_v", element.tangent(u, v, c), (n,)),
+            ("f_uu f_uv f_vv", element.curvature(u, v, c), (n,)),
+            ("f_uuu f_uuv f_uvv f_vvv", element.third(u, v, c), (n,)),
+            ("f_c f_uc f_vc", element.coefficient_tangent(u, v, c), (nc, n)),
+            ("f_cc", (element.coefficient_curvature(u, v, c),), (nc, nc, n)),
+        )
+        expected = [
+            (name, value, shape, moving or "v" not in name)
+            for names, values, shape in groups
+            for name, value in zip(names.split(), values, strict=True)
+        ]
+    else:
+        law, q, theta = as_coupled(element), at.q, at.theta
+        values = (
+            *law.tangent(q, theta, c), law.curvature(q, theta, c), law.third(q, theta, c),
+            *law.coefficient_tangent(q, theta, c), law.coefficient_curvature(q, theta, c),
+        )  # fmt: skip
+        names = ("f", "f_q", "f_qq", "f_qqq", "f_c", "f_qc", "f_cc")
+        shapes = ((), (size,), (size, size), (size, size, size), (nc,), (nc, size), (nc, nc))
+        expected = [(a, b, (*shape, n), True) for a, b, shape in zip(names, values, shapes, strict=True)]
+    messages = []
+    for name, value, shape, there in expected:
+        if (value is not None) != there:
+            state = "missing" if there else "not None"
+            messages.append(f"{name} is {state} although depends_on_velocity is {element.depends_on_velocity}")
+        elif there and np.shape(value) != shape:
+            messages.append(f"{name} has shape {np.shape(value)} instead of {shape}")
+        elif there and not np.all(np.isfinite(value)):
+            messages.append(f"{name} is not finite everywhere")
+    return messages
+
+
+def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str, float]:
+    """Errors of all derivatives of the law `f(q, theta; c)` by states and coefficients."""
+    law, theta, errors = as_coupled(element), at.theta, dict[str, float]()
+    names = ["u", "v"] if isinstance(element, Element) else [f"{kind}{i}" for kind in "uv" for i in range(law.count)]
+    names = names if element.depends_on_velocity else names[: law.count]
+    q = at.q[: len(names)]
+
+    def compare(name: str, exact: Array, part: Callable[[float], Array], step: float) -> None:
+        difference = central_difference(part, step)
+        noise = 1e-15 * float(np.max(np.abs(part(0.0)), initial=0.0)) / step  # what rounding of a constant would show
+        largest = max(float(np.max(np.abs(some), initial=0.0)) for some in (exact, difference))
+        error = float(np.max(np.abs(difference - exact), initial=0.0))
+        errors[name] = max(errors.get(name, 0.0), 0.0 if error <= noise else error / largest)
+
+    def moved(tensor: Tensor, i: int, pick: tuple[int, ...]) -> Callable[[float], Array]:
+        return lambda h: np.asarray(tensor(_shifted(q, i, h), c)[pick])
+
+    def changed(tensor: Tensor, k: int, pick: tuple[int, ...]) -> Callable[[float], Array]:
+        return lambda h: np.asarray(tensor(q, _shifted(c, k, h))[pick])
+
+    tensors: list[Tensor] = [
+        lambda q, c: law.tangent(q, theta, c)[0],
+        lambda q, c: law.tangent(q, theta, c)[1],
+        lambda q, c: law.curvature(q, theta, c),
+        lambda q, c: law.third(q, theta, c),
+    ]
+    differences_already = isinstance(element, Element) and type(element).third is Element.third
+    for order in range(2 if differences_already else 3):
+        exact = tensors[order + 1](q, c)
+        for index in itertools.product(range(len(names)), repeat=order + 1):
+            *lower, i = index
+            name = "f_" + "".join(names[j] for j in sorted(index))
+            compare(name, exact[index], moved(tensors[order], i, tuple(lower)), at.steps[i])
+    if isinstance(element, Element) and not element.depends_on_velocity:
+        u, v = at.q
+        unmoved = central_difference(lambda h: element.tangent(u, v + h, c)[0], at.steps[1]) * at.steps[1]
+        errors["f_v"] = float(np.max(np.abs(unmoved))) / (float(np.max(np.abs(element.tangent(u, v, c)[0]))) or 1.0)
+    f_c, f_qc = law.coefficient_tangent(q, theta, c)
+    f_cc = law.coefficient_curvature(q, theta, c)
+    for k, (name, step) in enumerate(zip(element.coefficient_names, at.coefficient_steps, strict=True)):
+        compare(f"f_c[{name}]", f_c[k], changed(tensors[0], k, ()), step)
+        for i, state in enumerate(names):
+            compare(f"f_{state}c[{name}]", f_qc[k, i], changed(tensors[1], k, (i,)), step)
+        for j, other in enumerate(element.coefficient_names):
+            slopes = changed(lambda q, c: law.coefficient_tangent(q, theta, c)[0], k, (j,))
+            compare(f"f_cc[{other}, {name}]", f_cc[j, k], slopes, step)
+    if element.depends_on_time:
+        f, again = (law.tangent(q, phase, c)[0] for phase in (theta, theta + 2.0 * np.pi))
+        errors["period"] = float(np.max(np.abs(again - f))) / (float(np.max(np.abs(f))) or 1.0)
+    return errors
+
+
+def _shifted(values: Array, i: int, h: float) -> Array:
+    moved = values.copy()
+    moved[i] += h
+    return moved
+
+
+def _smoothness_errors(element: BaseElement, at: _Places, c: Array) -> dict[str, float]:
+    """Errors of the force that the smoothness class declares, where that is the whole law."""
+    kind = element.sampling(c)
+    if not isinstance(element, Element):
+        return {}
+    u = at.q[0]
+    if isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
+        name, declared = "polynomial", np.polynomial.polynomial.polyval(u, kind.coefficients)
+    elif isinstance(kind, SharpSampling) and kind.steps is not None:
+        name, declared = "arctan steps", kind.constant + kind.slope * u
+        for point, width, step in zip(kind.points, kind.widths, kind.steps, strict=True):
+            y = u - point
+            declared += step / np.pi * (y * np.arctan(y / width) - 0.5 * width * np.log1p((y / width) ** 2))
+    elif isinstance(kind, PiecewiseLinear):
+        name, declared = "pieces", np.zeros_like(u)
+        for piece in kind.pieces:
+            distance = u - c[piece.gap]
+            declared += c[piece.stiffness] * distance * (piece.side * distance > 0.0)
+    else:
+        return {}
+    f = element.tangent(at.q[0], at.q[1], c)[0]
+    return {name: float(np.max(np.abs(declared - f))) / (float(np.max(np.abs(f))) or 1.0)}

@@ -1,0 +1,150 @@
+"""Smoothness classes of element laws. The class decides the quadrature rule."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suboctave.errors import InputError
+
+__all__ = [
+    "AdaptiveSampling",
+    "CornerSampling",
+    "Piece",
+    "PiecewiseLinear",
+    "PolynomialSampling",
+    "RoundedPiece",
+    "Sampling",
+    "SharpSampling",
+    "SharpVelocitySampling",
+    "levels",
+]
+
+
+@dataclass(frozen=True)
+class PolynomialSampling:
+    """A polynomial in `(u, v)` of this total degree: a uniform grid of enough samples integrates it exactly.
+
+    A polynomial in u alone may tell its coefficients too, those of u^0, u^1, ..., u^degree (unit of the p-th: force /
+    length^p): it is then evaluated without asking the element.
+    """
+
+    degree: int
+    coefficients: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.coefficients is not None and len(self.coefficients) != self.degree + 1:
+            raise InputError(
+                f"a polynomial of degree {self.degree} has {self.degree + 1} coefficients, not {len(self.coefficients)}"
+            )
+
+
+@dataclass(frozen=True)
+class RoundedPiece:
+    """An elastic stop rounded by an arctan step (`rounding`): indices of its stiffness, gap and sharpness among the
+    element's coefficients, and its side.
+    """
+
+    stiffness: int
+    gap: int
+    sharpness: int
+    side: int
+
+
+@dataclass(frozen=True)
+class SharpSampling:
+    """Analytic on the real axis, with complex singularities at `u = points[i] +- 1j * widths[i]` (unit: length).
+
+    A law that is a sum of arctan steps of its stiffness may tell them: it is then evaluated without asking the element,
+
+        f = constant + slope u + sum_i steps_i / pi [y_i atan(y_i / w_i) - w_i / 2 ln(1 + (y_i / w_i)^2)]
+
+    with y_i = u - points_i, w_i = widths_i.
+
+    constant
+        Unit: force; `slope` and `steps` are stiffnesses.
+    rounded
+        The rounded stops whose steps these are, if the whole law is a sum of them: it is then followed along a
+        parameter without asking the element.
+    """
+
+    points: tuple[float, ...]
+    widths: tuple[float, ...]
+    constant: float = 0.0
+    slope: float = 0.0
+    steps: tuple[float, ...] | None = None
+    rounded: tuple[RoundedPiece, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.points) != len(self.widths) or len(self.steps or self.points) != len(self.points):
+            raise InputError("a sharp law has as many widths (and steps, if it tells them) as points")
+        if self.rounded is not None and len(self.rounded) != len(self.steps or ()):
+            raise InputError("a sharp law that is a sum of rounded stops tells the step of every one of them")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One half-line of a piecewise-linear law: indices of its stiffness and gap among the element's coefficients.
+
+    Its force is `c[stiffness] * (u - c[gap])` where `side * (u - c[gap]) > 0` and zero elsewhere.
+    """
+
+    stiffness: int
+    gap: int
+    side: int
+
+
+@dataclass(frozen=True)
+class PiecewiseLinear:
+    """The law is the sum of its pieces and nothing else, so that it can be integrated in closed form."""
+
+    pieces: tuple[Piece, ...]
+
+
+@dataclass(frozen=True)
+class AdaptiveSampling:
+    """Nothing is known: samples are added until force and tangent stop moving."""
+
+
+@dataclass(frozen=True)
+class CornerSampling:
+    """A continuous force that is smooth but for corners at `u = points[i]` and at `v = velocities[i]`.
+
+    Only its derivatives may jump there. It is integrated between the instants at which a motion reaches these places,
+    with as many nodes as force and tangent need to settle. For elements with `own_nodes`; of a coupled element, the
+    places are those of its first input. `rough`: powers of a half begin at a corner (contact after Hertz).
+    """
+
+    points: tuple[float, ...] = ()
+    velocities: tuple[float, ...] = ()
+    rough: bool = False
+
+
+@dataclass(frozen=True)
+class SharpVelocitySampling:
+    """Analytic on the real axis, with complex singularities at `v = velocities[i] +- 1j * widths[i]` (length / time).
+
+    For elements with `own_nodes`: nodes are graded towards the instants at which the velocity passes there.
+    """
+
+    velocities: tuple[float, ...]
+    widths: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.widths) != len(self.velocities):
+            raise InputError("a sharp law has as many widths as velocities")
+
+
+Sampling: TypeAlias = (
+    PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling | CornerSampling | SharpVelocitySampling
+)
+
+
+def levels(kind: Sampling, coefficients: NDArray[np.float64]) -> tuple[float, ...]:
+    """Displacements at which a law has a corner, or is sharp, at these coefficients."""
+    if isinstance(kind, PiecewiseLinear):
+        return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
+    return kind.points if isinstance(kind, SharpSampling | CornerSampling) else ()

@@ -1,0 +1,1 @@
+"""Expressions in text: read, differentiated and turned into code."""

@@ -1,0 +1,307 @@
+"""Forces given as text, with all their derivatives: SymPy differentiates, NumPy evaluates.
+
+A law is compiled once per process and text, each order of derivatives when it is first needed. It runs on arrays in
+NumPy: some microseconds per operation more than compiled loops would take, but without a second of compilation at the
+first use of every new force.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import sympy
+
+from suboctave.errors import InputError
+from suboctave.model.elements.base import Array
+from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, PolynomialSampling, Sampling
+from suboctave.model.expressions.code import array_function, as_text, lines_of_code
+from suboctave.model.expressions.derivatives import (
+    CORNER_FUNCTIONS,
+    Modulus,
+    PositiveRamp,
+    Ramp,
+    Sign,
+    Step,
+    expanded_size,
+    force_expression,
+    symbol,
+)
+from suboctave.model.expressions.reader import PRIME
+
+__all__ = ["Law", "harmonic_of", "law_of"]
+
+#: symbol of the phase omega t of the load
+_THETA = "omega*t"  # no identifier, so that no parameter can have this name
+_HIGHEST_DEGREE = 30
+_OPERATIONS = 5000
+
+
+@functools.lru_cache(maxsize=512)
+def law_of(text: str, states: tuple[str, ...], short: bool, where: str) -> Law:
+    """The law of a text in the displacements `states` and their rates (with a prime); `short`: v is that of x."""
+    expression = force_expression(text, where)
+    if short:
+        expression = expression.subs(symbol("v"), symbol("x" + PRIME))
+    return Law(expression, states, where)
+
+
+class Law:
+    """A force `f(q, theta; c)` and its derivatives; q the displacements, then the velocities if it has any.
+
+    Attributes
+    ----------
+    coefficients
+        Names that are neither states nor time, sorted.
+    corner_input
+        Which of the displacements has the corners; they are known as such if it is the first.
+    depends_on_velocity, time_harmonic
+        Whether a velocity occurs; the highest multiple of the load's frequency, 0 without time.
+    """
+
+    def __init__(self, expression: Any, states: tuple[str, ...], where: str) -> None:
+        self.where = where
+        rates = [name + PRIME for name in states]
+        self.depends_on_velocity = any(symbol(rate) in expression.free_symbols for rate in rates)
+        self.q = [symbol(name) for name in (*states, *(rates if self.depends_on_velocity else ()))]
+        self.count = len(states)
+        self.expression, self.time_harmonic = _with_phase(expression, where)
+        taken = {*self.q, symbol(_THETA)}
+        for one in sorted(self.expression.free_symbols - taken, key=str):
+            if PRIME in one.name:
+                raise InputError(f"{where}: {one.name.replace(PRIME, chr(39))} cannot occur in a force")
+        if self.expression.count_ops() > _OPERATIONS:
+            raise InputError(f"{where}: more than {_OPERATIONS} operations; split it into several elements")
+        self.c: list[Any] = sorted(self.expression.free_symbols - taken, key=str)
+        self.coefficients = tuple(one.name for one in self.c)
+        self.corner_input = 0
+        self._degree, self._corner_places = self._smoothness()
+        powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
+        self._rough = any(power.base.has(Ramp, Modulus, Step) for power in powers)
+
+    # ------------------------------------------------------------------------------------------------ smoothness
+    def _smoothness(self) -> tuple[int | None, list[tuple[int, Any]] | None]:
+        """Degree of a polynomial (else None); rows of q and places of corners, None if they cannot be told."""
+
+        f = self.expression
+        states = {*self.q, self.phase}
+        atoms = [atom for atom in f.atoms(*CORNER_FUNCTIONS) if atom.free_symbols & states]
+        if not atoms:
+            return self._polynomial(), []
+        places: list[tuple[int, Any]] | None = []
+        for argument in sorted({atom.args[0] for atom in atoms}, key=str):
+            place = self._place(argument)
+            self._check_continuous(argument, place)
+            if place is None or places is None:
+                places = None
+            else:
+                places.append(place)
+        inputs = {row % self.count for row, _ in places or ()}
+        if places is None or len(inputs) > 1:
+            return None, None
+        self.corner_input = inputs.pop()
+        return None, places if self.corner_input == 0 else None
+
+    def _place(self, argument: Any) -> tuple[int, Any] | None:
+        """Row of q and its value at which an argument vanishes, if it depends on that one alone, and linearly."""
+        rows = [r for r, state in enumerate(self.q) if state in argument.free_symbols]
+        if len(rows) != 1 or symbol(_THETA) in argument.free_symbols:
+            return None
+        slope = argument.diff(self.q[rows[0]])
+        if slope.free_symbols.intersection(self.q):
+            return None
+        return rows[0], -argument.subs(self.q[rows[0]], 0) / slope
+
+    def _check_continuous(self, argument: Any, place: tuple[int, Any] | None) -> None:
+        """Refuse a force that jumps where an argument of a corner function vanishes."""
+        above = {Ramp: argument, Step: 1, Modulus: argument, Sign: 1}
+        below = {Ramp: 0, Step: 0, Modulus: -argument, Sign: -1}
+        jumps = any(isinstance(a, (Step, Sign)) and a.args[0] == argument for a in _functions(self.expression))
+        if not jumps:
+            return
+        hint = (
+            "a force must be continuous. Multiply by something that vanishes there, or smooth it: dry friction is "
+            "TanhFriction, or tanh(v/v0)"
+        )
+        if place is None:
+            where = f"where {as_text(argument)} changes sign"
+            raise InputError(f"{self.where}: it cannot be told whether the force jumps {where}; {hint}")
+        sides = [self.expression.subs({kind(argument): v for kind, v in one.items()}) for one in (above, below)]
+        draw = np.random.default_rng(1)
+        q, c = draw.uniform(0.3, 1.7, (len(self.q), 5)), draw.uniform(0.3, 1.7, len(self.c))
+        theta = draw.uniform(0.0, 6.0, 5)
+        q[place[0]] = self._compile([place[1]])(q, theta, c)[0]
+        upper, lower = self._compile(sides)(q, theta, c)
+        if not np.all(np.abs(upper - lower) <= 1e-9 * (1.0 + np.abs(upper) + np.abs(lower))):
+            raise InputError(f"{self.where}: the force jumps where {as_text(argument)} changes sign; {hint}")
+
+    def _polynomial(self) -> int | None:
+        """Total degree in q of a polynomial whose time enters by sines and cosines, else None."""
+        waves = [a for a in _functions(self.expression) if symbol(_THETA) in a.free_symbols]
+        swapped, generators, harmonics = self.expression, list(self.q), [0] * len(self.q)
+        for i, wave in enumerate(waves):
+            stand_in = sympy.Symbol(f"wave_{i}")
+            swapped = swapped.subs(wave, stand_in)
+            generators.append(stand_in)
+            harmonics.append(abs(int(wave.args[0].coeff(symbol(_THETA)))))
+        if symbol(_THETA) in swapped.free_symbols or not swapped.is_polynomial(*generators):
+            return None
+        if expanded_size(swapped) > 1000:
+            return None
+        polynomial = sympy.Poly(swapped, *generators)
+        degree = 0
+        for powers in polynomial.monoms():
+            degree = max(degree, sum(powers[: len(self.q)]))
+            self.time_harmonic = max(self.time_harmonic, sum(p * h for p, h in zip(powers, harmonics, strict=True)))
+        return degree if degree <= _HIGHEST_DEGREE else None
+
+    def sampling(self, c: Array) -> Sampling:
+        """How smooth the law is at these coefficients."""
+        if self._degree is not None:
+            return PolynomialSampling(max(1, self._degree))
+        if not self._corner_places:
+            return AdaptiveSampling()
+        values = self._code("corners", [place for _, place in self._corner_places])(
+            np.zeros((len(self.q), 1)), np.zeros(1), c
+        )[:, 0]
+        rows = [row for row, _ in self._corner_places]
+        points = sorted({float(v) for row, v in zip(rows, values, strict=True) if row == 0})
+        velocities = sorted({float(v) for row, v in zip(rows, values, strict=True) if row})
+        return CornerSampling(tuple(points), tuple(velocities), self._rough)
+
+    # ------------------------------------------------------------------------------------------------ derivatives
+    @functools.cached_property
+    def _compiled(self) -> dict[str, Callable[..., Array]]:
+        return {}
+
+    def _code(self, what: str, parts: list[Any] | Callable[[], list[Any]]) -> Callable[..., Array]:
+        if what not in self._compiled:
+            self._compiled[what] = self._compile(parts() if callable(parts) else parts)
+        return self._compiled[what]
+
+    def _compile(self, parts: list[Any]) -> Callable[..., Array]:
+        """A function `(q, theta, c) -> (len(parts), N)`."""
+        return array_function([_off_corners(part) for part in parts], self.q, self.phase, self.c)
+
+    def scalar_code(
+        self,
+        parts: list[Any],
+        states: list[str],
+        number: Callable[[int], str],
+        prefix: str,
+        more: Mapping[str, str],
+    ) -> tuple[list[str], list[str]]:
+        """Lines of code and an expression for each of the parts, for a compiler: of numbers instead of arrays.
+
+        `states`, `number` name states and coefficients; variables of its own begin with `prefix`; `more` are further
+        symbols. The phase is `theta`.
+        """
+        names = {state.name: states[i] for i, state in enumerate(self.q)}
+        names |= {one.name: number(i) for i, one in enumerate(self.c)} | {_THETA: "theta", **more}
+        return lines_of_code([_off_corners(part) for part in parts], names, f"{prefix}w")
+
+    @property
+    def phase(self) -> Any:
+        """The symbol of omega t."""
+        return symbol(_THETA)
+
+    @property
+    def rough(self) -> bool:
+        """Whether a power that is no integer begins at a"""
+        return self._rough
+
+    def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
+        """`(f, f_q)`, shapes (N,), (Q, N)."""
+        f = self.expression
+        values = self._code("tangent", lambda: [f, *(f.diff(a) for a in self.q)])(q, theta, c)
+        return values[0], values[1:]
+
+    def _symmetric(self, what: str, by: list[Any], order: int, q: Array, theta: Array, c: Array) -> Array:
+        """All derivatives of one order, each computed once."""
+        size = len(by)
+        index = list(itertools.combinations_with_replacement(range(size), order))
+        values = self._code(what, lambda: [self.expression.diff(*(by[i] for i in one)) for one in index])(q, theta, c)
+        out = np.empty((size,) * order + (len(theta),))
+        for one, value in zip(index, values, strict=True):
+            for permuted in set(itertools.permutations(one)):
+                out[permuted] = value
+        return out
+
+    def curvature(self, q: Array, theta: Array, c: Array) -> Array:
+        """`f_qq`, (Q, Q, N)."""
+        return self._symmetric("curvature", self.q, 2, q, theta, c)
+
+    def third(self, q: Array, theta: Array, c: Array) -> Array:
+        """`f_qqq`, (Q, Q, Q, N)."""
+        return self._symmetric("third", self.q, 3, q, theta, c)
+
+    def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
+        """`(f_c, f_qc)`, shapes (nc, N), (nc, Q, N)."""
+        f, n = self.expression, len(theta)
+        values = self._code("by c", lambda: [d for a in self.c for d in (f.diff(a), *(f.diff(a, b) for b in self.q))])(
+            q, theta, c
+        ).reshape(len(self.c), 1 + len(self.q), n)
+        return values[:, 0], values[:, 1:]
+
+    def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
+        """`f_cc`, (nc, nc, N)."""
+        return self._symmetric("by c twice", self.c, 2, q, theta, c)
+
+
+def _off_corners(expression: Any) -> Any:
+    """Derivatives of powers of ramps divide by them, and multiply by steps that are zero where the ramps are.
+
+    Those by an exponent have their logarithms.
+    """
+    swaps = {}
+    for power in expression.atoms(sympy.Pow, sympy.log):
+        base = power.args[0]
+        if isinstance(base, Ramp) and not (power.is_Pow and power.exp.is_nonnegative):
+            swaps[power] = power.func(PositiveRamp(*base.args), *power.args[1:])
+    return expression.xreplace(swaps)
+
+
+def _functions(expression: Any) -> list[Any]:
+    return sorted(expression.atoms(sympy.Function), key=str)
+
+
+def _with_phase(expression: Any, where: str) -> tuple[Any, int]:
+    """Time as the phase theta = omega t of the load, and its highest multiple."""
+    t, omega, theta = symbol("t"), symbol("omega"), symbol(_THETA)
+    if t not in expression.free_symbols:
+        if omega in expression.free_symbols:
+            raise InputError(f"{where}: omega occurs outside of cos(k*omega*t); only loads may depend on the frequency")
+        return expression, 0
+    highest, swaps = 0, {}
+    for wave in _functions(expression):
+        if t not in wave.free_symbols or type(wave).__name__ not in ("sin", "cos"):
+            continue
+        multiple = harmonic_of(wave.args[0])
+        if multiple is None:
+            raise InputError(
+                f"{where}: {as_text(wave)} does not have the period of the load; time occurs as cos(k*omega*t + phase) "
+                "or sin, k a positive integer"
+            )
+        swaps[wave] = type(wave)(multiple * theta + wave.args[0].subs(t, 0))
+        highest = max(highest, abs(multiple))
+    expression = expression.xreplace(swaps)
+    if t in expression.free_symbols or omega in expression.free_symbols:
+        what = "time" if t in expression.free_symbols else "omega"
+        raise InputError(f"{where}: {what} occurs outside of cos(k*omega*t + phase) and sin(k*omega*t + phase)")
+    return expression, highest
+
+
+def harmonic_of(argument: Any) -> int | None:
+    """k of an argument `k omega t + phase`, None if it is of another form or k is no integer other than 0."""
+    t, omega = symbol("t"), symbol("omega")
+    slope = argument.diff(t)
+    if t in slope.free_symbols or omega in argument.subs(t, 0).free_symbols:
+        return None
+    multiple = slope / omega
+    if multiple.free_symbols or not multiple.is_number:
+        return None
+    value = float(multiple)
+    return int(value) if value.is_integer() and value != 0.0 else None

@@ -1,0 +1,305 @@
+"""The one reader of expressions: texts become forms, trees of operations with closures.
+
+A text such as `"2*zeta"` is read with Python's own parser and then walked node by node against a short list of what is
+allowed (numbers, names, `+ - * / **`, parentheses, a few functions, `pi`); nothing is ever evaluated as Python code. A
+value costs a microsecond.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from suboctave.errors import InputError, suggest
+
+__all__ = ["CORNERS", "FUNCTIONS", "LONGEST", "PRIME", "RESERVED", "Evaluate", "Form", "read"]
+
+Evaluate = Callable[[Mapping[str, float]], float]
+
+#: functions that any expression may contain
+FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "log": math.log,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
+    "sinh": math.sinh,
+    "cosh": math.cosh,
+    "tanh": math.tanh,
+    "abs": math.fabs,
+}
+#: functions with corners or jumps, of forces only
+CORNERS: dict[str, Callable[..., float]] = {
+    "sign": lambda x: float((x > 0.0) - (x < 0.0)),
+    "heaviside": lambda x: float(x > 0.0),
+    "max": max,
+    "min": min,
+}
+# Names that a parameter cannot have. "omega" is the circular frequency of the load, "t" the time.
+RESERVED = frozenset(FUNCTIONS) | {"pi", "omega", "t"}
+
+_PAIRS = ("max", "min")
+_ELSEWHERE = {
+    "ln": "log", "arctan": "atan", "arcsin": "asin", "arccos": "acos", "fabs": "abs", "Abs": "abs", "Max": "max",
+    "Min": "min", "sgn": "sign", "Heaviside": "heaviside", "step": "heaviside", "pow": "x**y instead",
+}  # fmt: skip
+LONGEST = 10_000  # characters
+_DEEPEST = 300  # nested operations
+_LARGEST_POWER = 1000
+#: operations in the arguments of max or min, which occur twice in max(a, b) = b + ramp(a - b)
+_MOST_OPERATIONS = 500
+
+
+# ------------------------------------------------------------------------------------------------------------ reader
+class Form:
+    """An expression that has been read: an operation and its parts, with its closure and what is known about it.
+
+    Attributes
+    ----------
+    operation, parts
+        One of `+ - * / **`, "negative" or the name of a function, with forms; or "number", "name", "pi" with the
+        number, the name, nothing.
+    evaluate, names, constant
+        Its value at values of the names; these; its number, if no name occurs.
+    affine
+        The factor of every name, if it is affine in all of them.
+    power, size
+        The highest power of anything in it, powers of powers multiplied; how many operations it stands for.
+    """
+
+    __slots__ = ("affine", "constant", "evaluate", "names", "operation", "parts", "power", "size")
+
+    def __init__(
+        self,
+        operation: str,
+        parts: tuple[Any, ...],
+        evaluate: Evaluate,
+        names: frozenset[str] = frozenset(),
+        affine: dict[str, float] | None = None,
+        power: float = 0.0,
+        size: float = 1.0,
+    ) -> None:
+        self.operation, self.parts, self.evaluate, self.names = operation, parts, evaluate, names
+        self.affine, self.power, self.size = affine, power, size
+        self.constant: float | None = None
+
+
+def read(
+    text: str, where: str, functions: Mapping[str, Callable[..., float]], refusal: Callable[[str], str | None]
+) -> Form:
+    """The form of a text in which these functions may occur, and names about which `refusal` has nothing to say.
+
+    Raises
+    ------
+    InputError
+        Beginning with `where`, if it is given, with the column and the part of the text that is not allowed.
+    """
+    start = f"{where}: " if where else ""
+    if len(text) > LONGEST:
+        raise InputError(f"{start}an expression of {len(text)} characters is too long (at most {LONGEST})")
+    source = text.strip()
+    begin = len(text) - len(text.lstrip())
+    try:
+        tree = ast.parse(source, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        start += f"cannot read {_shortened(text)}"
+        if isinstance(error, RecursionError | MemoryError) or "nested" in str(error):
+            raise InputError(f"{start}: nested too deeply; split it into parameters or terms") from None
+        if not source:
+            raise InputError(f"{start}: it is empty") from None
+        column = getattr(error, "offset", None)
+        at = f" at column {begin + column}" if column else ""
+        raise InputError(f"{start}{at}: {getattr(error, 'msg', error)}") from None
+    return _Reader(source, begin, where or f"in the expression {_shortened(text)}", functions, refusal).read(tree, 0)
+
+
+#: what a prime is written as while Python parses the text: a letter of the same length
+PRIME = "\u02c8"
+
+
+def _shortened(text: str) -> str:
+    return repr((text if len(text) <= 60 else text[:57] + "...").replace(PRIME, "'"))
+
+
+class _Reader:
+    """Turns syntax into forms, and refuses everything that is not on the list."""
+
+    def __init__(
+        self,
+        text: str,
+        begin: int,
+        where: str,
+        functions: Mapping[str, Callable[..., float]],
+        refusal: Callable[[str], str | None],
+    ) -> None:
+        self.text, self.begin, self.where = text, begin, where
+        self.functions, self.refusal = functions, refusal
+
+    def refuse(self, node: ast.AST, reason: str) -> InputError:
+        column = len(self.text.encode()[: getattr(node, "col_offset", 0)].decode()) + self.begin + 1
+        part = _shortened(ast.get_source_segment(self.text, node) or "")
+        return InputError(f"{self.where} at column {column}, {part}: {reason}")
+
+    def read(self, node: ast.expr, depth: int) -> Form:
+        if depth > _DEEPEST:
+            raise self.refuse(node, f"more than {_DEEPEST} nested operations; split it into parameters or terms")
+        match node:
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+                return self.known(node, "number", (number,), lambda: float(number))
+            case ast.Name(id=name):
+                return self.name(node, name)
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return self.negative(node, self.read(inner, depth + 1))
+            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+                return self.read(inner, depth + 1)
+            case ast.BinOp(left=left, op=operation, right=right):
+                return self.binary(node, operation, self.read(left, depth + 1), self.read(right, depth + 1))
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in self.functions:
+                count = 2 if name in _PAIRS else 1
+                if len(arguments) != count or any(isinstance(argument, ast.Starred) for argument in arguments):
+                    raise self.refuse(node, f"{name} takes {'exactly one argument' if count == 1 else '2 arguments'}")
+                return self.call(node, name, [self.read(argument, depth + 1) for argument in arguments])
+            case ast.Call(func=ast.Name(id=name)) if name not in self.functions:
+                other = _ELSEWHERE.get(name, "")
+                known = other in self.functions or name == "pow"
+                hint = f"; write {other}" if known else suggest(name, self.functions)
+                raise self.refuse(node, f"there is no function {name!r}{hint}")
+        what = _WORDS.get(type(node), type(node).__name__)
+        raise self.refuse(node, f"{what} is not allowed (numbers, names, + - * / **, parentheses, functions, pi)")
+
+    def known(self, node: ast.AST, operation: str, parts: tuple[Any, ...], compute: Callable[[], float]) -> Form:
+        """A part without names is computed once, here; it must be finite."""
+        try:
+            value = compute()
+        except (ValueError, ZeroDivisionError, OverflowError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.refuse(node, "a part without parameters is not a finite real number")
+        form = Form(operation, parts, lambda _: value, affine={})
+        form.constant = value
+        return form
+
+    def name(self, node: ast.AST, name: str) -> Form:
+        if name == "pi":
+            return self.known(node, "pi", (), lambda: math.pi)
+        if name.rstrip(PRIME) in self.functions:
+            raise self.refuse(node, f"{name.rstrip(PRIME)} is a function and needs an argument in parentheses")
+        reason = self.refusal(name)
+        if reason is not None:
+            raise self.refuse(node, reason)
+        return Form("name", (name,), lambda values: values[name], frozenset([name]), {name: 1.0}, 1.0)
+
+    def negative(self, node: ast.AST, inner: Form) -> Form:
+        f, value = inner.evaluate, inner.constant
+        if value is not None:
+            return self.known(node, "negative", (inner,), lambda: -value)
+        affine = _scaled(inner.affine, -1.0)
+        return Form("negative", (inner,), lambda at: -f(at), inner.names, affine, inner.power, inner.size + 1.0)
+
+    def call(self, node: ast.AST, name: str, arguments: list[Form]) -> Form:
+        function, closures = self.functions[name], [argument.evaluate for argument in arguments]
+        size = 1.0 + sum(argument.size for argument in arguments)
+        if all(argument.constant is not None for argument in arguments):
+            return self.known(node, name, tuple(arguments), lambda: function(*(f({}) for f in closures)))
+        if name in _PAIRS:
+            if size > _MOST_OPERATIONS:
+                raise self.refuse(node, f"{name} of arguments this long; split it into terms")
+            size += 2.0 + arguments[1].size
+        f = closures[0]
+        evaluate: Evaluate = (
+            (lambda values: function(f(values)))
+            if len(closures) == 1
+            else (lambda values: function(*(one(values) for one in closures)))
+        )
+        names = frozenset().union(*(argument.names for argument in arguments))
+        return Form(name, tuple(arguments), evaluate, names, power=1.0, size=size)
+
+    def binary(self, node: ast.AST, operation: ast.operator, left: Form, right: Form) -> Form:
+        sign = _SIGNS.get(type(operation))
+        if sign is None:
+            other = "; write ** for a power" if isinstance(operation, ast.BitXor) else ""
+            shown = _WORDS.get(type(operation), type(operation).__name__)
+            raise self.refuse(node, f"the operation {shown} is not allowed{other}")
+        a, b = left.constant, right.constant
+        power = left.power + right.power if sign in "*/" else max(left.power, right.power)
+        if sign == "**" and b is not None:
+            power = left.power * abs(b)
+            if max(1.0, left.power) * abs(b) > _LARGEST_POWER:
+                raise self.refuse(node, f"the power is larger than {_LARGEST_POWER}")
+        evaluate = _closure(sign, left.evaluate, right.evaluate, a, b)
+        if a is not None and b is not None:
+            return self.known(node, sign, (left, right), lambda: evaluate({}))
+        if sign == "/" and b == 0.0:
+            raise self.refuse(node, "division by zero")
+        names, size = left.names | right.names, left.size + right.size + 1.0
+        return Form(sign, (left, right), evaluate, names, _affine(sign, left, right), power, size)
+
+
+def _closure(sign: str, f: Evaluate, g: Evaluate, a: float | None, b: float | None) -> Evaluate:
+    """The closure of a binary operation; a constant operand is bound into it."""
+    power = math.pow  # refuses a root of a negative number, where ** would answer with a complex one
+    match sign:
+        case "+":
+            return lambda values: f(values) + g(values)
+        case "-":
+            return lambda values: f(values) - g(values)
+        case "*" if a is not None:
+            return lambda values: a * g(values)
+        case "*" if b is not None:
+            return lambda values: f(values) * b
+        case "*":
+            return lambda values: f(values) * g(values)
+        case "/":
+            return lambda values: f(values) / g(values)
+    if b is not None:
+        return lambda values: power(f(values), b)
+    return lambda values: power(f(values), g(values))
+
+
+def _affine(sign: str, left: Form, right: Form) -> dict[str, float] | None:
+    """Factors of the names, where an operation keeps expressions affine with finite factors."""
+    p, q, factors = left.affine, right.affine, None
+    if p is None or q is None:
+        return None
+    if sign in "+-":
+        factor = 1.0 if sign == "+" else -1.0
+        factors = {name: p.get(name, 0.0) + factor * q.get(name, 0.0) for name in {*p, *q}}
+    elif sign == "*":
+        if left.constant is not None:
+            factors = _scaled(q, left.constant)
+        elif right.constant is not None:
+            factors = _scaled(p, right.constant)
+    elif sign == "/" and right.constant:
+        divisor = right.constant
+        factors = {name: factor / divisor for name, factor in p.items()}
+    if factors is None or not all(map(math.isfinite, factors.values())):
+        return None
+    return factors
+
+
+def _scaled(factors: Mapping[str, float] | None, by: float) -> dict[str, float] | None:
+    return None if factors is None else {name: by * factor for name, factor in factors.items()}
+
+
+_SIGNS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+_WORDS = {
+    ast.Attribute: "a dot between names",
+    ast.Subscript: "an index in brackets",
+    ast.Compare: "a comparison",
+    ast.BoolOp: "and/or",
+    ast.IfExp: "if/else",
+    ast.Lambda: "lambda",
+    ast.Constant: "a text, a truth value or an imaginary number",
+    ast.Call: "a call of something else than a function",
+    ast.BitXor: "^",
+    ast.FloorDiv: "//",
+    ast.Mod: "%",
+    ast.MatMult: "@",
+    ast.Tuple: "a comma",
+}

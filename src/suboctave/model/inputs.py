@@ -1,0 +1,114 @@
+"""What the verbs refuse before any work, with what to do instead."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.model.elements.coupled import CoupledElement
+from suboctave.model.system import System
+
+#: DOFs up to which the stiffness is examined for motions that nothing holds
+_MOST_EXAMINED = 400
+
+
+def check_system(system: System, omega: tuple[float, ...] = ()) -> None:
+    """Refuse what cannot vibrate periodically: no load (at the frequencies `omega`), or a body that nothing holds."""
+    if not isinstance(system, System):
+        raise InputError(f"the first argument must be a System, not {type(system).__name__}")
+    periodic = [c for c in system.load_components() if c.harmonic > 0]
+    if not periodic and not system.excited_by_elements:
+        raise InputError(
+            "the system has no periodic load: add loads=[HarmonicLoad(dof=..., amplitude=...)], or an element that "
+            "depends on time"
+        )
+    amplitudes = [c.amplitude.value({**system.parameters, "omega": w}) for c in periodic for w in omega]
+    if omega and not any(amplitudes) and not system.excited_by_elements:
+        names = sorted({name for c in periodic for name in c.amplitude.names} - {"omega"})
+        values = ", ".join(f"{name}={system.parameters[name]:g}" for name in names)
+        raise InputError(f"the periodic load is zero at these parameters ({values or 'a number'}): nothing moves")
+    if system.n <= _MOST_EXAMINED:
+        _check_held(system)
+
+
+def _check_held(system: System) -> None:
+    """Refuse a body that nothing holds: the mean of its motion is not determined."""
+    mass, _, stiffness = system.matrices()
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = stiffness * scale[:, None] * scale
+    if not np.isfinite(scaled).all():
+        raise InputError("the stiffness over the mass is larger than any number: check the units of both")
+    _, sizes, vectors = np.linalg.svd(scaled)
+    free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
+    if not len(free):
+        return
+    felt = [e.inputs(system.n) if isinstance(e, CoupledElement) else [e.direction(system.n)] for e in system.elements]
+    held = np.array([d * scale for directions in felt for d in directions]).reshape(-1, system.n)
+    if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
+        shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
+        raise InputError(
+            f"the structure can move freely along ({shape}): its stiffness is singular and no element holds it, so "
+            "that the mean position is not determined. Hold it by a spring, or write it in relative displacements"
+        )
+
+
+def check_parameter(system: System, name: str) -> None:
+    """Refuse a name that is neither "omega" nor a parameter."""
+    if not isinstance(name, str) or (name != "omega" and name not in system.parameters):
+        raise InputError(f"unknown parameter {name!r}{suggest(str(name), ['omega', *system.parameters])}")
+
+
+def check_omega(omega: Any) -> float:
+    """One circular frequency of the load."""
+    if not (is_number(omega) and omega > 0.0):
+        raise InputError(f"omega must be a positive number, not {shortened(omega)}")
+    return float(omega)
+
+
+def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
+    """Two ends at each of which the system exists (a mass that vanishes or turns negative does not)."""
+    first, last = check_range(name, bounds, positive=name == "omega")
+    if name != "omega":
+        for end in (first, last):
+            try:
+                system.with_parameters({name: end})
+            except InputError as failure:
+                raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
+    return first, last
+
+
+def read_values(system: System, parameters: Any) -> dict[str, float]:
+    """Values of some parameters of a system; InputError for what is none."""
+    if parameters is None:
+        return {}
+    if not isinstance(parameters, Mapping):
+        raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
+    for name, value in parameters.items():
+        system.check_parameter(name)
+        if isinstance(value, bool) or not is_number(value):
+            raise InputError(f"parameters: {name!r} must be a finite number, not {shortened(value)}")
+    return {name: float(value) for name, value in parameters.items()}
+
+
+def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:
+    """(from, to) as two different finite numbers.
+
+    Raises
+    ------
+    InputError
+        If they are not, or not positive where they must be.
+    """
+    try:
+        first, last = (float(b) for b in bounds)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name}={shortened(bounds)}: give two numbers, (from, to)") from None
+    if not (math.isfinite(first) and math.isfinite(last)) or first == last:
+        raise InputError(f"{name}=({first:g}, {last:g}): the range must have two different finite ends")
+    if positive and min(first, last) <= 0.0:
+        raise InputError(f"{name}=({first:g}, {last:g}): frequencies are positive, in rad per unit time")
+    return first, last

@@ -1,0 +1,299 @@
+"""Structural matrices whose entries may depend on named parameters, `A(p) = A_0 + sum_i c_i(p) A_i`, and their checks.
+
+A mass is symmetric and positive definite. The power that a damping `C` takes from a motion is `v . C v`, which its
+symmetric part alone decides; a wrong sign, or self-excitation that is meant, is warned of when a system is made. Both
+are judged after scaling by the diagonal of the mass, `A_ij / sqrt(M_ii M_jj)`, so that units do not matter.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from suboctave.errors import InputError, NegativeDampingWarning
+from suboctave.model.elements.base import Array
+from suboctave.model.expressions.coefficients import Coefficient, coefficient
+
+__all__ = ["MatrixCoefficient", "check_damping", "check_mass", "matrix_coefficient", "warn_of_negative"]
+
+#: largest asymmetry of a mass, in units of sqrt(M_ii M_jj)
+_ASYMMETRY = 1e-9
+#: degrees of freedom up to which eigenvalues are cheap; beyond, pivots and diagonals are taken
+_DENSE = 600
+#: share of the largest eigenvalue of a damping below which a negative one is rounding
+_ROUNDING = 1e-9
+
+
+class MatrixCoefficient:
+    """An n x n matrix `base + sum_i coefficient_i * pattern_i`. Immutable; made by `matrix_coefficient`.
+
+    `n` its size, `names` the parameters in it, `sparse` whether it was given as a sparse matrix.
+    """
+
+    def __init__(self, base: Any, terms: Sequence[tuple[Coefficient, Any]] = (), what: str = "matrix") -> None:
+        self._base = base
+        self._terms = tuple(terms)
+        self.what = what
+        self.n = int(base.shape[0])
+        self.sparse = not isinstance(base, np.ndarray)
+        self.names: frozenset[str] = frozenset().union(*(c.names for c, _ in self._terms))
+        self._derivatives: dict[str, MatrixCoefficient | None] = {}
+        self._dense = None if self.sparse else (base, [pattern for _, pattern in self._terms])
+
+    @property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """The expressions in it."""
+        return tuple(c for c, _ in self._terms)
+
+    def value(self, values: Mapping[str, float]) -> Array:
+        """The matrix (n, n) at these values of the parameters, as a dense array of its own."""
+        if self._dense is None:
+            return np.asarray(self.sparse_value(values).toarray(), dtype=float)
+        base, patterns = self._dense
+        result = base.copy()
+        for (c, _), pattern in zip(self._terms, patterns, strict=True):
+            result += c.value(values) * pattern
+        return result
+
+    def sparse_value(self, values: Mapping[str, float]) -> Any:
+        """The matrix at these values of the parameters in SciPy's compressed-row form."""
+        import scipy.sparse
+
+        result = scipy.sparse.csr_array(self._base, copy=True)
+        for c, pattern in self._terms:
+            result = result + c.value(values) * scipy.sparse.csr_array(pattern)
+        return result
+
+    def products(self, vector: Array) -> list[tuple[Coefficient, Array]]:
+        """Its product with a vector (n,), as pairs of an expression and a vector that add up to it."""
+        parts = [(coefficient(1.0), self._base), *self._terms]
+        return [(c, np.asarray(pattern @ vector, dtype=float).ravel()) for c, pattern in parts]
+
+    def derivative(self, name: str) -> MatrixCoefficient | None:
+        """The derivative by a parameter; None if it is identically zero."""
+        if name not in self._derivatives:
+            self._derivatives[name] = self._differentiate(name)
+        return self._derivatives[name]
+
+    def _differentiate(self, name: str) -> MatrixCoefficient | None:
+        slopes = [(c.derivative(name), pattern) for c, pattern in self._terms if name in c.names]
+        base = self._base * 0.0
+        terms = []
+        for slope, pattern in slopes:
+            if slope.constant:
+                base = base + slope.value({}) * pattern
+            else:
+                terms.append((slope, pattern))
+        if not terms and not abs(base).max():
+            return None
+        return MatrixCoefficient(base, terms, f"derivative of {self.what} by {name}")
+
+    def __repr__(self) -> str:
+        kind = "sparse" if self.sparse else "dense"
+        inside = f" in {', '.join(sorted(self.names))}" if self.names else ""
+        return f"MatrixCoefficient({self.n} x {self.n}, {kind}{inside})"
+
+
+def matrix_coefficient(source: Any, n: int | None = None, what: str = "matrix") -> MatrixCoefficient:
+    """Read a matrix: a number or an expression (n = 1), nested lists or an array mixing numbers and expressions, a
+    sparse matrix, or a mapping `{expression: matrix}` for the sum of expression times matrix.
+
+    `n` is the size it must have, if that is known (the number 0 then stands for a matrix of zeros); `what` names it in
+    messages.
+    """
+    if isinstance(source, MatrixCoefficient):
+        result = source
+    elif isinstance(source, Mapping):
+        result = _from_terms(source, what)
+    elif hasattr(source, "tocsr"):
+        result = MatrixCoefficient(_constant(source, what), (), what)
+    else:
+        result = _from_entries(source, n, what)
+    if n is not None and result.n != n:
+        raise InputError(f"{what} is {result.n} x {result.n}, but the mass has {n} degrees of freedom")
+    return result
+
+
+def _constant(source: Any, what: str) -> Any:
+    """A square, finite matrix of numbers as a read-only float array, or in compressed-row form."""
+    matrix: Any
+    if hasattr(source, "tocsr"):
+        import scipy.sparse
+
+        if np.iscomplexobj(source):
+            raise InputError(f"{what} has complex entries; an equation of motion in time needs real ones")
+        matrix = scipy.sparse.csr_array(source, dtype=float)
+        entries = matrix.data
+    else:
+        try:
+            matrix = entries = np.array(source, dtype=float)
+        except OverflowError:  # a whole number of hundreds of digits
+            raise InputError(f"{what} has entries that are not finite") from None
+        matrix.setflags(write=False)
+    if len(matrix.shape) != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
+        raise InputError(f"{what} must be square, not of shape {tuple(matrix.shape)}")
+    if not np.all(np.isfinite(entries)):
+        raise InputError(f"{what} has entries that are not finite")
+    return matrix
+
+
+def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
+    if isinstance(source, str | Coefficient) or np.ndim(_object_array(source, what)) == 0:
+        if n is not None and n > 1:
+            if not isinstance(source, str | Coefficient) and source == 0:
+                return MatrixCoefficient(_constant(np.zeros((n, n)), what), (), what)
+            raise InputError(
+                f"{what} is a single value ({source}), but the mass has {n} degrees of freedom; give a matrix {n} x {n}"
+            )
+        source = [[source]]
+    array = _object_array(source, what)
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
+        raise InputError(f"{what} must be square, not of shape {array.shape}")
+    if array.dtype != object:
+        return MatrixCoefficient(_constant(array, what), (), what)
+    base = np.zeros(array.shape)
+    patterns: dict[Coefficient, Array] = {}
+    for (i, j), entry in np.ndenumerate(array):
+        try:
+            read = coefficient(entry)
+        except InputError as error:
+            raise InputError(f"{what}[{i}, {j}]: {error}") from None
+        if read.constant:
+            base[i, j] = read.value({})
+        else:
+            patterns.setdefault(read, np.zeros(array.shape))[i, j] = 1.0
+    return MatrixCoefficient(_constant(base, what), list(patterns.items()), what)
+
+
+def _object_array(source: Any, what: str) -> Any:
+    if isinstance(source, np.ndarray):
+        if source.dtype.kind in "fiu":  # numbers only: no need to look at every entry
+            return source
+        if source.dtype.kind not in "OU":
+            raise InputError(f"{what} must hold numbers or expressions, not {source.dtype}")
+        return source.astype(object)
+    if not isinstance(source, Sequence) or isinstance(source, str):
+        return np.array(source, dtype=object)
+    lengths = {len(row) for row in source if isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)}
+    if len(lengths) > 1:
+        raise InputError(f"{what} has rows of different lengths: {sorted(lengths)}")
+    return np.array(source, dtype=object)
+
+
+def _from_terms(source: Mapping[Any, Any], what: str) -> MatrixCoefficient:
+    if not source:
+        raise InputError(f"{what} is an empty mapping; give {{expression: matrix}}")
+    read = []
+    for expression, matrix in source.items():
+        try:
+            factor = coefficient(expression)
+        except InputError as error:
+            raise InputError(f"{what}: {error}") from None
+        read.append((factor, _constant(matrix, f"{what}[{expression!r}]")))
+    shapes = {matrix.shape for _, matrix in read}
+    if len(shapes) > 1:
+        raise InputError(f"{what}: its matrices have different shapes {sorted(shapes)}")
+    base = read[0][1] * 0.0
+    for factor, matrix in read:
+        if factor.constant:
+            base = base + factor.value({}) * matrix
+    return MatrixCoefficient(base, [(c, matrix) for c, matrix in read if not c.constant], what)
+
+
+# ------------------------------------------------------------------------------------------------------------ checks
+def check_mass(mass: Any) -> None:
+    """Refuse a mass (n, n), dense or sparse, that is asymmetric, singular or indefinite.
+
+    The message names the degree of freedom at fault if one is. The matrix is judged after scaling its diagonal to one,
+    so that degrees of freedom in other units do not matter.
+    """
+    diagonal = np.asarray(mass.diagonal(), dtype=float)
+    bad = np.flatnonzero(~(diagonal > 0.0))
+    if bad.size:
+        i = int(bad[0])
+        kind = "singular" if diagonal[i] == 0.0 else "not positive definite"
+        raise InputError(
+            f"the mass is {kind}: its diagonal entry at dof {i} is {diagonal[i]:g}; every degree of freedom needs "
+            f"inertia (condense one without out of the model)"
+        )
+    scale = 1.0 / np.sqrt(diagonal)
+    scaled = mass * scale[:, None] * scale if isinstance(mass, np.ndarray) else _scaled_sparse(mass, scale)
+    difference = abs(scaled - scaled.T)
+    if difference.max() > _ASYMMETRY:
+        i, j = _where_largest(difference)
+        raise InputError(f"the mass is not symmetric: M[{i}, {j}] = {mass[i, j]:g}, M[{j}, {i}] = {mass[j, i]:g}")
+    lowest = _lowest(scaled)
+    if lowest < -1e-12:
+        raise InputError("the mass is not positive definite: some motion would have negative kinetic energy")
+    if lowest < len(diagonal) * np.finfo(float).eps:
+        raise InputError("the mass is singular: some motion has no kinetic energy; condense it out of the model")
+
+
+def _scaled_sparse(mass: Any, scale: Any) -> Any:
+    import scipy.sparse
+
+    factor = scipy.sparse.diags_array(scale)
+    return (factor @ mass @ factor).tocsr()
+
+
+def _where_largest(matrix: Any) -> tuple[int, int]:
+    if isinstance(matrix, np.ndarray):
+        i, j = np.unravel_index(int(np.argmax(matrix)), matrix.shape)
+        return int(i), int(j)
+    coordinates = matrix.tocoo()
+    k = int(np.argmax(coordinates.data))
+    return int(coordinates.row[k]), int(coordinates.col[k])
+
+
+def _lowest(scaled: Any) -> float:
+    """The lowest eigenvalue, or for a large matrix the smallest pivot, which has its sign."""
+    if scaled.shape[0] <= _DENSE:
+        return float(np.linalg.eigvalsh(scaled if isinstance(scaled, np.ndarray) else scaled.toarray())[0])
+    import scipy.sparse
+    from scipy.sparse.linalg import splu
+
+    if isinstance(scaled, np.ndarray):
+        try:
+            return float(np.min(np.diag(np.linalg.cholesky(scaled)))) ** 2
+        except np.linalg.LinAlgError:
+            return float(np.linalg.eigvalsh(scaled)[0])
+    try:
+        # pivots on the diagonal, as in a Cholesky factorisation: all positive if and only if the matrix is definite
+        factors = splu(
+            scipy.sparse.csc_matrix(scaled),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # exactly singular
+        return 0.0
+    if np.any(factors.perm_r != factors.perm_c):  # a zero on the diagonal had to be avoided: indefinite
+        return -1.0
+    return float(factors.U.diagonal().min())
+
+
+def check_damping(damping: Any, mass_diagonal: Any) -> None:
+    """Warn (`NegativeDampingWarning`) of a damping (n, n), dense or sparse, that feeds energy into some motion."""
+    scale = 1.0 / np.sqrt(np.asarray(mass_diagonal, dtype=float))
+    if damping.shape[0] > _DENSE:
+        values = np.asarray(damping.diagonal(), dtype=float) * scale**2
+    else:
+        dense = damping if isinstance(damping, np.ndarray) else damping.toarray()
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = 0.5 * (dense + dense.T) * scale[:, None] * scale
+        values = np.linalg.eigvalsh(scaled) if np.isfinite(scaled).all() else np.zeros(1)
+    if values.min() < -_ROUNDING * np.abs(values).max():
+        warn_of_negative("the damping matrix feeds energy into some motions")
+
+
+def warn_of_negative(what: str) -> None:
+    """Say that something is damped negatively, and how to say that it is meant."""
+    warnings.warn(
+        f"{what}: they grow until another force limits them. If this self-excitation is meant, silence the warning "
+        "with warnings.simplefilter('ignore', suboctave.NegativeDampingWarning); else change the sign",
+        NegativeDampingWarning,
+        stacklevel=5,  # the line that makes the system
+    )

@@ -1,0 +1,235 @@
+"""Drawings for the browser: Plotly traces and layout as plain data, ready for JSON, made without Plotly.
+
+The same strokes, markers, colours and axes as on paper. Each entry of the legend is one kind of thing, which a click
+hides: the stable part of a curve, its unstable part, the bifurcations of one kind.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from suboctave.pictures import style
+from suboctave.pictures.drawing import Axis, Beads, Drawing, Item, Label, Markers, Polyline, Region, Surface
+from suboctave.pictures.words import DIGITS, spelt
+
+__all__ = ["SYMBOLS", "figure_data", "html_of"]
+
+SYMBOLS: dict[str | tuple[int, int, int], str] = {
+    "o": "circle", "v": "triangle-down", "^": "triangle-up", "<": "triangle-left", ">": "triangle-right",
+    "s": "square", "D": "diamond", "d": "diamond-tall", "P": "cross", "x": "x-thin", "X": "x", "*": "star",
+    "p": "pentagon", "h": "hexagon", "8": "octagon",
+    (4, 1, 0): "star-diamond", (3, 1, 0): "star-triangle-up", (3, 1, 180): "star-triangle-down",
+    (4, 1, 45): "star-square",
+}  # fmt: skip
+#: what symbols there are in space; circles for all others
+_SOLID: dict[Any, str] = {(4, 1, 0): "diamond", "s": "square", "D": "diamond", "d": "diamond", "P": "cross"}
+_SOLID |= {"x": "x", "X": "x"}
+#: pixels of a line of width 1 in the plane and in space, and of a point of a marker's size and of its edge
+_LINE, _LINE_IN_SPACE = 2.2, 3.5
+_MARK, _MARK_IN_SPACE, _RIM = 1.5, 0.7, 1.5
+#: millimetres of a frame on a screen, by which marks along lines are spaced
+_SCREEN = (160.0, 110.0)
+#: sides of a point for its text, the preferred one first; shares of the axes within which points are near
+_SIDES, _NEAR = ("middle right", "top center", "bottom center", "middle left"), 0.08
+_FONT = {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK}
+_AXIS = {"showline": True, "linecolor": style.INK, "gridcolor": style.GRID, "zeroline": False}
+_LEGEND = {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0, "font": {"size": 12}}
+_MATH = ((r"\omega", spelt("omega")), (r"\max\,", "max "), (r"\,", " "))
+
+
+def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
+    """Traces and layout of a drawing of one frame; `name` is that of the file when a reader saves the figure."""
+    in_space, frame = len(drawing.axes) == 3, drawing.frames[0]
+    # a legend entry belongs to what is drawn on top
+    shown = {item.name: item for item in sorted(frame.items, key=lambda item: item.layer) if item.name}
+    data: list[dict[str, Any]] = []
+    for items in _traces(frame.items):
+        item = items[0]
+        entry = {
+            "name": html_of(item.name),
+            "legendgroup": html_of(item.group or item.name),
+            "showlegend": any(shown.get(one.name) is one for one in items),
+        }
+        drawn = _trace(items, drawing.axes)
+        if drawn:
+            data.append(drawn | entry)
+    if frame.labels and not in_space:
+        data.append(_labels(frame.labels, drawing.axes))
+    layout = _space(drawing) if in_space else _plane(drawing)
+    return {"data": data, "layout": layout, "name": name, **({"space": True} if in_space else {})}
+
+
+def _traces(items: Sequence[Item]) -> list[list[Item]]:
+    """What belongs into one trace: all strokes of one look and name, and every other thing by itself."""
+    traces: dict[Any, list[Item]] = {}
+    for number, item in enumerate(items):
+        key: Any = (item.name, item.role, item.pen) if isinstance(item, Polyline) else number
+        traces.setdefault(key, []).append(item)
+    return list(traces.values())
+
+
+def _trace(items: Sequence[Item], axes: Sequence[Axis]) -> dict[str, Any]:
+    """The trace of a thing, or of several strokes; empty for what is drawn on paper alone."""
+    match items[0]:
+        case Polyline():
+            return _lines([item for item in items if isinstance(item, Polyline)])
+        case Markers() as item:
+            return _markers(item, item.at)
+        case Beads() as item:
+            limits = np.array([(axis.low, axis.high) for axis in axes], dtype=float)
+            at = item.places(limits[:, 0], limits[:, 1], _SCREEN)
+            return _markers(item, at) if at.shape[1] else {}
+        case Region() as item if len(item.outline) == 2:
+            fill = {"fill": "toself", "fillcolor": item.colour, "line": {"width": 0}, "hoverinfo": "skip"}
+            return {"type": "scatter", "mode": "lines", **_coordinates(item.outline), **fill}
+        case Surface() as item:
+            return {
+                "type": "surface",
+                **{letter: [_short(row) for row in part] for letter, part in zip("xyz", item.grid, strict=True)},
+                "colorscale": [[0, item.colour], [1, item.colour]],
+                "showscale": False,
+                "opacity": item.opacity,
+                "hoverinfo": "skip",
+                "contours": {letter: {"highlight": False} for letter in "xyz"},
+            }
+    return {}
+
+
+def _lines(items: Sequence[Polyline]) -> dict[str, Any]:
+    """Strokes, with a gap between one and the next."""
+    pen, gap = items[0].pen, np.full((len(items[0].at), 1), np.nan)
+    at = np.hstack([part for item in items for part in (item.at, gap)])[:, :-1]
+    texts = [text for item in items for text in [*(item.hover() if item.hover else [""] * item.at.shape[1]), ""]][:-1]
+    if len(at) == 3:
+        line = {"color": pen.colour, "width": _LINE_IN_SPACE * pen.width, "dash": _dash(pen, "dash")}
+    else:
+        line = {"color": pen.colour, "width": _LINE * pen.width, "dash": _dash(pen)}
+    hover = {"text": [_broken(text) for text in texts], "hovertemplate": _template(items[0].name)}
+    return {"type": _type(at), "mode": "lines", **_coordinates(at), **hover, "connectgaps": False, "line": line}
+
+
+def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
+    mark = item.mark
+    if len(at) == 3:
+        look = {"symbol": _SOLID.get(mark.marker, "circle"), "size": _MARK_IN_SPACE * mark.size}
+    else:
+        look = {"symbol": SYMBOLS[mark.marker], "size": _MARK * mark.size}
+    edge = {"color": mark.edge, "width": _RIM * mark.rim}
+    hover: dict[str, Any] = {"hoverinfo": "skip"}
+    if item.name:
+        texts = [_broken(text) for text in item.hover()] if item.hover else []
+        hover = {"text": texts, "hovertemplate": _template(item.name, bool(texts))}
+    marker = {**look, "color": mark.face, "line": edge}
+    return {"type": _type(at), "mode": "markers", **_coordinates(at), **hover, "marker": marker}
+
+
+def _labels(labels: Sequence[Label], axes: Sequence[Axis]) -> dict[str, Any]:
+    """Texts beside points, each on a side where none is of the points nearby; the same text at the same place once."""
+    size = np.array([float(axis.high or 0.0) - float(axis.low or 0.0) for axis in axes])
+    taken: list[tuple[np.ndarray, str, str]] = []
+    for label in labels:
+        near = [(side, text) for at, side, text in taken if np.abs((at - label.at) / size).max() < _NEAR]
+        beside = [(other.at - label.at)[0] for other in labels if np.abs((other.at - label.at) / size).max() < _NEAR]
+        sides = _SIDES if max(beside) <= 0.0 else _SIDES[::-1]  # away from a point on the right
+        if label.text not in [text for _, text in near]:
+            free = [side for side in sides if side not in [other for other, _ in near]]
+            taken.append((label.at, (free or sides)[0], label.text))
+    return {
+        "type": "scatter",
+        "mode": "text",
+        "name": "",
+        "cliponaxis": False,
+        **_coordinates(np.array([at for at, _, _ in taken]).T),
+        "text": [f"\u2002{html_of(text)}\u2002" for _, _, text in taken],
+        "textposition": [side for _, side, _ in taken],
+        "hoverinfo": "skip",
+        "showlegend": False,
+    }
+
+
+def _type(at: np.ndarray) -> str:
+    return "scatter3d" if len(at) == 3 else "scatter"
+
+
+def _template(name: str, with_text: bool = True) -> str:
+    return html_of(name) + ("<br>%{text}" if with_text else "") + "<extra></extra>"
+
+
+def _broken(text: str) -> str:
+    return html.escape(text).replace("\n", "<br>")
+
+
+def _dash(pen: style.Pen, name: str = "") -> str:
+    """The dashes of a line, in pixels; in space, where there are few, by `name`."""
+    if isinstance(pen.dash, str):
+        return pen.dash
+    return name or ",".join(f"{max(1, round(_LINE * part))}px" for part in pen.dash[1])
+
+
+def _coordinates(at: np.ndarray) -> dict[str, list[float | None]]:
+    return {letter: _short(row) for letter, row in zip("xyz", at, strict=False)}
+
+
+def _short(values: np.ndarray) -> list[float | None]:
+    """Numbers with the digits that a screen can show; null where there is none."""
+    return [float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None for value in values.tolist()]
+
+
+# --------------------------------------------------------------------------------------------------------------- layout
+def _axis(axis: Axis, **others: Any) -> dict[str, Any]:
+    limits = {} if axis.low is None or axis.high is None else {"range": [axis.low, axis.high]}
+    return {**_AXIS, "title": {"text": html_of(axis.label)}, **limits, **others}
+
+
+def _plane(drawing: Drawing) -> dict[str, Any]:
+    across, upwards = (_axis(axis, mirror=True, ticks="inside") for axis in drawing.axes)
+    across["title"]["standoff"] = 8
+    return {
+        "font": _FONT,
+        "margin": {"l": 64, "r": 12, "t": 34, "b": 52},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "hovermode": "closest",
+        "hoverlabel": {"align": "left"},
+        "xaxis": {**across, "automargin": True},
+        "yaxis": upwards,
+        "legend": _LEGEND,
+    }
+
+
+def _space(drawing: Drawing) -> dict[str, Any]:
+    return {
+        "font": _FONT,
+        "margin": {"l": 0, "r": 0, "t": 34, "b": 0},
+        "paper_bgcolor": "white",
+        "legend": _LEGEND,
+        "scene": {
+            **{f"{letter}axis": _axis(axis) for letter, axis in zip("xyz", drawing.axes, strict=True)},
+            "aspectmode": "manual",
+            "aspectratio": {"x": 1.5, "y": 1.15, "z": 0.95},
+            "camera": {"eye": {"x": 1.05, "y": -1.75, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.2}},
+        },
+    }
+
+
+def html_of(text: str) -> str:
+    """A text of a figure as HTML: what is between dollar signs in letters, with indices."""
+    pieces = re.split(r"(?<!\\)\$", html.escape(text))
+    if len(pieces) % 2 == 0:  # a single dollar sign is itself
+        return html.escape(text).replace(r"\$", "$")
+    pieces[1::2] = [_formula(piece) for piece in pieces[1::2]]
+    return "".join(pieces).replace(r"\$", "$")
+
+
+def _formula(text: str) -> str:
+    for spelling, letter in _MATH:
+        text = text.replace(spelling, letter)
+    for command, accent in (("ddot", "\u0308"), ("dot", "\u0307")):
+        text = re.sub(rf"\\{command}{{(\w)((?:_{{\w+}}|_\w)?)}}", rf"\1{accent}\2", text)
+    return re.sub(r"_{(\w+)}|_(\w)", r"<sub>\1\2</sub>", text)

@@ -1,0 +1,280 @@
+"""What a figure shows, whoever draws it: strokes, markers, regions, labels and a legend, in the units of its axes.
+
+A kind of figure is laid out once, as a `Drawing` made from datasets. `paper` draws it with Matplotlib, `browser` writes
+it down for Plotly. Texts are those of Matplotlib, with formulas between dollar signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from suboctave.pictures import style
+from suboctave.pictures.style import Mark, Pen
+
+__all__ = [
+    "Axis",
+    "Band",
+    "Beads",
+    "Drawing",
+    "Entry",
+    "Frame",
+    "Guide",
+    "Item",
+    "Label",
+    "Markers",
+    "Polyline",
+    "Raster",
+    "Region",
+    "Surface",
+    "Ticks",
+    "dot",
+    "event_rank",
+    "extent",
+    "ordered",
+    "plain",
+]
+
+
+#: millimetres between beads along a line, and between one and a marker
+_SPACING, _CLEAR = 11.0, 2.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """What everything that is drawn has.
+
+    `role`: what it is, in one word; `layer`: higher ones cover lower ones; `name`, `group`: its entry in a legend of
+    the browser, and what is hidden with it; `hover()`, (vertices,): what is said of each vertex under the mouse.
+    """
+
+    role: str = ""
+    layer: float = 3.0
+    name: str = ""
+    group: str = ""
+    hover: Callable[[], Sequence[str]] | None = None
+
+
+@dataclass(frozen=True)
+class Polyline(_Seen):
+    """A line through vertices, (axes, vertices), `smooth` but for its corners, or straight between them."""
+
+    at: np.ndarray
+    pen: Pen
+    smooth: bool = False
+
+
+@dataclass(frozen=True)
+class Markers(_Seen):
+    """One marker at each of some places, (axes, places); `cut` where the frame ends, or beyond it too."""
+
+    at: np.ndarray
+    mark: Mark
+    cut: bool = False
+
+
+@dataclass(frozen=True)
+class Beads(_Seen):
+    """Markers at about equal distances along a line, (axes, vertices), none beside places `clear`, (axes, places)."""
+
+    at: np.ndarray
+    mark: Mark
+    clear: np.ndarray
+
+    def places(self, low: np.ndarray, high: np.ndarray, size: tuple[float, float]) -> np.ndarray:
+        """Where they are, (axes, places), in a frame from `low` to `high` that is so many millimetres wide and high."""
+        per_unit = (np.array(size) / (high - low))[:, None]
+        spots = _stations((self.at - low[:, None]) * per_unit, _SPACING)
+        inside = np.all((spots >= 0.0) & (spots <= np.array(size)[:, None]), axis=0)
+        near = (self.clear - low[:, None]) * per_unit
+        distance = np.linalg.norm(spots[:, :, None] - near[:, None, :], axis=0).min(axis=1, initial=np.inf)
+        return spots[:, inside & (distance > _CLEAR)] / per_unit + low[:, None]
+
+
+@dataclass(frozen=True)
+class Region(_Seen):
+    """What is inside an outline, (axes, vertices)."""
+
+    outline: np.ndarray
+    colour: str
+
+
+@dataclass(frozen=True)
+class Surface(_Seen):
+    """A surface in space through a grid, (3, rows, columns)."""
+
+    grid: np.ndarray
+    colour: str
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class Guide(_Seen):
+    """A straight line through the whole frame at a value, of the first axis (`upright`) or of the second."""
+
+    value: float
+    pen: Pen
+    upright: bool = False
+
+
+@dataclass(frozen=True)
+class Band(_Seen):
+    """What lies between two values of the second axis."""
+
+    low: float
+    high: float
+    colour: str
+
+
+@dataclass(frozen=True)
+class Raster(_Seen):
+    """Cells of one colour each, (rows, columns, 3), from the lower left, between ascending edges.
+
+    `hatched`, `dotted`, (rows, columns), bool: cells with strokes or dots besides. `scale`: colours with their values,
+    lowest and highest, and what they mean.
+    """
+
+    cells: np.ndarray
+    across: np.ndarray
+    upwards: np.ndarray
+    hatched: np.ndarray | None = None
+    dotted: np.ndarray | None = None
+    scale: tuple[Sequence[str], float, float, str] | None = None
+
+
+Item: TypeAlias = Polyline | Markers | Beads | Region | Surface | Guide | Band | Raster
+
+
+@dataclass(frozen=True)
+class Label:
+    """A short text beside a place, (axes,)."""
+
+    at: np.ndarray
+    text: str
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How a name is shown in the legend: a line, a marker or both, or a patch, perhaps with a marker in it."""
+
+    pen: Pen | None = None
+    mark: Mark | None = None
+    patch: str | None = None
+    edge: str | None = None
+    opacity: float = 1.0
+    hatched: bool = False
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Where an axis has ticks: at most so many, at multiples of `steps`; or at `places` with these texts."""
+
+    most: int = 9
+    steps: tuple[float, ...] = (1, 2, 5, 10)
+    whole: bool = False
+    minor: float | None = None
+    places: Sequence[float] = ()
+    texts: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: what it says, from where to where (None: what is drawn decides), its scale and ticks."""
+
+    label: str
+    low: float | None = None
+    high: float | None = None
+    logarithmic: bool = False
+    ticks: Ticks | None = None
+
+
+@dataclass
+class Frame:
+    """What stands in one frame, with a text above."""
+
+    items: list[Item] = field(default_factory=list)
+    labels: list[Label] = field(default_factory=list)
+    title: str = ""
+
+
+@dataclass
+class Drawing:
+    """One or several frames on the same axes, with one legend.
+
+    `legend`: "free" is inside the frame where there is room, else above; "outside" above in any case; "grow" like
+    "free", but the page becomes higher; "beside" and "below" the frame, without a box. `title` stands above all frames;
+    titles of frames are `small` where they are captions.
+    """
+
+    axes: Sequence[Axis]
+    frames: list[Frame] = field(default_factory=lambda: [Frame()])
+    entries: dict[str, Entry] = field(default_factory=dict)
+    title: str = ""
+    columns: int = 1
+    legend: str = "free"
+    grid: bool = True
+    small: bool = False
+    #: of a drawing in space: degrees above the floor, and around the vertical axis
+    seen_from: tuple[float, float] = (24.0, -58.0)
+
+    def add(self, *items: Item) -> None:
+        """Add to what is drawn in the first frame."""
+        self.frames[0].items += items
+
+
+def extent(items: Iterable[Item]) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest values of lines and markers, (axes,) each."""
+    every = np.concatenate([item.at for item in items if isinstance(item, Polyline | Markers)], axis=1)
+    known = [row[np.isfinite(row)] for row in every]
+    return (
+        np.array([row.min() if row.size else 0.0 for row in known]),
+        np.array([row.max() if row.size else 0.0 for row in known]),
+    )
+
+
+def _stations(path: np.ndarray, spacing: float) -> np.ndarray:
+    """Places, (2, places), at about equal distances along a polyline (2, vertices), none at its ends.
+
+    At least one if it is not short; `path` and `spacing` in one unit of length.
+    """
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=1)))])
+    length = float(along[-1])
+    if not np.isfinite(length) or length < 0.25 * spacing:
+        return np.empty((2, 0))
+    count = max(1, round(length / spacing))
+    at = (np.arange(count) + 0.5) * length / count
+    return np.array([np.interp(at, along, row) for row in path])
+
+
+def event_rank(kind: str) -> tuple[int, str]:
+    """The place of a kind of event in a legend: as in the table of styles, then a user's own."""
+    order = list(style.KINDS)
+    return (order.index(kind) if kind in order else len(order)), kind
+
+
+def ordered(entries: dict[str, Entry]) -> dict[str, Entry]:
+    """Curves first, then stable and unstable, then the kinds in the order of the style table, then a user's own."""
+    lines = ["stable", "unstable"]
+    kinds = [name for look in style.KINDS.values() for name in (look.name, f"{look.name}{style.SUBCRITICAL}")]
+
+    def rank(name: str) -> tuple[int, int]:
+        if name in lines:
+            return 1, lines.index(name)
+        if name in kinds:
+            return 2, kinds.index(name)
+        return (0, 0) if entries[name].mark is None else (3, 0)
+
+    return {name: entries[name] for name in sorted(entries, key=rank)}
+
+
+def dot(colour: str, size: float = 4.0) -> Mark:
+    """A point of one colour, without an edge."""
+    return Mark("o", size, colour, colour, 0.0)
+
+
+def plain(text: str) -> str:
+    """A name as it is: dollar signs in it do not begin mathematics."""
+    return str(text).replace("$", r"\$")

@@ -1,0 +1,247 @@
+"""Isolas in pictures: their regions and ends in a plane, the surfaces that their closed branches lie on in space.
+
+Drawn from the dataset that `suboctave.store.isolas` describes, given among those of the curves. `plot_isola_map` shows
+where in the plane of two design parameters isolas exist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.pictures import style
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Region
+from suboctave.pictures.paper import figure_of
+from suboctave.pictures.periods import period_colour, period_name
+from suboctave.pictures.style import Pen, tinted
+from suboctave.store.layout import coordinate
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "CENTRE",
+    "MERGING",
+    "IsolaRegion",
+    "end_text",
+    "is_isolas",
+    "isola_regions",
+    "parameter_of",
+    "plot_isola_map",
+    "shade",
+    "split",
+    "surface",
+    "with_ends",
+]
+
+#: kinds that the events at the two ends of an isola have in pictures
+CENTRE, MERGING = "isola_centre", "isola_merging"
+#: an event within this, relative to its values, is the end itself
+_SAME = 1e-8
+#: share of white in the region of an isola, in a plane with curves and in a map
+_PALE, _PALE_MAP = 0.82, 0.72
+#: places along a loop of a surface, from its largest to its least frequency
+_SAMPLES = 60
+
+
+@dataclass(frozen=True)
+class IsolaRegion:
+    """Where one isola is, in the plane of frequency and parameter: `low` and `high` omega at ascending values.
+
+    `parameter` is the name of the design parameter, `words` what a legend says, `colour` that of its period.
+    """
+
+    parameter: str
+    words: str
+    colour: str
+    value: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    def outline(self, names: Sequence[str | None]) -> np.ndarray | None:
+        """Once around it in the plane of two axes, (2, vertices); None where these are not omega and its parameter."""
+        if set(names) != {"omega", self.parameter}:
+            return None
+        omega = np.concatenate([self.low, self.high[::-1], self.low[:1]])
+        value = np.concatenate([self.value, self.value[::-1], self.value[:1]])
+        return np.array([omega if name == "omega" else value for name in names])
+
+
+def is_isolas(dataset: xarray.Dataset) -> bool:
+    """Whether a dataset is that of isolas."""
+    return bool(dataset.attrs.get("isolas"))
+
+
+def parameter_of(dataset: xarray.Dataset) -> str:
+    """The design parameter of a dataset of isolas."""
+    return str(dataset.attrs["isolas"])
+
+
+def split(datasets: Sequence[xarray.Dataset]) -> tuple[list[xarray.Dataset], list[xarray.Dataset]]:
+    """The datasets of curves, and those of isolas."""
+    heads = [dataset for dataset in datasets if is_isolas(dataset)]
+    return [dataset for dataset in datasets if not is_isolas(dataset)], heads
+
+
+def isola_regions(heads: Sequence[xarray.Dataset]) -> list[IsolaRegion]:
+    """The region of each isola."""
+    regions = []
+    for head in heads:
+        which = head["edge_isola"].to_numpy()
+        value, low, high = (head[f"edge_{name}"].to_numpy() for name in ("value", "low", "high"))
+        for number, nu in enumerate(head["period"].to_numpy()):
+            own, words = which == number, f"{period_name(int(nu))} isola"
+            colour = period_colour(int(nu))
+            regions.append(IsolaRegion(parameter_of(head), words, colour, value[own], low[own], high[own]))
+    return regions
+
+
+def shade(
+    heads: Sequence[xarray.Dataset], names: Sequence[str | None], factors: np.ndarray, floor: float | None = None
+) -> list[Region]:
+    """The regions of isolas in the plane of two axes, if it is theirs; in space on the floor, at this height."""
+    shaded = []
+    for region in isola_regions(heads):
+        outline = region.outline(names)
+        if outline is None:
+            continue
+        outline = outline * factors[:2, None]
+        colour = tinted(region.colour, _PALE)
+        if floor is None:
+            shaded.append(Region(outline, colour, role="isola", layer=1.5, name=region.words, group=region.words))
+        else:
+            outline = np.vstack([outline, np.full(outline.shape[1], floor)])
+            shaded.append(Region(outline, colour, role="isola-floor", layer=0.9))
+    return shaded
+
+
+def with_ends(dataset: xarray.Dataset, heads: Sequence[xarray.Dataset]) -> xarray.Dataset:
+    """The dataset of a curve, the ends of isolas among its events under kinds of their own."""
+    kinds = dataset["event_kind"].to_numpy().astype(object)
+    for kind, parameter, omega, value in _ends(heads):
+        if parameter not in dataset["parameter"].to_numpy():
+            continue
+        there, at = dataset["event_omega"].to_numpy(), coordinate(dataset, parameter)[1]
+        same = (np.abs(there - omega) <= _SAME * abs(omega)) & (np.abs(at - value) <= _SAME * max(abs(value), 1e-300))
+        kinds[same] = kind
+    return dataset.assign(event_kind=("event", kinds))
+
+
+def _ends(heads: Sequence[xarray.Dataset]) -> Iterator[tuple[str, str, float, float]]:
+    for head in heads:
+        for kind, name in ((CENTRE, "born"), (MERGING, "merges")):
+            for value, omega in zip(head[name].to_numpy(), head[f"{name}_omega"].to_numpy(), strict=True):
+                if np.isfinite(value):
+                    yield kind, parameter_of(head), float(omega), float(value)
+
+
+def end_text(kind: str, value: float | None) -> str:
+    """What stands beside an end, with the value of the parameter where that is drawn upwards."""
+    word = "born" if kind == CENTRE else "merges"
+    return word if value is None else f"{word} {value:#.4g}"
+
+
+# ------------------------------------------------------------------------------------------------------------- surfaces
+def surface(loops: Sequence[np.ndarray], tips: Sequence[np.ndarray] = ()) -> np.ndarray | None:
+    """The grid (3, rows, columns) through loops and points that they shrink to, in the order of the parameter.
+
+    Each loop is cut at its least and its largest frequency into two arcs, and the places at equal shares of their
+    lengths are joined from loop to loop. In between that is interpolation: a picture of how the loops hang together.
+
+    `loops`, (3, vertices) each: frequency and parameter, in either order, and the quantity upwards, once around;
+    `tips`, (3,) each. None where there are fewer than two rows.
+    """
+    if not loops or len(loops) + len(tips) < 2:
+        return None
+    along = 0 if np.ptp(loops[0][0]) > 0.0 else 1
+    scale = np.max([np.ptp(loop, axis=1) for loop in loops], axis=0)[:, None]
+    scale[scale == 0.0] = 1.0
+    rows: list[np.ndarray] = []
+    for loop in sorted(loops, key=lambda loop: float(loop[1 - along][0])):
+        both = _arcs(loop, along, scale)
+        if rows:
+            far = [float(np.sum(((arcs - rows[-1]) / scale)[[along, 2]] ** 2)) for arcs in both]
+        else:  # the first one begins with its upper arc
+            far = [-float(np.mean(arcs[2, :_SAMPLES])) for arcs in both]
+        rows.append(both[int(np.argmin(far))])
+    for tip in tips:
+        rows.append(np.repeat(np.asarray(tip, dtype=float)[:, None], 2 * _SAMPLES, axis=1))
+    rows.sort(key=lambda row: float(row[1 - along][0]))
+    return np.stack(rows, axis=1)
+
+
+def _arcs(loop: np.ndarray, along: int, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The loop from its largest frequency to the least and back, (3, 2 samples), in both senses."""
+    vertices = loop[:, :-1] if np.allclose(loop[:, 0], loop[:, -1]) else loop
+    vertices = np.roll(vertices, -int(np.argmax(vertices[along])), axis=1)
+    turn = int(np.argmin(vertices[along]))
+    there, back = vertices[:, : turn + 1], np.column_stack([vertices[:, turn:], vertices[:, 0]])
+    first, second = _spread(there, scale), _spread(back, scale)
+    return np.hstack([first, second]), np.hstack([second[:, ::-1], first[:, ::-1]])
+
+
+def _spread(arc: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Places at equal shares of the length of an arc, (3, samples)."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(arc / scale, axis=1), axis=0))])
+    return np.array([np.interp(np.linspace(0.0, length[-1], _SAMPLES), length, row) for row in arc])
+
+
+# ------------------------------------------------------------------------------------------------------------------ map
+#: borders of the regions of a map; a bound of the search is no border of nature
+_BORDERS = {
+    "birth (isola centre)": Pen("#009E73", 1.3),
+    "merging": Pen("#D55E00", 1.3, style.UNSTABLE_DASH),
+    "end": Pen(style.INK),
+    "bounds": Pen(style.SOFT, 0.8, (0, (1.2, 1.2))),
+}
+_Outline = tuple[np.ndarray, np.ndarray, np.ndarray]
+_Piece = tuple[str, np.ndarray, np.ndarray]
+
+
+def plot_isola_map(
+    regions: Sequence[tuple[str, _Outline, Sequence[Sequence[_Piece]]]],
+    names: tuple[str, str],
+    path: str | Path | None = None,
+    *,
+    bounds: tuple[float, float],
+    title: str | None = None,
+    size: str | tuple[float, float] = (6.4, 4.2),
+    xlim: Sequence[float] | None = None,
+    ylim: Sequence[float] | None = None,
+    xlabel: str | None = None,
+    ylabel: str | None = None,
+) -> Figure:
+    """Shaded regions over two design parameters, `names` to the right and upwards.
+
+    Parameters
+    ----------
+    regions
+        For each the period of its motions ("2T"); its outline (values to the right, lower and upper end); the pieces of
+        its lower and of its upper border (what it is, to the right, upwards).
+    bounds
+        What is shown of the parameter to the right, unless `xlim` says otherwise.
+    """
+    frame, entries, shown = Frame(title=style.checked_text(title)), {}, []
+    for period, (values, low, high), borders in regions:
+        colour = tinted(period_colour(1 if period == "T" else int(period[:-1])), _PALE_MAP)
+        outline = np.array([[*values, *values[::-1]], [*low, *high[::-1]]])
+        frame.items.append(Region(outline, colour, role="isola", layer=1.0))
+        shown.append(outline)
+        entries[f"{period} isola"] = Entry(patch=colour)
+        for words, x, y in (piece for pieces in borders for piece in pieces):
+            frame.items.append(Polyline(np.array([x, y]), _BORDERS[words], role=words))
+            entries[words] = Entry(_BORDERS[words])
+    upwards: Any = ylim
+    if ylim is None and shown:
+        every = np.concatenate([*shown, *(i.at for i in frame.items if isinstance(i, Polyline))], axis=1)[1]
+        margin = 0.12 * float(np.nanmax(every) - np.nanmin(every))
+        upwards = float(np.nanmin(every)) - margin, float(np.nanmax(every)) + margin
+    across = bounds if xlim is None else xlim
+    bottom, top = upwards or (None, None)
+    axes = Axis(xlabel or names[0], across[0], across[1]), Axis(ylabel or names[1], bottom, top)
+    return figure_of(Drawing(axes, [frame], entries), style.sheet_of(size), path)

@@ -1,0 +1,448 @@
+"""The options of figures: which quantity is drawn over which axes, in which units, and what the axes say of it.
+
+The public verbs take these as keywords; `View` and `MotionView` hold them once they are checked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import numpy as np
+
+from suboctave.errors import InputError, suggest
+from suboctave.pictures.periods import period_of
+from suboctave.store.layout import check_component, coordinate, has_component, reading_name
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = [
+    "DERIVATIVES",
+    "QUANTITIES",
+    "Coordinates",
+    "CurveOptions",
+    "HistoryOptions",
+    "MotionView",
+    "SpaceOptions",
+    "SpectrumOptions",
+    "UnitOptions",
+    "View",
+    "as_multiple",
+    "keywords_of",
+    "shown_multiple",
+]
+
+# What the axis says, with {x} the observed displacement, {k} the harmonic, {e} the element.
+QUANTITIES = {
+    "amplitude": r"amplitude $\max\,|{x}|$",
+    "rms": r"RMS of ${x}$",
+    "velocity": r"velocity $\max\,|\dot{{{x}}}|$",
+    "velocity_rms": r"RMS of $\dot{{{x}}}$",
+    "acceleration": r"acceleration $\max\,|\ddot{{{x}}}|$",
+    "acceleration_rms": r"RMS of $\ddot{{{x}}}$",
+    "harmonic": r"harmonic {k} of ${x}$",  # of harmonic 0 see _MEAN
+    "phase": r"phase of harmonic {k} of ${x}$",
+    "peak_force": r"peak force, element {e}",
+    "contact_share": r"share of period in contact, element {e}",
+    "impacts": r"impacts per period, element {e}",
+    "transmitted_force": "peak force on the ground",
+    "transmissibility": "transmissibility",
+}
+_MEAN = r"mean of ${x}$, in modulus"
+_FREQUENCIES = ("rad/s", "Hz")
+_NUMBERED = {"harmonic": "harmonic", "phase": "harmonic"} | dict.fromkeys(
+    ("peak_force", "contact_share", "impacts"), "element"
+)
+_OF_A_DOF = frozenset(list(QUANTITIES)[:8])
+#: what of a displacement may be shown: the order of its derivative by time
+DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_DOTS = ("x", r"\dot{x}", r"\ddot{x}")
+
+
+class UnitOptions(TypedDict, total=False):
+    """Keywords of every figure of curves or motions: units and texts of the axes, see `Units`."""
+
+    frequency: str | None
+    omega_reference: float | None
+    scale: float | None
+    unit: str | None
+    xlabel: str | None
+    ylabel: str | None
+
+
+class SpaceOptions(UnitOptions, total=False):
+    """Keywords of `plot_space`: the quantity of curves, see `View`, and its units."""
+
+    quantity: str | None
+    harmonic: float | None
+    element: int | None
+    dof: int | None
+
+
+class CurveOptions(SpaceOptions, total=False):
+    """Keywords of `plot`: the quantity of curves, its units, and what of the frame is shown, see `View`."""
+
+    xlim: Sequence[float] | None
+    ylim: Sequence[float] | None
+    marks: Sequence[str] | None
+
+
+class SpectrumOptions(UnitOptions, total=False):
+    """Keywords of `plot_spectrum`: the quantity of motions, see `MotionView`, and its units."""
+
+    quantity: str
+
+
+class HistoryOptions(SpectrumOptions, total=False):
+    """Keywords of `plot_history`: the quantity of motions, or the force of an element, and its units."""
+
+    element: int | None
+
+
+def keywords_of(verb: str, given: Mapping[str, Any], known: type) -> dict[str, Any]:
+    """The keywords given to a verb; TypeError for one that is not among those `known`, a TypedDict."""
+    for name in given:
+        if name not in known.__annotations__:
+            raise TypeError(
+                f"{verb}() got an unexpected keyword argument {name!r}{suggest(name, known.__annotations__)}"
+            )
+    return dict(given)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Units:
+    """Units and texts of the axes.
+
+    Attributes
+    ----------
+    frequency
+        "rad/s" or "Hz" (where time is in seconds); None leaves omega without a unit.
+    omega_reference
+        The axis shows `omega / omega_reference`; of motions time is `omega_reference t`, and velocities are
+        derivatives by that.
+    scale, unit
+        Values are multiplied by `scale`, and the label ends in `(unit)`: `scale=1e3, unit="mm"` for lengths in m, or
+        `scale=1/0.02` for a displacement in units of 0.02. Phases are in degrees unless scaled.
+    xlabel, ylabel
+        Instead of the labels that follow from the above.
+    """
+
+    frequency: str | None = None
+    omega_reference: float | None = None
+    scale: float | None = None
+    unit: str | None = None
+    xlabel: str | None = None
+    ylabel: str | None = None
+
+    def __post_init__(self) -> None:
+        frequency, reference = self.frequency, self.omega_reference
+        if frequency is not None and frequency not in _FREQUENCIES:
+            raise InputError(f"frequency is 'rad/s' or 'Hz', not {frequency!r}{suggest(str(frequency), _FREQUENCIES)}")
+        for name, value in (("omega_reference", reference), ("scale", self.scale)):
+            if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+                raise InputError(f"{name} must be a positive number, not {value!r}")
+        if frequency is not None and reference is not None:
+            raise InputError("frequency= gives the axis a unit, omega_reference= takes it away: choose one")
+
+    @property
+    def per_omega(self) -> float:
+        """What a frequency is multiplied by on an axis of frequencies."""
+        return 1.0 / (2.0 * math.pi) if self.frequency == "Hz" else 1.0 / (self.omega_reference or 1.0)
+
+    @property
+    def of_omega(self) -> str:
+        """What an axis of forcing frequencies says."""
+        if self.frequency == "Hz":
+            return "forcing frequency (Hz)"
+        if self.omega_reference is not None:
+            return r"frequency ratio $\omega/\omega_0$"
+        return r"forcing frequency $\omega$" + (" (rad/s)" if self.frequency else "")
+
+
+@dataclass(frozen=True)
+class View(Units):
+    """What is drawn of curves and in which units.
+
+    Attributes
+    ----------
+    quantity
+        What is drawn upwards: "amplitude", or a reading such as "rms", "velocity", "harmonic", "phase", "peak_force".
+        Default the amplitude, with `harmonic` that of this harmonic.
+    harmonic, element, dof
+        Of which multiple of omega (default 1; 0 is the mean, 0.5 a component of motions of two load periods), of which
+        element, of which degree of freedom (default: the observed one).
+    xlim, ylim
+        Part of the axes that is shown, in the units that they show; default everything.
+    marks
+        Kinds of bifurcations and names of events that get markers; default all.
+
+    Others as `Units`.
+    """
+
+    quantity: str = ""
+    harmonic: float | None = None
+    element: int | None = None
+    dof: int | None = None
+    xlim: Sequence[float] | None = None
+    ylim: Sequence[float] | None = None
+    marks: Sequence[str] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.quantity:
+            object.__setattr__(self, "quantity", "amplitude" if self.harmonic is None else "harmonic")
+        if self.quantity not in QUANTITIES:
+            raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), QUANTITIES)}")
+        needs = _NUMBERED.get(self.quantity)
+        for name, given in (("harmonic", self.harmonic), ("element", self.element)):
+            if given is not None and needs != name:
+                raise InputError(f"{name}={given!r} says nothing about the quantity {self.quantity!r}; leave it out")
+        if self.harmonic is not None:
+            object.__setattr__(self, "harmonic", as_multiple(self.harmonic))
+        if needs == "element":
+            _check_element(self.quantity, self.element)
+        if self.dof is not None and self.quantity not in _OF_A_DOF:
+            raise InputError(f"the quantity {self.quantity!r} is not one of a degree of freedom: leave dof= out")
+        super().__post_init__()
+        for name, limits in (("xlim", self.xlim), ("ylim", self.ylim)):
+            if limits is not None:
+                _check_limits(name, limits)
+        if isinstance(self.marks, str):
+            raise InputError(f'marks is a list of kinds: marks=["{self.marks}"]')
+
+    @property
+    def variable(self) -> str:
+        """The variable of the dataset that is drawn: the name of a reading."""
+        needs = _NUMBERED.get(self.quantity)
+        number = {None: None, "element": self.element, "harmonic": self.multiple}[needs]
+        return reading_name(self.quantity, number, self.dof)
+
+    @property
+    def multiple(self) -> float:
+        """The harmonic that is drawn where one is."""
+        return 1.0 if self.harmonic is None else self.harmonic
+
+    @property
+    def in_degrees(self) -> bool:
+        """Whether phases are drawn, in degrees."""
+        return self.quantity == "phase" and self.scale is None
+
+    def readings(self, nu: int) -> list[str]:
+        """The read-offs to lay out of motions of nu load periods so that they can be drawn."""
+        return [] if self.variable == "amplitude" or not self._has_component(nu) else [self.variable]
+
+    def _has_component(self, nu: int) -> bool:
+        return _NUMBERED.get(self.quantity) != "harmonic" or has_component(self.multiple, nu)
+
+    def completed(self, datasets: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
+        """The datasets with the component that is drawn, also where motions have none at that frequency.
+
+        It is zero there, and its phase nan. InputError where none of the motions has it.
+        """
+        periods = [period_of(dataset) for dataset in datasets]
+        if _NUMBERED.get(self.quantity) == "harmonic":
+            check_component(self.multiple, periods)
+        nothing = math.nan if self.quantity == "phase" else 0.0
+        return [
+            dataset
+            if self._has_component(nu)
+            else dataset.assign(
+                {
+                    f"{prefix}{self.variable}": (of, np.full(dataset.sizes[of], nothing))
+                    for prefix, of in (("", "point"), ("event_", "event"))
+                }
+            )
+            for dataset, nu in zip(datasets, periods, strict=True)
+        ]
+
+    def label(self, datasets: Sequence[xarray.Dataset]) -> str:
+        """What the axis of the quantity says, without a unit; the curves may observe different DOFs."""
+        dofs = list(dict.fromkeys(int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets))
+        dofs = dofs if self.dof is None else [self.dof]
+        x = "x_i" if len(dofs) > 1 else "x" if int(datasets[0].attrs.get("dofs", 1)) == 1 else f"x_{{{dofs[0]}}}"
+        says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else QUANTITIES[self.quantity]
+        text = says.format(x=x, k=shown_multiple(self.multiple), e=self.element)
+        return text + (f", $i$ = {', '.join(map(str, dofs))}" if len(dofs) > 1 and "{x}" in says else "")
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The axes of a frame of curves: across, perhaps into the depth, upwards.
+
+    `names` has "omega" or a parameter for each, None for the quantity of the view. `scale` and `unit` of the view are
+    those of the last axis that is no frequency.
+    """
+
+    names: tuple[str | None, ...]
+    view: View = View()
+
+    @property
+    def factors(self) -> np.ndarray:
+        """What values along the axes are multiplied by, (axes,)."""
+        view = self.view
+        scale = math.degrees(1.0) if None in self.names and view.in_degrees else float(view.scale or 1.0)
+        return np.array(
+            [view.per_omega if n == "omega" else scale if i == self._scaled else 1.0 for i, n in enumerate(self.names)]
+        )
+
+    @property
+    def _scaled(self) -> int:
+        return max((i for i, name in enumerate(self.names) if name != "omega"), default=-1)
+
+    def check(self, dataset: xarray.Dataset) -> None:
+        """InputError where the dataset does not have what is drawn."""
+        name = self.view.variable
+        if None in self.names and (name not in dataset or f"event_{name}" not in dataset):
+            raise InputError(
+                f"this dataset has no {name!r}: draw the branch itself, or lay it out with "
+                f"branch.to_xarray(readings=[{name!r}])"
+            )
+
+    def of(self, dataset: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
+        """Positions of the points, (axes, points), and of the events, (axes, events), as the axes show them."""
+        variable = self.view.variable
+        columns = [
+            coordinate(dataset, name)
+            if name is not None
+            else (dataset[variable].to_numpy(), dataset[f"event_{variable}"].to_numpy())
+            for name in self.names
+        ]
+        factors = self.factors[:, None]
+        points, events = (np.array(part, dtype=float) for part in zip(*columns, strict=True))
+        return points * factors, events * factors
+
+    def limits(
+        self, datasets: Sequence[xarray.Dataset], *margins: float, from_zero: bool = False
+    ) -> list[tuple[float, float]]:
+        """The limits of the axes: `xlim` and `ylim` of the view, else all points and events with a margin.
+
+        `margins`: shares of each axis beyond what is drawn; `from_zero`: a quantity never negative begins there.
+        """
+        every = np.concatenate([part for dataset in datasets for part in self.of(dataset)], axis=1)
+        view, limits = self.view, []
+        if view.xlim is not None:
+            inside = (every[0] >= view.xlim[0]) & (every[0] <= view.xlim[1])
+            every = every[:, inside] if inside.any() else every
+        for name, row, margin in zip(self.names, every, margins, strict=True):
+            known = row[np.isfinite(row)]
+            low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+            at_zero = from_zero and name is None and low >= 0.0
+            if at_zero:
+                low, high = 0.0, high or 1.0
+            beyond = margin * (high - low or abs(low) or 1.0)
+            limits.append((low if at_zero else low - beyond, high + beyond))
+        for index, given in enumerate((view.xlim, view.ylim)):
+            if given is not None:
+                limits[index] = (float(given[0]), float(given[1]))
+        return limits
+
+    def marked(self, dataset: xarray.Dataset) -> np.ndarray:
+        """Which of the events get a marker, (events,), bool: those of the kinds asked for, inside the limits."""
+        kinds, view = dataset["event_kind"].to_numpy(), self.view
+        chosen = np.array([view.marks is None or str(kind) in view.marks for kind in kinds], dtype=bool)
+        for row, limits in zip(self.of(dataset)[1], (view.xlim, view.ylim), strict=False):
+            if limits is not None:
+                chosen &= (row >= limits[0]) & (row <= limits[1])
+        return chosen
+
+    def labels(self, datasets: Sequence[xarray.Dataset]) -> tuple[str, ...]:
+        """What the axes say; `xlabel` and `ylabel` of the view are those of the first two."""
+        view, texts = self.view, []
+        for index, name in enumerate(self.names):
+            text = view.of_omega if name == "omega" else view.label(datasets) if name is None else name
+            unit = view.unit if index == self._scaled else None
+            if name is None and view.in_degrees and view.unit is None:
+                unit = "°"
+            texts.append(text + (f" ({unit})" if unit else ""))
+        own = (view.xlabel, view.ylabel, None)
+        return tuple(given or text for given, text in zip(own, texts, strict=False))
+
+
+@dataclass(frozen=True)
+class MotionView(Units):
+    """What is drawn of motions and in which units.
+
+    quantity
+        "displacement", "velocity", "acceleration", or "force" with `element`.
+
+    Others as `Units`; `scale` and `unit` are those of lengths, of a force those of the force.
+    """
+
+    quantity: str = "displacement"
+    element: int | None = None
+
+    def check_quantity(self, known: Sequence[str]) -> None:
+        """InputError for a quantity that is not among those known, or an element where none is asked for."""
+        if self.quantity not in known:
+            raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), known)}")
+        if self.quantity == "force":
+            _check_element("force", self.element)
+        elif self.element is not None:
+            raise InputError(
+                f"element={self.element!r} says nothing about the quantity {self.quantity!r}; leave it out"
+            )
+
+    def factor(self, order: int = 0) -> float:
+        """What a derivative of x of this order is multiplied by."""
+        return float(self.scale or 1.0) / (self.omega_reference or 1.0) ** order
+
+    def name(self, dataset: xarray.Dataset, order: int, words: bool = False) -> str:
+        """A derivative of x as an axis says it: `dx/dt (mm/s)`."""
+        index = "" if int(dataset.attrs["dofs"]) == 1 else f"_{{{int(dataset.attrs['dof'])}}}"
+        if self.omega_reference is not None and order:
+            power = "" if order == 1 else f"^{order}"
+            text = rf"$d{power}x{index}/d(\omega_0 t){power}$"
+        else:
+            text = f"${_DOTS[order]}{index}$"
+        if words:
+            text = f"{list(DERIVATIVES)[order]} {text}"
+        if self.unit:
+            per = "" if not order or self.omega_reference is not None else ("/s", "/s²")[order - 1]
+            per = per if self.frequency or not per else per.replace("s", "time")
+            text += f" ({self.unit}{per})"
+        return text
+
+    def at_frequency(self, omega: float) -> str:
+        """A frequency in words."""
+        if self.frequency == "Hz":
+            return f"{omega / (2.0 * math.pi):.4g} Hz"
+        if self.omega_reference is not None:
+            return rf"$\omega/\omega_0$ = {omega / self.omega_reference:.4g}"
+        return rf"$\omega$ = {omega:.4g}" + (" rad/s" if self.frequency else "")
+
+
+def as_multiple(given: Any) -> float:
+    """The multiple of omega that a harmonic is: a number, or a text such as "1/3"."""
+    try:
+        multiple = float(Fraction(given) if isinstance(given, str) else given)
+    except (TypeError, ValueError, ZeroDivisionError, OverflowError):
+        multiple = math.nan
+    if isinstance(given, bool) or not 0.0 <= multiple < math.inf:
+        raise InputError(
+            f"harmonic={given!r} is no multiple of omega: 0 (the mean), 1, 2, ..., or a fraction such as 0.5 of "
+            "motions of two load periods"
+        )
+    return multiple
+
+
+def shown_multiple(multiple: float) -> str:
+    """A multiple of omega as text: 3, 1/2, 1/3."""
+    fraction = Fraction(multiple).limit_denominator(999)
+    return str(fraction) if abs(fraction - Fraction(multiple)) <= 1e-9 else f"{multiple:g}"
+
+
+def _check_element(quantity: str, element: Any) -> None:
+    if isinstance(element, bool) or not isinstance(element, int | np.integer):
+        raise InputError(f"the quantity {quantity!r} is one of an element: give element=, its index")
+
+
+def _check_limits(name: str, limits: Any) -> None:
+    try:
+        first, last = (float(value) for value in limits)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name}={limits!r}: give two numbers, (from, to)") from None
+    if not (math.isfinite(first) and math.isfinite(last) and first < last):
+        raise InputError(f"{name}=({first:g}, {last:g}): two finite numbers, the smaller one first")

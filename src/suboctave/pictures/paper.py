@@ -1,0 +1,381 @@
+"""Drawings on paper: Matplotlib figures made without any global plotting state, saved as PNG, SVG or PDF."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError, path_of, suggest
+from suboctave.pictures import style
+from suboctave.pictures.drawing import (
+    Axis,
+    Band,
+    Beads,
+    Drawing,
+    Entry,
+    Frame,
+    Guide,
+    Item,
+    Markers,
+    Polyline,
+    Raster,
+    Region,
+    Surface,
+    extent,
+)
+from suboctave.pictures.labels import annotate, fitting_legend, place_legend
+from suboctave.pictures.strokes import bent
+from suboctave.store.files import replace_file
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["DOT", "SUFFIXES", "check_path", "draw", "dress", "figure_of", "handles", "save_figure", "svg_text"]
+
+SUFFIXES = (".png", ".svg", ".pdf")
+# No time stamps: the same curve gives the same file.
+_METADATA: dict[str, dict[str, Any]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+# Letters are part of the file: TrueType in PDF, as journals ask for, and outlines in SVG. No random names in SVG.
+_EMBEDDED: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "suboctave"}
+_HATCH = "////"
+#: millimetres between the dots of cells, and how they are marked
+_DOTS, DOT = 2.6, style.Mark("o", 1.5, style.INK)
+#: inches of width of a figure from which a legend stands beside the frame, not below it
+_WIDE = 5.0
+#: lengths of the edges of the frame, one to another
+_ASPECT = (1.5, 1.15, 0.95)
+#: inches of width of a page below which there are fewer ticks, and labels closer to their axes
+_SMALL = 4.2
+
+
+def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = None) -> Figure:
+    """The figure of a drawing on a page, saved where a path is given."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    in_space = len(drawing.axes) == 3
+    figure = Figure(figsize=sheet.inches, layout=None if in_space else "constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    if in_space:
+        _in_space(figure, drawing, sheet)
+    else:
+        _in_plane(figure, drawing, sheet)
+    if path is not None:
+        save_figure(figure, path)
+    # Notebooks show an object that has this; without pyplot nothing else would tell them to.
+    setattr(figure, "_repr_png_", partial(_png_bytes, figure))  # noqa: B010
+    return figure
+
+
+def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
+    look, count, columns = sheet.look, len(drawing.frames), drawing.columns
+    rows = math.ceil(count / columns)
+    every: list[Axes] = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel())
+    for index in range(count, len(every)):
+        every[index].remove()
+        every[index - columns].tick_params(labelbottom=True)
+    frames, (across, upwards) = every[:count], drawing.axes
+    for index, (axes, frame) in enumerate(zip(frames, drawing.frames, strict=True)):
+        draw(axes, frame, look)
+        labels = across.label if index + columns >= count else "", upwards.label if index % columns == 0 else ""
+        dress(axes, labels, look, grid=drawing.grid)
+        if frame.title:
+            axes.set_title(frame.title, fontsize=look.normal if drawing.small else look.large, color=style.INK)
+    _set_axis("x", frames[0], across)
+    _set_axis("y", frames[0], upwards)
+    if drawing.title:
+        figure.suptitle(drawing.title, fontsize=look.large, color=style.INK)
+    _place(figure, frames, drawing, sheet)
+    figure.draw_without_rendering()  # the frames have their places: what is spaced on paper comes now
+    for axes, frame in zip(frames, drawing.frames, strict=True):
+        _add_spaced(axes, frame, look)
+        known = [label for label in frame.labels if np.isfinite(label.at).all()]
+        annotate(figure, axes, np.array([label.at for label in known]), [label.text for label in known], look)
+
+
+def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: style.Sheet) -> None:
+    from matplotlib.legend_handler import HandlerTuple
+
+    entries, where = handles(drawing.entries, sheet.look), drawing.legend
+    if where in ("free", "grow", "outside"):
+        place_legend(figure, [] if where == "outside" else frames, entries, sheet.look, grow=where == "grow")
+        return
+    beside = where == "beside" and sheet.inches[0] >= _WIDE
+    plain: dict[str, Any] = {"frameon": False, "handlelength": 2.2, "handleheight": 1.1}
+    place = "outside right upper" if beside else "outside lower center"
+    handlers = {tuple: HandlerTuple(ndivide=1)}
+    fitting_legend(figure, entries, sheet.look, most=1 if beside else 2, loc=place, handler_map=handlers, **plain)
+
+
+# ---------------------------------------------------------------------------------------------------- what is in frames
+def draw(axes: Any, frame: Frame, look: style.Look) -> None:
+    """Draw what stands in a frame, but for what is spaced on paper and for labels."""
+    seen = [item for item in frame.items if isinstance(item, Polyline | Markers)]
+    low, high = extent(seen) if seen else (np.zeros(2), np.zeros(2))
+    spread = np.where(high > low, high - low, 1.0)
+    for item in frame.items:
+        _draw(axes, item, look, (float(spread[0]), float(spread[1])))
+
+
+def _draw(axes: Any, item: Item, look: style.Look, spread: tuple[float, float]) -> None:
+    placed: dict[str, Any] = {"zorder": item.layer, "gid": item.role}
+    match item:
+        case Polyline():
+            at = bent(item.at[0], item.at[1], spread) if item.smooth else item.at
+            axes.plot(*at, **_line(item.pen, look), **placed)
+        case Markers():
+            axes.plot(*item.at, clip_on=item.cut, linestyle="none", **_marker(item.mark, look), **placed)
+        case Region() if len(item.outline) == 2:
+            axes.fill(*item.outline, facecolor=item.colour, linewidth=0.0, **placed)
+        case Region():
+            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+            shade = Poly3DCollection([item.outline.T], facecolor=item.colour, linewidth=0.0, gid=item.role)
+            shade.set_zorder(item.layer)
+            axes.add_collection3d(shade)
+        case Surface():
+            drawing: dict[str, Any] = {"color": item.colour, "alpha": item.opacity, "shade": False, "linewidth": 0.0}
+            axes.plot_surface(*item.grid, rcount=200, ccount=200, **drawing, **placed)
+        case Guide():
+            line = axes.axvline if item.upright else axes.axhline
+            line(item.value, **_line(item.pen, look), **placed)
+        case Band():
+            axes.axhspan(item.low, item.high, color=item.colour, **placed)
+        case Raster():
+            _paint(axes, item, look, placed)
+
+
+def _line(pen: style.Pen, look: style.Look) -> dict[str, Any]:
+    ends = {"solid_capstyle": "butt", "dash_capstyle": "butt", "solid_joinstyle": "round"}
+    return {"color": pen.colour, "linewidth": look.line * pen.width, "linestyle": pen.dash, **ends}
+
+
+def _marker(mark: style.Mark, look: style.Look) -> dict[str, Any]:
+    return {
+        "marker": mark.marker,
+        "markersize": mark.size * look.marker,
+        "markerfacecolor": mark.face,
+        "markeredgecolor": mark.edge,
+        "markeredgewidth": mark.rim * look.edge,
+    }
+
+
+def _paint(axes: Axes, raster: Raster, look: style.Look, placed: dict[str, Any]) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    axes.pcolormesh(raster.across, raster.upwards, raster.cells, rasterized=True, **placed)
+    if raster.hatched is not None and raster.hatched.any() and min(raster.hatched.shape) > 1:
+        middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (raster.across, raster.upwards)]
+        strokes: Any = {"levels": [0.5, 1.5], "colors": "none", "hatches": [_HATCH], "zorder": raster.layer + 0.5}
+        filled = axes.contourf(*middles, raster.hatched.astype(float), **strokes)
+        filled.set_edgecolor(style.SOFT)
+        filled.set_linewidth(0.0)
+    if raster.scale is not None:
+        colours, low, high, label = raster.scale
+        shades = ScalarMappable(Normalize(low, high), LinearSegmentedColormap.from_list("scale", list(colours)))
+        figure: Any = axes.figure
+        bar = figure.colorbar(shades, ax=axes, pad=0.02)
+        bar.set_label(label, fontsize=look.normal, color=style.INK)
+        bar.ax.tick_params(labelsize=look.small)
+
+
+def _add_spaced(axes: Axes, frame: Frame, look: style.Look) -> None:
+    """Marks at equal distances on paper: along lines, and over the cells of rasters."""
+    box = axes.get_window_extent()
+    size = box.width / axes.figure.dpi * 25.4, box.height / axes.figure.dpi * 25.4
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    for item in frame.items:
+        if isinstance(item, Beads):
+            at, mark, cut = item.places(low, high, size), item.mark, False
+        elif isinstance(item, Raster) and item.dotted is not None:
+            at, mark, cut = _dots(item, size), DOT, True
+        else:
+            continue
+        if at.shape[1]:
+            beads = Markers(at, mark, cut, role=item.role, layer=item.layer + 0.5)
+            _draw(axes, beads, look, (1.0, 1.0))
+
+
+def _dots(raster: Raster, size: tuple[float, float]) -> np.ndarray:
+    """Places (2, dots) over the dotted cells, evenly spread on paper in rows that are set off."""
+    inside = np.asarray(raster.dotted)
+    columns, rows = (max(8, round(length / _DOTS)) for length in size)
+    across, up = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+    across = across + np.where(np.arange(rows) % 2, 0.25, -0.25)[:, None] / columns
+    where = inside[(up * inside.shape[0]).astype(int), (across * inside.shape[1]).astype(int)]
+    (x0, x1), (y0, y1) = raster.across[[0, -1]], raster.upwards[[0, -1]]
+    return np.array([x0 + across[where] * (x1 - x0), y0 + up[where] * (y1 - y0)])
+
+
+def handles(entries: Mapping[str, Entry], look: style.Look) -> dict[str, Any]:
+    """What a legend shows beside its names."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    shown: dict[str, Any] = {}
+    for name, entry in entries.items():
+        line: dict[str, Any] = {"linestyle": "none"} if entry.pen is None else _line(entry.pen, look)
+        handle: Any = Line2D([], [], **line, **({} if entry.mark is None else _marker(entry.mark, look)))
+        if entry.patch is not None:
+            edge: dict[str, Any] = {"edgecolor": entry.edge or "none", "linewidth": 0.5 if entry.edge else 0.0}
+            hatch = _HATCH if entry.hatched else None
+            patch = Patch(facecolor=entry.patch, alpha=entry.opacity, hatch=hatch, **edge)
+            handle = patch if entry.mark is None else (patch, handle)
+        shown[name] = handle
+    return shown
+
+
+# --------------------------------------------------------------------------------------------------------------- frames
+def dress(axes: Axes, labels: tuple[str, str], look: style.Look, *, grid: bool = True) -> None:
+    """Texts, ticks, grid and edges of a frame."""
+    axes.set_xlabel(labels[0], fontsize=look.large, color=style.INK)
+    axes.set_ylabel(labels[1], fontsize=look.large, color=style.INK)
+    axes.tick_params(direction="in", top=True, right=True, labelsize=look.normal, color=style.INK, zorder=2)
+    axes.tick_params(which="minor", direction="in", top=True, right=True, color=style.INK, zorder=2)
+    if grid:
+        axes.grid(True, color=style.GRID, linewidth=0.4 * look.line, zorder=0)
+    axes.set_axisbelow(True)
+    for spine in axes.spines.values():
+        spine.set_color(style.INK)
+        spine.set_linewidth(0.53 * look.line)
+
+
+def _set_axis(letter: str, axes: Any, axis: Axis) -> None:
+    """Scale, limits and ticks of one axis, which all frames share."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, MultipleLocator
+
+    if axis.logarithmic:
+        getattr(axes, f"set_{letter}scale")("log")
+    if axis.low is not None or axis.high is not None:
+        getattr(axes, f"set_{letter}lim")(axis.low, axis.high)
+    own, ticks = getattr(axes, f"{letter}axis"), axis.ticks
+    if ticks is None:
+        return
+    if len(ticks.places):
+        own.set_major_locator(FixedLocator(list(ticks.places)))
+        own.set_major_formatter(FixedFormatter(list(ticks.texts)))
+        return
+    own.set_major_locator(MaxNLocator(nbins=ticks.most, steps=list(ticks.steps), integer=ticks.whole))
+    if ticks.minor is not None:
+        own.set_minor_locator(MultipleLocator(ticks.minor))
+
+
+# ------------------------------------------------------------------------------------------------------------- in space
+def _in_space(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
+    """Arrange a drawing with three axes on a figure."""
+    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    for letter, axis in zip("xyz", drawing.axes, strict=True):
+        getattr(axes, f"set_{letter}lim")(axis.low, axis.high)
+    draw(axes, drawing.frames[0], sheet.look)
+    _dress_space(axes, [axis.label for axis in drawing.axes], sheet)
+    axes.view_init(*drawing.seen_from)
+    _fill_page(figure, axes, drawing, sheet)
+
+
+def _dress_space(axes: Any, labels: list[str], sheet: style.Sheet) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    look, small = sheet.look, sheet.inches[0] < _SMALL
+    pad = (-0.45 if small else 0.3) * look.large
+    for letter, label, axis in zip("xyz", labels, (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
+        getattr(axes, f"set_{letter}label")(label, fontsize=look.large, color=style.INK, labelpad=pad)
+        axis.set_pane_color((1.0, 1.0, 1.0, 1.0))
+        axis.pane.set_edgecolor(style.GRID)
+        axis._axinfo["grid"].update({"color": style.GRID, "linewidth": 0.4 * look.line})
+        axis.line.set_color(style.INK)
+        axis.line.set_linewidth(0.53 * look.line)
+        axis.set_major_locator(MaxNLocator(nbins=4 if small else 5, steps=[1, 2, 2.5, 5, 10]))
+    axes.tick_params(labelsize=look.small, color=style.INK, pad=(-0.3 if small else -0.1) * look.small)
+    axes.set_box_aspect(_ASPECT)
+
+
+def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) -> None:
+    """Title and legend above, and the frame as large as what is left; a named size grows by the legend's height."""
+    entries, look = handles(drawing.entries, sheet.look), sheet.look
+    if sheet.named:
+        rows = fitting_legend(figure, entries, look, tight=True)
+        width, height = figure.get_size_inches()
+        figure.set_size_inches(width, height + rows.get_window_extent().height / figure.dpi)
+        rows.remove()
+    top, whole = 1.0, figure.bbox.height
+    if drawing.title:
+        figure.suptitle(drawing.title, fontsize=look.large, color=style.INK, y=0.985)
+        top -= 2.0 * look.large / 72.0 * figure.dpi / whole
+    legend = fitting_legend(figure, entries, look, tight=True, loc="upper center", bbox_to_anchor=(0.5, top))
+    top = legend.get_window_extent().y0 / whole
+    zoom, corner = 1.0, np.zeros(2)
+    room = np.array([figure.bbox.width, top * whole])
+    for _ in range(4):  # letters do not grow with the frame, so that a few rounds are needed
+        axes.set_position((*corner, 1.0, top))
+        axes.set_box_aspect(_ASPECT, zoom=zoom)
+        figure.draw_without_rendering()
+        low, high = _corners(figure, axes)
+        corner = corner + (0.5 * (room - low - high)) / figure.bbox.size
+        zoom *= float(np.clip((0.97 * room / (high - low)).min(), 0.5, 1.5))
+    axes.set_position((*corner, 1.0, top))
+
+
+def _corners(figure: Figure, axes: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The lower left and the upper right corner of the frame with its labels, pixels."""
+    from mpl_toolkits.mplot3d import proj3d
+
+    limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
+    cube = np.array(list(product(*limits))).T
+    flat = np.array(proj3d.proj_transform(*cube, axes.get_proj())[:2]).T
+    corners = [axes.transData.transform(flat)]
+    canvas: Any = figure.canvas
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        box = axis.get_tightbbox(canvas.get_renderer())
+        corners.append(np.array([[box.x0, box.y0], [box.x1, box.y1]]))
+    every = np.concatenate(corners)
+    return every.min(axis=0), every.max(axis=0)
+
+
+# --------------------------------------------------------------------------------------------------------------- saving
+def check_path(path: str | Path | None) -> None:
+    """InputError for a file of a form that figures do not have, before any work."""
+    if path is not None and (suffix := path_of(path).suffix.lower()) not in SUFFIXES:
+        raise InputError(f"cannot tell the form of {path_of(path).name!r} from its suffix{suggest(suffix, SUFFIXES)}")
+
+
+def save_figure(figure: Figure, path: str | Path, *, dpi: float = 300.0) -> Path:
+    """Writes the figure as PNG (at `dpi`), SVG or PDF, by the suffix of `path`; makes the folder where it is missing.
+
+    Written beside its place and renamed, so that an interruption leaves what was there before.
+    """
+    import matplotlib
+
+    check_path(path)
+    target = path_of(path)
+    suffix = target.suffix.lower()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(_EMBEDDED):
+        options: dict[str, Any] = {"format": suffix[1:], "dpi": dpi, "metadata": _METADATA[suffix]}
+        replace_file(target, lambda place: figure.savefig(place, **options))
+    return target
+
+
+def svg_text(figure: Figure) -> str:
+    """The figure as SVG in memory."""
+    import matplotlib
+
+    buffer = io.StringIO()
+    with matplotlib.rc_context(_EMBEDDED):
+        figure.savefig(buffer, format="svg", metadata=_METADATA[".svg"])
+    return buffer.getvalue()
+
+
+def _png_bytes(figure: Figure, dpi: float = 110.0) -> bytes:
+    """The figure as PNG in memory."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()

@@ -1,0 +1,96 @@
+"""What `progress=` means: nothing, a bar on the terminal, or a callable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from suboctave.errors import InputError
+
+Report = Callable[[float, str], None]
+
+
+class CurveProgress:
+    """Progress of a curve that is followed in one direction or both: the share of its parameter's range that it has
+    covered, and in words what it costs.
+    """
+
+    def __init__(self, report: Report, bounds: tuple[float, float], located: str = "bifurcation") -> None:
+        self.report = report
+        self.bounds = bounds
+        #: what is counted besides points
+        self.located = located
+        self._covered: tuple[float, float] | None = None
+        #: points and bifurcations of the directions that are over, and of this one
+        self._before = (0, 0)
+        self._now = (0, 0)
+
+    def begins(self) -> None:
+        """Another direction is begun."""
+        self._before, self._now = (self._before[0] + self._now[0], self._before[1] + self._now[1]), (0, 0)
+
+    def at(self, value: float, where: str, points: int, bifurcations: int, harmonics: int) -> None:
+        """The curve has come to a value of its parameter, with so many points and bifurcations in this direction."""
+        low, high = self._covered or (value, value)
+        self._covered = low, high = min(low, value), max(high, value)
+        self._now = points, bifurcations
+        share = min(1.0, (high - low) / (self.bounds[1] - self.bounds[0]))
+        self.report(share, f"{where}, {self._counted(harmonics)}" if points else where)
+
+    def _counted(self, harmonics: int) -> str:
+        numbers = (self._before[0] + self._now[0], self._before[1] + self._now[1], harmonics)
+        names = ("point", self.located, "harmonic")
+        return ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for n, name in zip(numbers, names, strict=True))
+
+
+@contextmanager
+def reporting(progress: Any, title: str) -> Iterator[Report | None]:
+    """A function (share done, where) to report to, or None.
+
+    `progress` is None or False (silent), True (a bar on standard error, silent where that is not a terminal), or a
+    callable that takes the share done, 0 to 1, and a text. If that has a method `found`, it is called after each point
+    with the trace so far (points, bifurcations): a journal keeps it.
+    """
+    if progress is None or progress is False:
+        yield None
+    elif progress is True:
+        with bar(title) as report:
+            yield report
+    elif callable(progress):
+        yield progress
+    else:
+        raise InputError(f"progress must be None, True or a callable taking (share, text), not {progress!r}")
+
+
+@contextmanager
+def bar(title: str) -> Iterator[Report]:
+    """A bar on standard error with the text in a line below it, gone afterwards; silent where nobody watches."""
+    from rich.console import Console, RenderableType
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.text import Text
+
+    class Lines(Progress):
+        def get_renderables(self) -> Iterator[RenderableType]:
+            """The bars, then what each has to say."""
+            yield self.make_tasks_table(self.tasks)
+            for task in self.tasks:
+                yield Text(str(task.fields["where"]), overflow="ellipsis", no_wrap=True)
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=28),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Lines(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
+        task = shown.add_task(title, total=1.0, where="")
+        furthest = 0.0
+
+        def report(share: float, where: str = "") -> None:
+            nonlocal furthest  # what is done in several parts begins each of them anew; a bar does not
+            furthest = max(furthest, share)
+            shown.update(task, completed=furthest, where=where)
+
+        yield report

@@ -1,0 +1,328 @@
+"""A computed branch: its points, its bifurcations, and why it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation, BifurcationList
+from suboctave.continuation.ending import Ending, interruption_of, sentence
+from suboctave.continuation.problem import Array
+from suboctave.curves.audit import Audit
+from suboctave.curves.junction import Junction, period_name
+from suboctave.curves.points import BranchPoint
+from suboctave.errors import InputError, suggest
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import Interruption
+from suboctave.model.system import System
+from suboctave.results.readings.readings import BranchReadings, columns, with_readings
+from suboctave.store.columns import parameter_column
+from suboctave.store.registry import save
+from suboctave.store.table import write_csv
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from suboctave.results.readings.sweep import SweepPath
+
+
+class Branch(BranchReadings):
+    """A curve of periodic motions along one free parameter.
+
+    Attributes
+    ----------
+    system, name
+        What vibrates, and the free parameter's name.
+    observe
+        DOF whose amplitude is reported.
+    bifurcations, events
+        Located bifurcations (`bifurcations["grazing"]`: the contacts that begin or cease to touch), and the user's
+        events, in the order met.
+    closed, ended
+        Whether the curve closed on itself, and a sentence saying why it ended.
+    endings
+        The same as data: an `Ending` with its `reason` for the first and for the last point.
+    interruption
+        What stopped it before its end in one of its directions, Ctrl-C or a time limit (`seconds`); None if nothing
+        did.
+    departs, arrives
+        Where it leaves the branch that it bifurcates from, and where it meets it again at its end (`Junction`); None
+        where it does not.
+    options
+        Everything it was computed with.
+    seconds
+        How long that took; nan where nobody measured.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        name: str,
+        points: list[BranchPoint],
+        bifurcations: list[Bifurcation],
+        events: list[Bifurcation],
+        closed: bool,
+        endings: tuple[Ending, ...],
+        observe: int,
+        options: Mapping[str, Any],
+        warnings: tuple[str, ...] = (),
+        audit: Audit | None = None,
+        departs: Junction | None = None,
+        arrives: Junction | None = None,
+    ) -> None:
+        self.system = system
+        self.name = name
+        self.points = tuple(points)
+        self.bifurcations = BifurcationList(bifurcations)
+        self.events = BifurcationList(events, tuple({e.kind for e in events}))
+        self.closed = closed
+        self.endings = endings
+        self.observe = observe
+        self.options = dict(options)
+        self.warnings = warnings
+        self.audit = audit or Audit()
+        self.departs = departs
+        self.arrives = arrives
+        self.seconds = float("nan")
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C or a time limit stopped it, in whichever direction; what had been computed is there."""
+        return self.interruption is not None
+
+    @property
+    def interruption(self) -> Interruption | None:
+        """What stopped it, None if nothing did."""
+        return interruption_of(self.endings)
+
+    @property
+    def ended(self) -> str:
+        """Why it ended, in words."""
+        return sentence(self.endings)
+
+    @property
+    def nu(self) -> int:
+        """Period of its motions in periods of the load: 1 for T, 2 for 2T, ..."""
+        return self.points[0].orbit.basis.nu if self.points else 1
+
+    @property
+    def junctions(self) -> list[tuple[Junction, PeriodicOrbit]]:
+        """Where it leaves or meets another branch, each with its own motion right beside."""
+        ends = ((self.departs, 0), (self.arrives, -1))
+        return [(end, self.points[i].orbit) for end, i in ends if end is not None and self.points]
+
+    @property
+    def grazings(self) -> list[Bifurcation]:
+        """Where contacts begin or cease to touch, in the order met."""
+        return self.bifurcations["grazing"]
+
+    @property
+    def orbits(self) -> list[PeriodicOrbit]:
+        """The motions, in the order they were computed."""
+        return [p.orbit for p in self.points]
+
+    @cached_property
+    def omega(self) -> Array:
+        """Circular frequency of the load, shape (len,)."""
+        return np.array([p.orbit.omega for p in self.points])
+
+    def parameter(self, name: str) -> Array:
+        """Values of omega or a parameter along the branch, shape (len,).
+
+        Raises
+        ------
+        InputError
+            If there is no parameter of that name.
+        """
+        if name == "omega":
+            return self.omega
+        if name not in self.system.parameters:
+            raise InputError(f"unknown parameter {name!r}{suggest(name, ['omega', *self.system.parameters])}")
+        return np.array([p.orbit.values[name] for p in self.points])
+
+    @cached_property
+    def amplitude(self) -> Array:
+        """Largest |x| of the observed DOF over one response period, shape (len,)."""
+        return np.array([p.orbit.amplitude(self.observe) for p in self.points])
+
+    def harmonic(self, k: float, dof: int | None = None) -> ComplexArray:
+        """Complex amplitude of the component at `k omega` (of the observed DOF unless told), shape (len,)."""
+        where = self.observe if dof is None else dof
+        return np.array([p.orbit.harmonic(k, where) for p in self.points])
+
+    @cached_property
+    def stable(self) -> np.ndarray:
+        """Whether each motion is stable, shape (len,), bool."""
+        return np.array([p.floquet.stable for p in self.points])
+
+    @property
+    def verdicts(self) -> str:
+        """How many motions are unstable, in words, and of how many that cannot be told: without damping."""
+        results = [p.floquet for p in self.points]
+        decided = [r for r in results if r.decided or not r.undamped]
+        unstable, rest = sum(not r.stable for r in decided), len(results) - len(decided)
+        return f"{unstable} unstable" + (f", {rest} not settled" if rest else "")
+
+    @cached_property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers over the response period, by descending modulus, shape (len, 2 n)."""
+        return np.array([p.floquet.multipliers for p in self.points])
+
+    @cached_property
+    def multiplier_errors(self) -> Array:
+        """Estimated errors of the multipliers, shape (len, 2 n)."""
+        return np.array([p.floquet.errors for p in self.points])
+
+    @cached_property
+    def stability_methods(self) -> list[str]:
+        """Where each point's multipliers come from, in words."""
+        return [p.floquet.method for p in self.points]
+
+    @cached_property
+    def arclength(self) -> Array:
+        """Distance along the branch in scaled arclength, shape (len,)."""
+        return np.array([p.arclength for p in self.points])
+
+    @cached_property
+    def truncation(self) -> Array:
+        """Estimated size of the neglected harmonics relative to the motion, shape (len,)."""
+        return np.array([p.orbit.truncation for p in self.points])
+
+    @cached_property
+    def harmonics(self) -> np.ndarray:
+        """Highest multiple of the base frequency used at each point, shape (len,), int."""
+        return np.array([p.orbit.basis.harmonics for p in self.points])
+
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """How many harmonics are unknowns at each point: all up to the highest, shape (len,), int."""
+        return self.harmonics
+
+    def to_xarray(self, readings: Iterable[str] | bool = False) -> xarray.Dataset:
+        """The branch as a labelled dataset: points, events, and what produced them.
+
+        `readings`: names of read-offs to add (see `reading`), or True for all of `available_readings`.
+        """
+        from suboctave.store.layout import branch_dataset, events_met
+
+        return with_readings(branch_dataset(self), self, events_met(self), readings)
+
+    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+        """One row per point: free parameters, amplitude, stability, leading multiplier, errors; read-offs on request.
+
+        `readings` as in `to_xarray`. A parameter that bears the name of another column is in "parameter.NAME".
+        """
+        import pandas as pd
+
+        own = self._columns(readings)
+        taken = ("omega", *own)
+        table: dict[str, Any] = {"omega": self.omega}
+        table |= {parameter_column(name, taken): self.parameter(name) for name in self._free if name != "omega"}
+        return pd.DataFrame(table | own)
+
+    @property
+    def _free(self) -> tuple[str, ...]:
+        """The parameters that it was followed in."""
+        return (self.name,)
+
+    def _columns(self, readings: Iterable[str] | bool) -> dict[str, Any]:
+        """The columns of `to_dataframe` but omega and the free parameters."""
+        leading = self.multipliers[:, 0]
+        return {
+            "amplitude": self.amplitude,
+            "stable": self.stable,
+            "multiplier_real": leading.real,
+            "multiplier_imag": leading.imag,
+            "arclength": self.arclength,
+            "harmonics": self.harmonics,
+            "truncation": self.truncation,
+            "residual": [p.orbit.residual for p in self.points],
+            **columns(self, readings),
+        }
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
+
+        Raises
+        ------
+        InputError
+            If the file exists and `overwrite` is not given, or cannot be written there.
+        """
+        return save(self, path, overwrite)
+
+    def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
+        """The points, or the "bifurcations", as comma-separated text (.csv)."""
+        frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
+        if what not in frames:
+            raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
+        return write_csv(frames[what](), path, overwrite)
+
+    def bifurcations_frame(self) -> pandas.DataFrame:
+        """One row per bifurcation, grazing and event, in the order met: place, parameters, multiplier, errors.
+
+        A parameter that bears the name of another column is in "parameter.NAME".
+        """
+        import pandas as pd
+
+        own = ["kind", "omega", "amplitude", "multiplier_real", "multiplier_imag"]
+        own += ["criticality", "residual", "uncertainty", "arclength", "remark"]
+        names = {name: parameter_column(name, own) for name in self.system.parameters}
+        rows = []
+        for item in sorted([*self.bifurcations.met, *self.events.met], key=lambda b: b.arclength):
+            mu = item.critical_multiplier()
+            rows.append(
+                {
+                    **{names[name]: value for name, value in item.parameters.items() if name in names},
+                    "kind": item.kind,
+                    "omega": item.omega,
+                    "amplitude": item.amplitude,
+                    "multiplier_real": mu.real,
+                    "multiplier_imag": mu.imag,
+                    "criticality": item.criticality or "",
+                    "residual": item.residual,
+                    "uncertainty": item.uncertainty,
+                    "arclength": item.arclength,
+                    "remark": item.remark(),
+                }
+            )
+        return pd.DataFrame(rows, columns=[*own[:2], *names.values(), *own[2:]])
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given.
+
+        Options are those of `suboctave.plot`.
+        """
+        from suboctave.pictures import plot
+
+        return plot(self, path, **options)
+
+    def sweep_path(self, direction: str = "up") -> SweepPath:
+        """The path that a slow sweep of the free parameter "up" or "down" would follow, with its jumps."""
+        from suboctave.results.readings.sweep import sweep_path
+
+        return sweep_path(self.to_xarray(), direction)
+
+    def hysteresis(self) -> list[tuple[float, float]]:
+        """Ranges of the free parameter in which sweeps up and down find different motions."""
+        from suboctave.results.readings.sweep import hysteresis
+
+        return hysteresis(self.to_xarray())
+
+    def __repr__(self) -> str:
+        values = self.parameter(self.name)
+        span = f"{self.name} from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
+        kind = "Branch" if self.nu == 1 else f"Branch of {period_name(self.nu)} motions"
+        leaves = "" if self.departs is None else f"leaves {self.departs}; "
+        text = f"{kind}: {len(self)} points ({self.verdicts}), {span}; {leaves}{self.ended}."
+        for warning in self.warnings:
+            text += f"\n  note: {warning}"
+        return text + "\n" + repr(self.bifurcations)

@@ -1,0 +1,371 @@
+"""A branch as a dataset that holds all of it, and back: what `Branch.save`, `load` and the journal of a study keep.
+
+The dataset of `Branch.to_xarray()` (`suboctave.store.layout`) with complex numbers as pairs of variables `..._real`,
+`..._imag`, and besides on `point`: `coefficients` (point x coefficient x unknown, padded with zeros), `arclength`,
+`iterations`, `multiplier_errors`; on `event` the same under `event_...` and the null vectors. What is neither a number
+per point nor per event is JSON in the variable `record`. docs/results.md describes it for readers without this package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bordered import NullVectors
+from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.normal_form import NormalForm
+from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.continuation.ending import Ending, read_endings
+from suboctave.curves.audit import Audit, Unsettled
+from suboctave.curves.junction import Junction
+from suboctave.curves.points import BranchPoint
+from suboctave.errors import InputError
+from suboctave.floquet import FloquetResult
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.model.system import System, build, describe
+from suboctave.results.branch import Branch
+from suboctave.results.tracked_branch import TrackedBranch, tracked_points, tracked_record
+from suboctave.store.arrays import array_of, flat, padded
+from suboctave.store.layout import branch_dataset
+from suboctave.store.plain import from_json, to_json
+from suboctave.store.registry import Codec, register
+from suboctave.store.systems import Prefixed, system_arrays
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["branch_from_dataset", "branch_to_dataset"]
+
+_CLASSES = {
+    c.__name__: c
+    for c in (Audit, Unsettled, Ending, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
+}
+_MEANINGS = {
+    "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
+    "event_coefficients": "the same of the motions at events",
+    "arclength": "distance along the branch in scaled arclength",
+    "iterations": "Newton iterations",
+    "multiplier_errors": "estimated errors of the multipliers",
+    "record": "system, options, warnings, audit and what motions share, as JSON",
+}
+_PLACES = {"bifurcations": 0, "events": 1}
+
+
+def branch_to_dataset(branch: Branch) -> xarray.Dataset:
+    """Everything that a branch holds, as a dataset of numbers and texts that a file can hold.
+
+    Raises InputError where its system cannot be written down.
+    """
+    import xarray
+
+    writer = _Writer()
+    dataset = branch_dataset(branch)
+    new: dict[str, Any] = {
+        "arclength": (("point",), branch.arclength),
+        "iterations": (("point",), np.array([p.iterations for p in branch.points], dtype=int)),
+    }
+    points = [p.orbit for p in branch.points]
+    new |= _orbits("", "point", points, [p.floquet for p in branch.points])
+    located = _in_order(branch)
+    events = [event for _, _, event in located]
+    new |= _orbits("event_", "event", [e.orbit for e in events], [e.floquet for e in events])
+    for side in ("right", "left"):
+        rows = [() if e.null_vectors is None else getattr(e.null_vectors, side) for e in events]
+        new[f"event_null_{side}"] = (("event", "null"), padded(rows, complex))
+    record = {
+        "points": [writer.point(p) for p in branch.points],
+        "event_list": [(_PLACES[where], index) for where, index, _ in located],
+        "events": [writer.event(event, branch) for event in events],
+        "name": branch.name,
+        "options": branch.options,
+        "warnings": tuple(branch.warnings),
+        "audit": branch.audit,
+        "closed": bool(branch.closed),
+        "ended": branch.ended,
+        "endings": branch.endings,
+        "departs": branch.departs,
+        "arrives": branch.arrives,
+        "observe": int(branch.observe),
+        "seconds": float(branch.seconds),
+        "system": writer.system(branch.system),
+        "tables": writer.tables(),
+        "tracked": tracked_record(branch) if isinstance(branch, TrackedBranch) else None,
+    }
+    new["record"] = ((), np.array(to_json(record), dtype=object))
+    for name, array in writer.arrays.items():
+        new[name] = (tuple(f"{name}_{axis}" for axis in range(array.ndim)), array)
+    for name, meaning in _MEANINGS.items():
+        new[name] = (*new[name][:2], {"long_name": meaning})
+    # a parameter that bears the name of a variable is in `parameters` all the same
+    coords = [name for name in dataset.coords if name not in new]
+    variables = {name: (v.dims, v.values, v.attrs) for name, v in dataset.variables.items() if name not in new} | new
+    attributes = {name: value for name, value in dataset.attrs.items() if name != "warnings"}  # they are in `record`
+    if branch.seconds == branch.seconds:
+        attributes["seconds"] = float(branch.seconds)
+    attributes["contents"] = "branch"
+    return xarray.Dataset(dict(flat(variables)), attrs=attributes).set_coords(coords)
+
+
+def branch_from_dataset(dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None) -> Branch:
+    """The branch that `branch_to_dataset` wrote, equal bit for bit.
+
+    `linear`: the linear part that it was computed with, where that was not the system's own matrices.
+
+    Raises InputError where the dataset is not one of those.
+    """
+    try:
+        return _Reader(dataset, allow_code, linear).branch()
+    except (KeyError, IndexError, TypeError, AttributeError) as error:
+        raise InputError(f"this is no branch of suboctave: {type(error).__name__}: {error}") from None
+
+
+register(
+    Codec(
+        "branch",
+        Branch,
+        lambda branch: {"": branch_to_dataset(branch)},
+        lambda groups, allow_code, linear: branch_from_dataset(groups[""], allow_code, linear),
+    )
+)
+
+
+def _in_order(branch: Branch) -> list[tuple[str, int, Bifurcation]]:
+    """Every bifurcation, grazing and event with its list and place there, in the order of the layout's events."""
+    listed = {id(b): ("bifurcations", i, b) for i, b in enumerate(branch.bifurcations.met)}
+    listed |= {id(b): ("events", i, b) for i, b in enumerate(branch.events.met)}
+    met = sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda event: event.arclength)
+    return [listed[id(event)] for event in met]
+
+
+def _orbits(
+    prefix: str, dimension: str, orbits: Sequence[PeriodicOrbit], verdicts: Sequence[FloquetResult]
+) -> dict[str, tuple[tuple[str, ...], Any]]:
+    """Coefficients and multipliers of several motions, padded to the longest."""
+    longest = max((o.coefficients.shape[0] for o in orbits), default=0)
+    size = max((o.coefficients.shape[1] for o in orbits), default=0)
+    table = np.zeros((len(orbits), longest, size))
+    for row, orbit in zip(table, orbits, strict=True):
+        row[: orbit.coefficients.shape[0], : orbit.coefficients.shape[1]] = orbit.coefficients
+    # a dimension of its own for each: the longest motion among the points is not that among the events
+    shape = (dimension, f"{prefix}coefficient", "unknown" if orbits else f"{prefix}unknown")
+    variables: dict[str, tuple[tuple[str, ...], Any]] = {f"{prefix}coefficients": (shape, table)}
+    numbers = (dimension, "event_floquet" if prefix else "multiplier")
+    variables[f"{prefix}multipliers"] = (numbers, padded([v.multipliers for v in verdicts], complex))
+    variables[f"{prefix}multiplier_errors"] = (numbers, padded([v.errors for v in verdicts], float))
+    return variables
+
+
+@dataclass(frozen=True)
+class _Discretisation:
+    """What motions of a branch share: system, harmonics, samples."""
+
+    system: int
+    harmonics: int
+    nu: int
+    samples: tuple[int | None, ...]
+    values: tuple[float, ...]
+    linear: str
+
+
+class _Writer:
+    """Collects what motions share, each thing once."""
+
+    def __init__(self) -> None:
+        self.arrays: dict[str, np.ndarray] = {}
+        self._systems: dict[int, tuple[int, System, Any]] = {}
+        self._balances: dict[int, tuple[HarmonicBalance, int]] = {}
+        self._shared: dict[_Discretisation, int] = {}
+        self._rules: list[AdaptiveHarmonics] = []
+        self._contexts: list[Any] = []
+
+    def tables(self) -> dict[str, Any]:
+        return {
+            "systems": [text for _, _, text in self._systems.values()],
+            "discretisations": [{f.name: getattr(d, f.name) for f in fields(d)} for d in self._shared],
+            "rules": list(self._rules),
+            "contexts": list(self._contexts),
+        }
+
+    def system(self, system: System) -> int:
+        if id(system) not in self._systems:
+            written = describe(system, Prefixed(self.arrays))
+            for index, _, text in self._systems.values():
+                if text == written:
+                    self._systems[id(system)] = (index, system, text)
+                    return index
+            self._systems[id(system)] = (len(self._systems), system, written)
+        return self._systems[id(system)][0]
+
+    def _discretisation(self, balance: HarmonicBalance) -> int:
+        if id(balance) not in self._balances:
+            linear = balance.linear
+            shared = _Discretisation(
+                self.system(balance.system),
+                int(balance.basis.harmonics),
+                int(balance.basis.nu),
+                tuple(None if s is None else int(s) for s in balance.samples),
+                tuple(float(balance.values[name]) for name in balance.system.parameters),
+                "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
+            )
+            self._balances[id(balance)] = (balance, self._shared.setdefault(shared, len(self._shared)))
+        return self._balances[id(balance)][1]
+
+    def _orbit(self, orbit: PeriodicOrbit, floquet: FloquetResult) -> list[Any]:
+        rule = -1
+        if orbit.adaptive is not None:
+            if orbit.adaptive not in self._rules:
+                self._rules.append(orbit.adaptive)
+            rule = self._rules.index(orbit.adaptive)
+        verdict = {f.name: getattr(floquet, f.name) for f in fields(floquet) if f.name not in ("multipliers", "errors")}
+        verdict["checks"] = dict(floquet.checks)
+        return [self._discretisation(orbit.balance), rule, len(floquet.multipliers), verdict]
+
+    def point(self, point: BranchPoint) -> list[Any]:
+        return self._orbit(point.orbit, point.floquet)
+
+    def event(self, event: Bifurcation, branch: Branch) -> dict[str, Any]:
+        taken = ("orbit", "floquet", "null_vectors", "context")
+        plain = {f.name: getattr(event, f.name) for f in fields(event) if f.name not in taken}
+        orbit = event.orbit
+        own = {
+            "omega": orbit.omega,
+            "values": dict(orbit.values),
+            "residual": orbit.residual,
+            "truncation": orbit.truncation,
+            "orbit": self._orbit(orbit, event.floquet),
+            "null": None,
+            "normal_form": event.normal_form,
+            "context": None,
+        }
+        if event.null_vectors is not None:
+            vectors = event.null_vectors
+            own["null"] = [len(vectors.right), bool(np.iscomplexobj(vectors.right)), len(vectors.left)]
+        if event.context is not None:
+            context = {**event.context, "system": self.system(event.context.get("system", branch.system))}
+            if context not in self._contexts:
+                self._contexts.append(context)
+            own["context"] = self._contexts.index(context)
+        return {"fields": plain, **own}
+
+
+class _Reader:
+    def __init__(self, dataset: xarray.Dataset, allow_code: bool, linear: LinearPart | None) -> None:
+        self.dataset = dataset
+        self.record = from_json(str(dataset["record"].item()), _CLASSES)
+        self.tables = self.record["tables"]
+        stored = system_arrays(dataset)
+        self.systems = [build(text, stored, allow_code) for text in self.tables["systems"]]
+        self.system = self.systems[self.record["system"]]
+        self.balances = [self._balance(d, linear) for d in self.tables["discretisations"]]
+
+    def _balance(self, stated: Mapping[str, Any], linear: LinearPart | None) -> HarmonicBalance:
+        # files of earlier versions name harmonics that were left out: their coefficients are zero
+        d = _Discretisation(**{f.name: stated[f.name] for f in fields(_Discretisation)})
+        system = self.systems[d.system]
+        if d.linear and linear is None:
+            raise InputError(
+                f"this branch was computed with another linear part, a {d.linear}: make it again and give it as linear="
+            )
+        values = dict(zip(system.parameters, d.values, strict=True))
+        given = linear if d.linear else None
+        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu), values, given, d.samples)
+
+    def array(self, name: str) -> np.ndarray:
+        return array_of(self.dataset, name)
+
+    def branch(self) -> Branch:
+        record = self.record
+        points, events = self._points(), self._events()
+        lists: tuple[dict[int, Bifurcation], dict[int, Bifurcation]] = ({}, {})
+        for (place, index), event in zip(record["event_list"], events, strict=True):
+            lists[place][index] = event
+        bifurcations, own = ([items[i] for i in range(len(items))] for items in lists)
+        tracked = record.get("tracked")
+        make: Any = Branch
+        if tracked:
+            make = partial(TrackedBranch, tracked["kind"], tracked["names"], turning=tracked.get("turning", ""))
+        branch: Branch = make(
+            self.system,
+            record["name"],
+            points,
+            bifurcations,
+            own,
+            record["closed"],
+            # older files hold the sentence alone
+            record.get("endings") or read_endings(record["ended"]),
+            record["observe"],
+            record["options"],
+            record["warnings"],
+            record["audit"],
+            record.get("departs"),
+            record.get("arrives"),
+        )
+        branch.seconds = record["seconds"]
+        return branch
+
+    def _points(self) -> list[BranchPoint]:
+        names = [str(name) for name in self.array("parameter")]
+        omega, values = self.array("omega"), self.array("parameters")
+        residual, error = self.array("residual"), self.array("error")
+        arclength, iterations = self.array("arclength"), self.array("iterations")
+        motions = _Motions(self, "")
+        points = []
+        for i, stored in enumerate(self.record["points"]):
+            at = {name: float(value) for name, value in zip(names, values[i], strict=True)}
+            orbit, floquet = motions.at(i, stored, float(omega[i]), at, float(residual[i]), float(error[i]))
+            points.append(BranchPoint(orbit, floquet, float(arclength[i]), int(iterations[i])))
+        if self.record.get("tracked"):
+            points[:] = tracked_points(points, self.record["tracked"])
+        return points
+
+    def _events(self) -> list[Bifurcation]:
+        right, left = self.array("event_null_right"), self.array("event_null_left")
+        motions = _Motions(self, "event_")
+        events = []
+        for i, stored in enumerate(self.record["events"]):
+            numbers = stored["omega"], stored["values"], stored["residual"], stored["truncation"]
+            orbit, floquet = motions.at(i, stored["orbit"], *numbers)
+            vectors = None
+            if stored["null"] is not None:
+                wide, is_complex, narrow = stored["null"]
+                pair = right[i, :wide], left[i, :narrow]
+                vectors = NullVectors(*(p.copy() if is_complex else p.real.copy() for p in pair))
+            context = None
+            if stored["context"] is not None:
+                context = dict(self.tables["contexts"][stored["context"]])
+                context["system"] = self.systems[context["system"]]
+            # older files hold no normal forms: they are computed when asked for
+            fields = {name: value for name, value in stored["fields"].items() if name != "criticality"}
+            made = TrackedEvent if "curve" in fields else Bifurcation
+            event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            events.append(event.with_normal_form(stored["normal_form"]) if "normal_form" in stored else event)
+        return events
+
+
+class _Motions:
+    """Motions with their verdicts, one by one from the tables of a dataset."""
+
+    def __init__(self, reader: _Reader, prefix: str) -> None:
+        self.reader = reader
+        self.coefficients = reader.array(f"{prefix}coefficients")
+        self.multipliers = reader.array(f"{prefix}multipliers")
+        self.errors = reader.array(f"{prefix}multiplier_errors")
+
+    def at(
+        self, i: int, stored: Sequence[Any], omega: float, values: dict[str, float], residual: float, truncation: float
+    ) -> tuple[PeriodicOrbit, FloquetResult]:
+        which, rule, count, verdict = stored
+        balance = self.reader.balances[which]
+        x = self.coefficients[i, : balance.basis.size, : balance.size].copy()
+        adaptive = None if rule < 0 else self.reader.tables["rules"][rule]
+        floquet = FloquetResult(self.multipliers[i, :count].copy(), self.errors[i, :count].copy(), **verdict)
+        return PeriodicOrbit(balance, x, omega, values, residual, truncation, adaptive), floquet

@@ -1,0 +1,1 @@
+"""Quantities read off the motions of a branch."""

@@ -1,0 +1,106 @@
+"""Results as datasets and back, each by the codec of its class: what `save`, `load` and journals use.
+
+A codec says how one class is written as datasets, the one named "" first, and read again. It is registered beside the
+class; nothing here knows one. The attribute `contents` of the first dataset names the codec.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.store import files
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["Codec", "Datasets", "contents", "from_datasets", "provenance", "register", "save", "to_datasets"]
+
+Datasets = Mapping[str, "xarray.Dataset"]
+
+
+@dataclass(frozen=True)
+class Codec:
+    """How the results of one class are written and read.
+
+    Parameters
+    ----------
+    contents
+        What files call them.
+    made
+        The class; what derives from it is written in the same way unless it has a codec of its own.
+    write
+        From a result to its datasets; the one named "" comes first.
+    read
+        From datasets, whether the modules of a user's own laws may be imported, and the linear part of the
+        computation, to the result.
+    """
+
+    contents: str
+    made: type
+    write: Callable[[Any], dict[str, xarray.Dataset]]
+    read: Callable[[Datasets, bool, LinearPart | None], Any]
+
+
+_codecs: dict[str, Codec] = {}
+
+
+def register(codec: Codec) -> None:
+    """Make a codec known."""
+    _codecs[codec.contents] = codec
+
+
+def contents() -> tuple[str, ...]:
+    """What files can hold, by name."""
+    return tuple(_codecs)
+
+
+def to_datasets(item: Any, details: Mapping[str, Any] | None = None) -> dict[str, xarray.Dataset]:
+    """A result as datasets that a file or a journal can hold, `details` among the attributes of the one named "".
+
+    Raises InputError where its class has no codec.
+    """
+    by_class = {codec.made: codec for codec in _codecs.values()}
+    codec = next((by_class[cls] for cls in type(item).__mro__ if cls in by_class), None)
+    if codec is None:
+        raise InputError(f"{type(item).__name__} cannot be written to a file")
+    (first, head), *parts = codec.write(item).items()
+    return {first: head.assign_attrs({**(details or {}), "contents": codec.contents}), **dict(parts)}
+
+
+def from_datasets(
+    groups: Datasets, allow_code: bool = False, linear: LinearPart | None = None
+) -> tuple[Any, dict[str, Any]]:
+    """The result that `to_datasets` wrote, and the attributes of the dataset named ""."""
+    details = {str(name): files.number(value) for name, value in groups[""].attrs.items()}
+    codec = _codecs.get(str(details.get("contents")))
+    if codec is None:
+        raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
+    return codec.read(groups, allow_code, linear), details
+
+
+def save(item: Any, path: str | Path, overwrite: bool = False) -> Path:
+    """A result as a NetCDF file (.nc) of its own."""
+    target = files.free_place(path, overwrite, (".nc",))
+    files.write(target, to_datasets(item), provenance())
+    return target
+
+
+def provenance() -> dict[str, str]:
+    """Origin of a file: version, interpreter, platform, time."""
+    return {
+        "suboctave": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "platform": platform.platform(),
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

@@ -1,0 +1,474 @@
+"""Figures in study files: curves (responses, boundaries, in space) and motions (phase portraits, spectra, histories).
+
+The keys of a figure are the options of the function that draws it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator
+
+from suboctave.bifurcation import KINDS
+from suboctave.curves.junction import period_name
+from suboctave.errors import InputError, suggest
+from suboctave.maps.isolas.result import Isolas
+from suboctave.model.system import System
+from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum
+from suboctave.pictures.isolas import is_isolas
+from suboctave.pictures.options import DERIVATIVES, MotionView, as_multiple
+from suboctave.pictures.style import size_in_inches
+from suboctave.results.branch import Branch
+from suboctave.results.diagram import BifurcationDiagram
+from suboctave.results.readings.contacts import check_element, gapped_elements
+from suboctave.store.motions import motion_datasets
+from suboctave.study.results import Result
+from suboctave.study.steps.base import (
+    CheckContext,
+    Complaint,
+    Motion,
+    Step,
+    check_branch,
+    check_motion,
+    chosen,
+    chosen_branch,
+    name_or_table,
+    tried,
+)
+
+__all__ = ["FIGURES", "CurveFigure", "Figure", "MotionFigure", "StudyCurves", "drawable"]
+
+_VIEW = [field.name for field in fields(View)]
+_Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+@dataclass(frozen=True)
+class StudyCurves:
+    """What a figure may show: the steps of a study by name, with its system where that is in order."""
+
+    steps: Mapping[str, Step]
+    system: System | None
+
+    @property
+    def planes(self) -> dict[str, tuple[str, str] | None]:
+        """The curves by name, with the two parameters of those that are tracked or bound isolas, else None."""
+        return {name: step.plane for name, step in self.steps.items() if step.drawn()}
+
+
+class Figure(BaseModel):
+    """One figure; its form follows the suffix of `file`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    kind: str
+    file: str
+    dof: int | None = None
+    frequency: str | None = None
+    omega_reference: float | None = None
+    scale: float | None = None
+    unit: str | None = None
+    xlabel: str | None = None
+    ylabel: str | None = None
+    title: str | None = None
+    size: Any = None
+
+    @property
+    def texts(self) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """What is written on it, with the key of each."""
+        for key in ("title", "unit", "xlabel", "ylabel", "zlabel"):
+            if getattr(self, key, None) is not None:
+                yield (key,), getattr(self, key)
+        for i, label in enumerate(getattr(self, "labels", None) or ()):
+            yield ("labels", i), label
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        """What is wrong with it, before any work."""
+        yield from tried("size", lambda: self.size is None or size_in_inches(self.size))
+        if study.system is None:
+            return
+        if self.dof is not None and not 0 <= self.dof < study.system.n:
+            yield ("dof",), f"dof={self.dof} is out of range: the system has {study.system.n}, numbered from 0"
+
+    def draw(self, results: Mapping[str, Result], path: Path) -> bool:
+        """Draw it; False where what it shows is not there.
+
+        Raises InputError where a finished analysis lacks what it shows.
+        """
+        raise TypeError(f"{type(self).__name__} does not say how it is drawn")
+
+
+class CurveFigure(Figure):
+    """One figure of curves; what is drawn follows the keys of `View`."""
+
+    analyses: list[str] = Field(default_factory=list)
+    x: str | None = None
+    size: Any = (6.4, 4.2)
+    quantity: str = ""
+    harmonic: float | None = None
+    element: int | None = None
+
+    @field_validator("harmonic", mode="before")
+    @classmethod
+    def _multiple(cls, given: Any) -> Any:
+        """A number, or a fraction as text: "1/3"."""
+        return None if given is None else as_multiple(given)
+
+    @property
+    def view(self) -> View:
+        """Quantity and units; InputError where they do not go together."""
+        given: dict[str, Any] = {name: getattr(self, name, None) for name in _VIEW}
+        return View(**given)
+
+    def drawn(self, planes: Mapping[str, tuple[str, str] | None]) -> list[str]:
+        """The analyses that it shows."""
+        return self.analyses or list(planes)
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        """See `Figure.check`."""
+        planes, system = study.planes, study.system
+        for i, name in enumerate(self.analyses):
+            if name not in planes:
+                yield ("analyses", i), f"no analysis {name!r} gives a curve{suggest(name, planes)}"
+        if not planes:
+            yield (), "there is no analysis that gives a curve"
+        parameters = ["omega", *(system.parameters if system else ())]
+        for key in ("x", "y"):
+            given = getattr(self, key, None)
+            if system is not None and given is not None and given not in parameters:
+                yield (key,), f"neither omega nor a parameter{suggest(given, parameters)}"
+        labels, drawn = getattr(self, "labels", None), len(self.drawn(planes))
+        if labels is not None and len(labels) != drawn:
+            yield ("labels",), f"{len(labels)} labels for {drawn} curves"
+        kinds = [*KINDS, *(event.name for step in study.steps.values() for event in getattr(step, "events", ()))]
+        for i, kind in enumerate(getattr(self, "marks", None) or ()):
+            if kind not in kinds:
+                yield ("marks", i), f"neither a kind nor an event{suggest(kind, kinds)}"
+        yield from super().check(study)
+        try:
+            view = self.view
+        except InputError as error:
+            yield (), str(error)
+            return
+        if system is None:
+            return
+        if view.element is not None:
+            gapped = gapped_elements(system) if view.quantity in ("contact_share", "impacts") else None
+            yield from tried("element", lambda: check_element(system, view.element, gapped))
+        loads = [c for c in system.load_components() if c.harmonic == 1 and c.direction.sum()]
+        if view.quantity == "transmissibility" and not loads:
+            yield ("quantity",), "no force at harmonic 1 is applied, so that there is no transmissibility"
+
+    def draw(self, results: Mapping[str, Result], path: Path) -> bool:
+        """See `Figure.draw`."""
+        planes = {name: getattr(item, "plane", None) for name, item in results.items() if isinstance(item, _CURVES)}
+        every = self.drawn(planes)
+        there = [name for name in every if name in results and drawable(results[name])]
+        if not there:
+            return False
+        view = self.view
+        alone = results[there[0]] if len(there) == 1 else None
+        given: list[str] | None = getattr(self, "labels", None)
+        labels: Sequence[str] | None = None
+        if given is not None:
+            labels = [label for name in there for label in self._labels(results[name], given[every.index(name)])]
+        elif isinstance(alone, BifurcationDiagram):
+            labels = alone.legend
+        if isinstance(alone, BifurcationDiagram) and view.marks is None:
+            view = replace(view, marks=alone.marks)
+        datasets = [dataset for name in there for dataset in self.datasets(results[name], view)]
+        if not datasets:
+            return False
+        completed = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
+        self.drawing([data if is_isolas(data) else next(completed) for data in datasets], path, labels, view)
+        return True
+
+    def datasets(self, item: Result, view: View) -> list[Any]:
+        """What of a result is drawn."""
+        if isinstance(item, Isolas):
+            return self.of_isolas(item.to_xarray(readings=view.readings(0)))
+        return [branch.to_xarray(readings=view.readings(branch.nu)) for branch in _branches_of(item)]
+
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """What of isolas is drawn."""
+        raise TypeError(f"{type(self).__name__} does not say what of isolas it draws")
+
+    def _labels(self, item: Result, label: str) -> list[str]:
+        """The label of a curve; those of a diagram's branches name their periods, those of isolas what they are."""
+        if isinstance(item, BifurcationDiagram):
+            return [f"{label}, {period_name(branch.nu)}" for branch in _branches_of(item)]
+        if isinstance(item, Isolas):
+            datasets = item.to_xarray()
+            shown = {id(dataset) for dataset in self.of_isolas(datasets)}
+            names = [name.split(": ")[-1] for name, dataset in datasets.items() if id(dataset) in shown]
+            return [f"{label}, {name}" for name in names if name != "isolas"]
+        return [label]
+
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
+        """Draw the datasets of its curves."""
+        raise TypeError(f"{type(self).__name__} does not say how it is drawn")
+
+
+_CURVES = (Branch, BifurcationDiagram, Isolas)
+
+
+def drawable(item: Result) -> bool:
+    """Whether there is something of a result to draw."""
+    if isinstance(item, Isolas):
+        return bool(item.limit_points or item.doublings)
+    return bool(_branches_of(item))
+
+
+def _branches_of(item: Result) -> list[Branch]:
+    """The branches of a curve or a diagram that can be drawn."""
+    if isinstance(item, BifurcationDiagram):
+        return [branch for branch in item.branches if len(branch)]
+    return [item] if isinstance(item, Branch) and len(item) else []
+
+
+class ResponseFigure(CurveFigure):
+    """Response curves. Curves of bifurcations are drawn among them where `x` is given and they are named.
+
+    Of isolas that are named the closed branches known are drawn, or those at the values `at`.
+    """
+
+    kind: str = "response"
+    labels: list[str] | None = None
+    xlim: _Limits | None = None
+    ylim: _Limits | None = None
+    marks: list[str] | None = None
+    at: list[float] | None = None
+
+    def drawn(self, planes: Mapping[str, tuple[str, str] | None]) -> list[str]:
+        """All that are no curves of bifurcations, unless some are named."""
+        return self.analyses or [name for name, plane in planes.items() if plane is None] or list(planes)
+
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        return _closed(datasets, self.at)
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        """See `Figure.check`."""
+        yield from super().check(study)
+        for i, name in enumerate(self.analyses):
+            tracked = study.planes.get(name) is not None and not study.steps[name].gives_isolas
+            if tracked and self.x is None:
+                yield ("analyses", i), f'{name!r} is a curve of bifurcations: kind = "boundary" draws it, or give x'
+
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
+        """See `CurveFigure.drawing`."""
+        plot_response(datasets, path, x=self.x, labels=labels, title=self.title, size=self.size, view=view)
+
+
+class BoundaryFigure(CurveFigure):
+    """Curves of bifurcations and regions of isolas in the plane of two parameters; with a `quantity`, this upwards."""
+
+    kind: Literal["boundary"]
+    y: str | None = None
+    labels: list[str] | None = None
+    xlim: _Limits | None = None
+    ylim: _Limits | None = None
+    marks: list[str] | None = None
+
+    @property
+    def projected(self) -> bool:
+        """Whether a quantity is drawn upwards."""
+        return bool(self.quantity) or self.harmonic is not None
+
+    def drawn(self, planes: Mapping[str, tuple[str, str] | None]) -> list[str]:
+        """All curves of bifurcations, unless some are named."""
+        return self.analyses or [name for name, plane in planes.items() if plane is not None]
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        """See `Figure.check`."""
+        yield from super().check(study)
+        curves = study.planes
+        tracked = [name for name, plane in curves.items() if plane is not None]
+        if curves and not tracked:
+            yield (), "there is no analysis of the type 'track' or 'find_isolas', whose curves it would show"
+        for i, name in enumerate(self.analyses):
+            if name in curves and curves[name] is None:
+                yield ("analyses", i), f"{name!r} is no curve of bifurcations{suggest(name, tracked)}"
+        planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
+        if self.projected and self.y is not None:
+            yield ("y",), "is a parameter; with a quantity that is what is drawn upwards: leave one of them out"
+        if len(planes) > 1 and (self.x is None or (self.y is None and not self.projected)):
+            yield (), "the curves are tracked in different parameters: choose x and y, or fewer analyses"
+        yield from _same(self.x, self.y)
+        if len(planes) == 1 and (self.x is None) != (self.y is None) and not self.projected:
+            key, given = ("x", self.x) if self.x is not None else ("y", self.y)
+            (plane,) = planes
+            if plane is not None and given not in plane:
+                yield (key,), f"is not free on these curves{suggest(str(given), plane)}; else give x and y"
+
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        return [dataset for dataset in datasets.values() if "isola" not in dataset.attrs]
+
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
+        """See `CurveFigure.drawing`."""
+        axes: dict[str, Any] = {"x": self.x, "y": self.y, "projected": self.projected}
+        plot_boundaries(datasets, path, **axes, labels=labels, title=self.title, size=self.size, view=view)
+
+
+class SpaceFigure(CurveFigure):
+    """Response curves at several values of a parameter, and curves of bifurcations through them, in space.
+
+    Of isolas the closed branches known are drawn, or those at the values `at`.
+    """
+
+    kind: Literal["space"]
+    y: str | None = None
+    size: Any = (6.4, 5.0)
+    zlabel: str | None = None
+    elevation: float = 24.0
+    azimuth: float = -58.0
+    at: list[float] | None = None
+
+    def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
+        """See `CurveFigure.of_isolas`."""
+        return [d for d in datasets.values() if "isola" not in d.attrs] + _closed(datasets, self.at)
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        """See `Figure.check`."""
+        yield from super().check(study)
+        curves = study.planes
+        planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
+        yield from _same(self.x, self.y)
+        if self.x is not None and self.y is not None:
+            return
+        if len(planes) > 1:
+            yield (), "the curves are tracked in different parameters: choose x and y, or fewer analyses"
+        elif curves and not planes and self.y is None:
+            yield ("y",), "is missing: the parameter into the depth, which no tracked curve tells here"
+
+    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
+        """See `CurveFigure.drawing`."""
+        own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
+        units: dict[str, Any] = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
+        plot_space(datasets, path, **own, **units)
+
+
+def _closed(datasets: Mapping[str, Any], values: Sequence[float] | None) -> list[Any]:
+    """The closed branches among the datasets of isolas, or those at some values; InputError where there is none."""
+    closed = [dataset for dataset in datasets.values() if "isola" in dataset.attrs]
+    places = [float(dataset.attrs["at"]) for dataset in closed]
+    parameter = datasets["isolas"].attrs["isolas"]
+    for value in values or ():
+        if value not in places:
+            there = ", ".join(f"{other:.6g}" for other in sorted(set(places))) or "none"
+            raise InputError(
+                f"no closed branch at {parameter} = {value:g} is known (known: {there}): name it in at of the analysis"
+            )
+    return [dataset for dataset, place in zip(closed, places, strict=True) if values is None or place in values]
+
+
+def _same(x: str | None, y: str | None) -> Iterator[Complaint]:
+    if x is not None and x == y:
+        yield ("y",), f"is {x!r}, which is x as well"
+
+
+# ------------------------------------------------------------------------------------------------------------ motions
+_Motion = Annotated[Annotated[str, Tag("name")] | Annotated[Motion, Tag("table")], Discriminator(name_or_table)]
+#: keys of a figure that are no options of what draws it
+_OWN = {"kind", "file", "motions", "dof"}
+
+
+class MotionFigure(Figure):
+    """One figure of motions, each chosen as `start` chooses one."""
+
+    plot: ClassVar[Any]
+    quantities: ClassVar[Sequence[str]] = ("displacement",)
+
+    motions: list[_Motion] = Field(min_length=1)
+    overlay: bool = False
+    labels: list[str] | None = None
+
+    @property
+    def chosen(self) -> list[Motion]:
+        """The motions; the name of an analysis alone means its last point."""
+        return [Motion(analysis=given) if isinstance(given, str) else given for given in self.motions]
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        """See `Figure.check`."""
+        curves = list(study.planes)
+        kinds = {name: type(step) for name, step in study.steps.items()}
+        around = None if study.system is None else CheckContext(study.system, kinds)
+        for i, motion in enumerate(self.chosen):
+            key: tuple[str | int, ...] = ("motions", i)
+            if motion.analysis not in curves:
+                yield key, f"no analysis {motion.analysis!r} gives a curve{suggest(motion.analysis, curves)}"
+            elif around is not None:
+                named = key if isinstance(self.motions[i], str) else (*key, "analysis")
+                yield from check_branch(motion, named, around)
+            if around is not None:
+                yield from check_motion(motion, key, around)
+        if self.labels is not None and len(self.labels) != len(self.motions):
+            yield ("labels",), f"{len(self.labels)} labels for {len(self.motions)} motions"
+        quantity, element = getattr(self, "quantity", "displacement"), getattr(self, "element", None)
+        units = {name: getattr(self, name) for name in ("frequency", "omega_reference", "scale", "unit")}
+        yield from tried("", lambda: MotionView(quantity, element, **units).check_quantity(self.quantities))
+        yield from super().check(study)
+        if element is not None and study.system is not None:
+            system = study.system
+            yield from tried("element", lambda: check_element(system, element))
+
+    def draw(self, results: Mapping[str, Result], path: Path) -> bool:
+        """See `Figure.draw`; False also where an analysis was interrupted before the motion."""
+        element = getattr(self, "element", None)
+        datasets = []
+        for motion in self.chosen:
+            result = results.get(motion.analysis)
+            if result is None or not len(result):
+                return False
+            try:
+                branch, item = chosen_branch(motion, results), chosen(motion, results)
+            except InputError:
+                if isinstance(result, _CURVES) and result.interrupted:
+                    return False
+                raise
+            dof = branch.observe if self.dof is None else self.dof
+            datasets += motion_datasets(item, dof=dof, elements=() if element is None else (element,))
+        options = {name: getattr(self, name) for name in type(self).model_fields if name not in _OWN}
+        type(self).plot(datasets, path, **options)
+        return True
+
+
+class PhaseFigure(MotionFigure):
+    """Phase portraits."""
+
+    plot: ClassVar[Any] = staticmethod(plot_phase)
+    kind: Literal["phase"]
+
+
+class SpectrumFigure(MotionFigure):
+    """Spectra."""
+
+    plot: ClassVar[Any] = staticmethod(plot_spectrum)
+    quantities: ClassVar[Sequence[str]] = tuple(DERIVATIVES)
+    kind: Literal["spectrum"]
+    quantity: str = "displacement"
+    highest: float | None = Field(default=None, gt=0)
+
+
+class HistoryFigure(MotionFigure):
+    """Time histories."""
+
+    plot: ClassVar[Any] = staticmethod(plot_history)
+    quantities: ClassVar[Sequence[str]] = (*DERIVATIVES, "force")
+    kind: Literal["history"]
+    quantity: str = "displacement"
+    element: int | None = None
+
+
+#: by the `kind` of a figure
+FIGURES: dict[str, type[Figure]] = {
+    "response": ResponseFigure,
+    "boundary": BoundaryFigure,
+    "space": SpaceFigure,
+    "phase": PhaseFigure,
+    "spectrum": SpectrumFigure,
+    "history": HistoryFigure,
+}

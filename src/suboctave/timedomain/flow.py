@@ -1,0 +1,444 @@
+"""Many trajectories at once: the compiled flow of a system over whole periods of the load.
+
+    flow = Flow(system)
+    motions = flow.over(states, omega=2.3, periods=200)      # states (B, 2n)
+
+Every trajectory may have its own frequency and parameters. Its result does not depend on the others, on their number or
+on that of the threads: neighbours in a group share instructions, no number. Nothing here knows what a user calls; the
+verbs are in `analysis`.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
+from suboctave.interruption import Interruption, check_time
+from suboctave.model.elements.base import Array
+from suboctave.model.system import System
+from suboctave.timedomain.adaptive import AdaptiveGroup, AdaptiveMethod
+from suboctave.timedomain.layout import Layout, Numbers
+from suboctave.timedomain.newmark import NewmarkGroup, NewmarkMethod
+from suboctave.timedomain.python_callbacks import PythonCallbacks
+
+__all__ = ["METHODS", "Flow", "Motions", "Report", "check_count", "check_extent", "check_motions"]
+
+METHODS = ("accurate", "newmark")
+Report = Callable[[float, str], None]
+#: seconds after which a run is interrupted or reports
+_INTERVAL = 0.1
+#: numbers that one answer may hold, periods of the load that all trajectories together may take (weeks on one
+#: processor), and the largest count of anything
+_LARGEST, _LONGEST, _MOST = 400_000_000, 100_000_000_000, 100_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Result of a batch integration.
+
+    Attributes
+    ----------
+    states
+        (B, S, 2n): displacements, then velocities, at the S instants kept.
+    peaks
+        (B, S, n): the largest |x_i| since the instant before, between the instants too; None if not asked for.
+    end
+        (B, 2n): the last states.
+    failed
+        (B,): trajectories that left the range of numbers, or took more than 100 000 steps between two samples; they are
+        NaN from there on.
+    unsettled
+        (B,): steps of Newmark's method whose equations were not solved to the tolerance.
+    finished
+        (B,): whether the trajectory was followed to its end; not all are where it was interrupted.
+    growth
+        (B, S, k + 1): of a flow with k tangent vectors, the logarithms by which they grew since the instant before,
+        then that by which the volume of states did.
+    tangents
+        (B, 2n, k): the tangent vectors at the end, as columns.
+    interruption
+        What stopped them, Ctrl-C or a time limit; None if nothing did.
+    """
+
+    states: Array
+    peaks: Array | None
+    end: Array
+    failed: NDArray[np.bool_]
+    unsettled: Array
+    finished: NDArray[np.bool_]
+    growth: Array | None = None
+    tangents: Array | None = None
+    interruption: Interruption | None = None
+
+
+class Flow:
+    """The flow of a system over whole periods of its load, compiled.
+
+    Parameters
+    ----------
+    system
+        Any `System`. Its structure (places and kinds of elements) is compiled, its numbers are not.
+    method
+        "accurate": Runge-Kutta of order 8 with located corners, local error `tolerance` (default 1e-10) relative to the
+        size of the motion. "newmark": constant average acceleration with `steps_per_period` steps (default 1000), each
+        solved until Newton's correction is below `tolerance` (default 1e-10) of the motion.
+    samples
+        Instants per period at which states are given; of Newmark's method a divisor of `steps_per_period`.
+    lanes
+        Trajectories that run side by side; default what suits large batches. Few of them waste less with 8. Results
+        with different numbers may differ in the last bit.
+    tangents
+        Vectors that are carried along by the derivative of the flow, 0 to 2n; "accurate" only. They are kept
+        orthonormal, with weights `omega sqrt(M_ii)` of displacements and `sqrt(M_ii)` of velocities.
+    transition
+        Leave them as they come, from unit vectors: with 2n of them, the state-transition matrix.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        method: str = "accurate",
+        samples: int = 1,
+        steps_per_period: int = 1000,
+        tolerance: float | None = None,
+        lanes: int | None = None,
+        tangents: int = 0,
+        transition: bool = False,
+    ) -> None:
+        if method not in METHODS:
+            raise InputError(f"method={method!r}{suggest(str(method), METHODS)}")
+        tolerance = 1e-10 if tolerance is None else tolerance
+        check_numbers(tolerance=tolerance)
+        if not 1e-15 <= tolerance <= 1e-2:
+            raise InputError(f"tolerance={tolerance!r}: give a number from 1e-15 to 1e-2, relative to the motion")
+        samples = check_count("samples", samples)
+        steps = check_count("steps_per_period", steps_per_period)
+        if method == "newmark" and (steps < 4 or steps % samples):
+            raise InputError(f"steps_per_period={steps} must be at least 4 and a multiple of samples={samples}")
+        self.system, self.method, self.samples = system, method, samples
+        self.layout = Layout(system)
+        self.integrator: NewmarkMethod | AdaptiveMethod
+        if tangents and (method != "accurate" or not 0 < tangents <= 2 * system.n):
+            raise InputError(f'tangents={tangents}: from 1 to {2 * system.n} of them, with method="accurate"')
+        if method == "newmark":
+            self.integrator = NewmarkMethod(self.layout, steps, tolerance, lanes)
+        else:
+            self.integrator = AdaptiveMethod(self.layout, samples, tolerance, lanes, tangents, transition)
+
+    def over(
+        self,
+        states: ArrayLike,
+        omega: ArrayLike,
+        periods: int,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        skip: int = 0,
+        measure: bool = False,
+        workers: int | None = None,
+        report: Report | None = None,
+    ) -> Motions:
+        """Follow trajectories from phase 0 of the load over whole periods.
+
+        Parameters
+        ----------
+        states
+            (B, 2n), or (2n,) for one that all share.
+        omega, parameters
+            A number, or (B,) with one for each; parameters by name.
+        periods
+            How many periods of the load.
+        skip
+            Samples at the beginning that are not kept.
+        measure
+            Whether the largest displacements are wanted.
+        workers
+            Threads; default: as many as there are processors.
+        report
+            Called with the share done and a text, from the calling thread.
+
+        Raises
+        ------
+        InputError
+            Before any work, for shapes and values that make no sense.
+        """
+        periods = check_count("periods", periods)
+        x, w, varied = self._broadcast(states, omega, parameters or {})
+        total = periods * self.samples
+        skip = min(max(int(skip), 0), total)
+        check_extent(len(x), periods, len(x) * (total - skip) * 2 * self.layout.n)
+        which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
+        numbers = self.layout.numbers(w, varied)
+        return _Run(self, numbers, x, which, total, skip, measure).go(workers, report)
+
+    def onward(
+        self,
+        states: ArrayLike,
+        omega: ArrayLike,
+        first: NDArray[np.int_],
+        parameters: Mapping[str, ArrayLike] | None = None,
+        workers: int | None = None,
+    ) -> Motions:
+        """Follow each trajectory from an instant of its own to the next: from sample `first` (B,) of the period.
+
+        For methods that cut a period in pieces, such as multiple shooting; with the accurate method only. The rest is
+        as in `over`.
+        """
+        if self.method != "accurate":
+            raise InputError('pieces of a period are followed with method="accurate"')
+        x, w, varied = self._broadcast(states, omega, parameters or {})
+        which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
+        numbers = self.layout.numbers(w, varied)
+        run = _Run(self, numbers, x, which, 1, 0, False)
+        run.first = np.broadcast_to(np.asarray(first) % self.samples, (len(x),)).astype(float)
+        return run.go(workers, None)
+
+    def _broadcast(
+        self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
+    ) -> tuple[Array, Array, dict[str, Array]]:
+        n = self.layout.n
+        x, w = _floats("states", states), _floats("omega", omega)
+        varied = {}
+        if not isinstance(parameters, Mapping):
+            raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
+        for name, values in parameters.items():
+            self.system.check_parameter(name)
+            varied[name] = _floats(name, values)
+        if x.ndim not in (1, 2) or x.shape[-1] != 2 * n:
+            raise InputError(
+                f"states of {n} degrees of freedom have the shape ({2 * n},) or (B, {2 * n}): displacements, then "
+                f"velocities; got {x.shape}"
+            )
+        sizes = {"states": len(x) if x.ndim == 2 else None, "omega": len(w) if w.ndim else None}
+        sizes |= {name: len(values) if values.ndim else None for name, values in varied.items()}
+        for name, array in (("omega", w), *varied.items()):
+            if array.ndim > 1 or not np.isfinite(array).all():
+                raise InputError(f"{name} must be a finite number or one for each trajectory, got shape {array.shape}")
+        if not (w > 0.0).all():
+            raise InputError("omega must be positive: it sets the scale of time")
+        if not np.isfinite(x).all():
+            raise InputError("the states have entries that are not finite")
+        counts = {size for size in sizes.values() if size is not None}
+        if len(counts) > 1 or 0 in counts:
+            given = ", ".join(f"{name}: {size}" for name, size in sizes.items() if size is not None)
+            raise InputError(f"there must be as many states, frequencies and parameters; got {given}")
+        count = counts.pop() if counts else 1
+        sets = count if w.ndim or any(values.ndim for values in varied.values()) else 1
+        return (
+            np.broadcast_to(x, (count, 2 * n)),
+            np.broadcast_to(w, (sets,)),
+            {name: np.broadcast_to(values, (sets,)) for name, values in varied.items()},
+        )
+
+
+class _Run:
+    """One batch on its way: groups of trajectories, each followed by one thread in chunks."""
+
+    def __init__(
+        self, flow: Flow, numbers: Numbers, states: Array, which: NDArray[np.int_], total: int, skip: int, measure: bool
+    ) -> None:
+        self.flow, self.numbers, self.states, self.which = flow, numbers, states, which
+        self.total, self.skip, self.measure = total, skip, measure
+        self.first: Array | None = None
+        self.rows = flow.integrator.numbers(numbers)
+        self.callbacks = PythonCallbacks(flow.layout.called_back)
+        n, count = flow.layout.n, len(states)
+        self.out = np.full((count, total - skip, 2 * n), np.nan)
+        self.peaks = np.full((count, total - skip, n), np.nan) if measure else None
+        self.end = np.full((count, 2 * n), np.nan)
+        self.failed = np.zeros(count, dtype=bool)
+        self.unsettled = np.zeros(count)
+        self.finished = np.zeros(count, dtype=bool)
+        self.growth = self.tangents = None
+        tangents = flow.integrator.count if isinstance(flow.integrator, AdaptiveMethod) else 0
+        if tangents:
+            self.growth = np.full((count, total - skip, tangents + 1), np.nan)
+            self.tangents = np.full((count, 2 * n, tangents), np.nan)
+        lanes = flow.integrator.lanes
+        self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
+        self.done = [0.0] * len(self.groups)
+        self.stop = threading.Event()
+        self.interruption: Interruption | None = None
+
+    def go(self, workers: int | None, report: Report | None) -> Motions:
+        """Follow all of them."""
+        many = min(_processors() if workers is None else check_count("workers", workers), len(self.groups))
+        try:
+            if many <= 1:
+                for g in range(len(self.groups)):
+                    self._follow(g, report)
+            else:
+                self._together(many, report)
+        except KeyboardInterrupt as cause:
+            self.stop.set()
+            self.interruption = Interruption.of(cause)
+        if self.callbacks.failure is not None:
+            raise self.callbacks.failure
+        self.failed |= self.finished & ~np.isfinite(self.end).all(axis=1)
+        return Motions(
+            self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished, self.growth, self.tangents,
+            self.interruption,
+        )  # fmt: skip
+
+    def _together(self, many: int, report: Report | None) -> None:
+        self._compile()
+        with ThreadPoolExecutor(many) as pool:
+            pending: set[Future[None]] = {pool.submit(self._follow, g, None) for g in range(len(self.groups))}
+            try:
+                while pending:
+                    finished, pending = wait(pending, _INTERVAL, FIRST_COMPLETED)
+                    for future in finished:
+                        future.result()
+                    self._report(report)
+            except BaseException:
+                self.stop.set()
+                for future in pending:
+                    future.cancel()
+                raise
+
+    def _report(self, report: Report | None) -> None:
+        check_time()
+        if report is not None:
+            share = sum(self.done) / len(self.done)
+            report(share, f"{share * len(self.states):.0f} of {len(self.states)} trajectories")
+
+    def _compile(self) -> None:
+        """Once, before the threads."""
+        group = self._group(np.zeros(self.flow.integrator.lanes, dtype=int))
+        empty = np.empty((0, 2 * self.flow.layout.n, self.flow.integrator.lanes))
+        if isinstance(group, NewmarkGroup):
+            group.advance(0, 0, 1, 0, empty, None)
+        else:
+            group.advance(0, 0, empty, None)
+
+    def _group(self, members: NDArray[np.int_], alive: int = 0) -> NewmarkGroup | AdaptiveGroup:
+        integrator, states, which = self.flow.integrator, self.states[members], self.which[members]
+        if isinstance(integrator, NewmarkMethod):
+            return NewmarkGroup(integrator, self.rows, states, which, self.callbacks.address)
+        sizes = self.flow.layout.sizes(self.numbers, states, which)
+        group = AdaptiveGroup(integrator, self.rows, states, which, sizes, self.total, self.callbacks.address, alive)
+        if self.first is not None:
+            group.begin_at(self.first[members])
+        return group
+
+    def _follow(self, g: int, report: Report | None) -> None:
+        members = self.groups[g]
+        lanes, n = self.flow.integrator.lanes, self.flow.layout.n
+        # what is missing from the last group is made up by its first one, but stands still where it may
+        filled = np.array([members[i] if i < len(members) else members[0] for i in range(lanes)])
+        group = self._group(filled, len(members))
+        kept = self.total - self.skip
+        out = np.full((kept, 2 * n, lanes), np.nan)
+        peaks = np.full((kept, n, lanes), np.nan) if self.measure else None
+        if isinstance(group, NewmarkGroup):
+            self._by_steps(group, g, out, peaks, report)
+        else:
+            if self.growth is not None:
+                group.growth = np.full((kept, self.growth.shape[2], lanes), np.nan)
+            self._by_trials(group, g, out, peaks, report)
+        if self.stop.is_set():
+            return
+        if isinstance(group, AdaptiveGroup) and group.left() > 0.0:
+            return
+        here, own = slice(members.start, members.stop), slice(0, len(members))
+        self.out[here] = out.transpose(2, 0, 1)[own]
+        if self.peaks is not None and peaks is not None:
+            self.peaks[here] = peaks.transpose(2, 0, 1)[own]
+        self.end[here] = group.states()[own]
+        if isinstance(group, NewmarkGroup):
+            self.unsettled[here] = group.unsettled()[own]
+        else:
+            self.failed[here] = group.failed()[own]
+            if self.growth is not None and self.tangents is not None:
+                self.growth[here] = group.growth.transpose(2, 0, 1)[own]
+                self.tangents[here] = group.tangents()[own]
+        self.finished[here] = True
+
+    def _by_steps(self, group: NewmarkGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
+        steps = group.method.steps
+        stride = steps // self.flow.samples
+        begin, end, used, chunk = 0, self.total * stride, 0, steps
+        while begin < end and not self._stopped():
+            to, started = min(begin + chunk, end), perf_counter()
+            used += group.advance(
+                begin, to, stride, self.skip * stride, out[used:], None if peaks is None else peaks[used:]
+            )
+            chunk = _next_chunk(to - begin, perf_counter() - started)
+            begin = to
+            self.done[g] = begin / end
+            self._report(report)
+
+    def _by_trials(self, group: AdaptiveGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
+        budget, finished = 20, False
+        while not finished and not self._stopped():
+            started = perf_counter()
+            finished = group.advance(budget, self.skip, out, peaks)
+            budget = _next_chunk(budget, perf_counter() - started)
+            self.done[g] = 1.0 - group.left() / (self.total * len(self.groups[g]))
+            self._report(report)
+
+    def _stopped(self) -> bool:
+        return self.stop.is_set() or self.callbacks.failure is not None
+
+
+def _next_chunk(chunk: int, seconds: float) -> int:
+    """What will take about `_INTERVAL` seconds, if `chunk` took `seconds`."""
+    return max(1, int(chunk * min(4.0, _INTERVAL / max(seconds, 1e-6))))
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _floats(name: str, given: ArrayLike) -> Array:
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be a finite number or an array of them, not {shortened(given)}") from None
+
+
+def check_count(name: str, value: int) -> int:
+    """A positive whole number, or `InputError`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise InputError(f"{name} must be a positive whole number, not {shortened(value)}")
+    if value > _MOST:
+        raise InputError(f"{name}={shortened(int(value))} is more than {_MOST}, the largest count that is taken")
+    return int(value)
+
+
+def check_extent(trajectories: int, periods: int, numbers: int) -> None:
+    """Refuse what would not fit in memory (so many numbers are kept), or would take years."""
+    if numbers > _LARGEST:
+        raise InputError(
+            f"{trajectories} trajectories over {periods} periods leave {numbers:.1e} numbers, more than fit (at most "
+            f"{_LARGEST:.1e}): keep fewer (a longer transient, fewer trajectories at once, a coarser grid)"
+        )
+    if trajectories * periods > _LONGEST:
+        raise InputError(
+            f"{trajectories} trajectories over {periods} periods are {trajectories * periods:.1e} periods of the load, "
+            f"more than can be waited for (at most {_LONGEST:.1e}): take fewer of either"
+        )
+
+
+def check_motions(motions: Motions) -> None:
+    """Refuse motions that failed or whose steps were not solved, with what to change."""
+    if motions.failed.any():
+        first = int(np.flatnonzero(motions.failed)[0])
+        raise ConvergenceError(
+            f"{int(motions.failed.sum())} of {len(motions.failed)} trajectories (the first is number {first}) left the "
+            "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite where "
+            "it goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
+        )
+    if motions.unsettled.any():
+        raise ConvergenceError(
+            f"Newmark's method did not solve {int(motions.unsettled.sum())} of its steps: take more steps_per_period "
+            'than now, or method="accurate"'
+        )

@@ -1,0 +1,80 @@
+"""Which motion a trajectory has settled on, from its stroboscopic points alone.
+
+A motion has the period nT if its last points repeat after n of them, n the smallest such number: `|y_(k+n) - y_k| <=
+tolerance` of the motion's size for the last 2 n pairs. So at least 3 n points are needed. Points that spiral towards
+one may do so before they have come together, for the n after which the spiral has gone about once around: the
+differences then shrink from n points to the next n, and what is still to come by that rate must be little beside the
+distances that make it a motion of nT. Two things cannot be told: a motion of twice the period whose points lie closer
+together than the tolerance counts as the simple one, and one that still creeps by less than the tolerance counts as
+settled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from suboctave.model.elements.base import Array
+
+__all__ = ["Repeat", "extents", "period_of", "same_cycle"]
+
+_SMALLEST_SHARE = 1e-3
+#: largest share of the distance between the points of a cycle by which they may still move
+_TO_COME = 0.1
+#: slowest rate at which differences count as shrinking
+_SLOWEST = 0.999
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """The period in load periods, 0 if nothing repeats, and by how much the points miss, relative to the motion."""
+
+    period: int
+    defect: float
+
+
+def extents(peaks: Array, omega: float, mass: Array) -> Array:
+    """Sizes (2n,) of displacements and velocities of a motion, from its largest displacements (n,).
+
+    A degree of freedom that hardly moves counts for a thousandth of the largest one, weighted by the roots of the
+    masses `mass` (n,).
+    """
+    weight = np.sqrt(mass)
+    floor = _SMALLEST_SHARE * np.max(peaks * weight) / weight
+    lengths = np.maximum(np.maximum(peaks, floor), np.finfo(float).tiny)
+    return np.concatenate([lengths, omega * lengths])
+
+
+def period_of(points: Array, sizes: Array, tolerance: float, longest: int | None = None) -> Repeat:
+    """The period of stroboscopic points (P, 2n); `longest` bounds it (default: what P points can show)."""
+    if not np.isfinite(points).all():
+        return Repeat(0, np.inf)
+    most = len(points) // 3
+    best = np.inf
+    for n in range(1, min(most, longest or most) + 1):
+        defect = float(np.max(np.abs(points[-2 * n :] - points[-3 * n : -n]) / sizes))
+        if defect <= tolerance and _stays_apart(points, sizes, n):
+            return Repeat(n, defect)
+        best = min(best, defect)
+    return Repeat(0, best)
+
+
+def _stays_apart(points: Array, sizes: Array, n: int) -> bool:
+    """Whether the n points of a cycle will not come together to one of a shorter period."""
+    changes = np.abs(points[-2 * n :] - points[-3 * n : -n]) / sizes
+    before, last = float(changes[:n].max()), float(changes[n:].max())
+    rate = min(last / before, _SLOWEST) if before > 0.0 else 0.0
+    to_come = last * rate / (1.0 - rate)
+    cycle = points[-n:]
+    apart = (float(np.max(np.abs(np.roll(cycle, d, axis=0) - cycle) / sizes)) for d in range(1, n) if n % d == 0)
+    return all(to_come <= _TO_COME * distance for distance in apart)
+
+
+def same_cycle(one: Array, other: Array, sizes: Array, tolerance: float) -> bool:
+    """Whether two cycles of n points (n, 2n) are the same but for where they begin."""
+    if one.shape != other.shape:
+        return False
+    return any(
+        float(np.max(np.abs(np.roll(other, shift, axis=0) - one) / sizes)) <= tolerance for shift in range(len(one))
+    )

@@ -1,0 +1,249 @@
+"""What shooting says of a branch: verdicts on its points and bifurcations, and these as a labelled dataset.
+
+On `point`: `index` (which point of the branch), `omega`, `amplitude`, `distance`, `multipliers` (point x multiplier,
+nan behind those that there are), `multiplier_errors`, `multiplier_error` (the largest difference from the branch's),
+`stable` and `computed` (1, 0, or -1 where there is no verdict), `outcome`, `reason`; on `event` with the prefix
+`event_`: `kind`, `omega`, `amplitude`, `true_omega`, `distance`, `agrees`, `reason`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.continuation.problem import Array
+from suboctave.experiments.time_result import TimeResult
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.interruption import Interruption
+from suboctave.results.branch import Branch
+from suboctave.store.arrays import flat, padded
+from suboctave.store.columns import parameter_column
+from suboctave.version import __version__
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+__all__ = ["BranchVerification", "VerifiedBifurcation", "VerifiedPoint", "verification_dataset"]
+
+AGREES, DISAGREES, OPEN = "agrees", "disagrees", "cannot tell"
+
+#: columns of points and of bifurcations in a dataset, with their types
+POINT_COLUMNS: dict[str, Any] = {
+    "index": int, "omega": float, "amplitude": float, "distance": float, "multiplier_error": float, "outcome": str,
+    "reason": str,
+}  # fmt: skip
+EVENT_COLUMNS: dict[str, Any] = {
+    "kind": str, "omega": float, "amplitude": float, "true_omega": float, "distance": float, "agrees": bool,
+    "reason": str,
+}  # fmt: skip
+VERDICTS = ("stable", "computed")
+
+
+@dataclass(frozen=True, eq=False)
+class VerifiedPoint:
+    """One point of a branch against the true motion beside it.
+
+    Attributes
+    ----------
+    index, omega, amplitude
+        Which point of the branch, and where it lies.
+    distance
+        Largest difference of the states at the instants of shooting, relative to the motion, or of the frequencies if
+        larger; inf where no true motion was found.
+    multipliers, errors
+        (2n,): of the true motion over the response period, by falling modulus, and their estimated errors.
+    multiplier_error
+        Largest difference from those of the branch, paired, relative to those that are larger than one.
+    stable, computed
+        The verdict of the true motion, None without one, and that of the branch.
+    outcome, reason
+        "agrees", "disagrees" or "cannot tell", and why.
+    """
+
+    index: int
+    omega: float
+    amplitude: float
+    distance: float
+    multipliers: ComplexArray
+    errors: Array
+    multiplier_error: float
+    stable: bool | None
+    computed: bool | None
+    outcome: str
+    reason: str
+
+    @property
+    def margin(self) -> float:
+        """Largest modulus of the true multipliers minus one."""
+        return float(np.max(np.abs(self.multipliers))) - 1.0 if len(self.multipliers) else float("nan")
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it does, for certain."""
+        return self.outcome == AGREES
+
+    def __repr__(self) -> str:
+        return (
+            f"point {self.index} at omega = {self.omega:.8g}: {self.outcome}; distance {self.distance:.1e}, "
+            f"multipliers {self.multiplier_error:.1e}. {self.reason}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class VerifiedBifurcation:
+    """A bifurcation of a branch against shooting: its frequency in time, how far that is off, whether it is confirmed.
+
+    `distance` is along the curve of true motions and from it, relative to the motion.
+    """
+
+    kind: str
+    omega: float
+    parameters: Mapping[str, float]
+    amplitude: float
+    true_omega: float
+    distance: float
+    agrees: bool
+    reason: str
+
+    def __repr__(self) -> str:
+        verdict = "confirmed" if self.agrees else "NOT CONFIRMED"
+        return f"{self.kind} at omega = {self.omega:.9g}: {verdict}; distance {self.distance:.1e}. {self.reason}"
+
+
+@dataclass(frozen=True, eq=False)
+class BranchVerification(TimeResult):
+    """What shooting says of a branch.
+
+    Attributes
+    ----------
+    points, bifurcations
+        `VerifiedPoint` and `VerifiedBifurcation` of each that was looked at, in the order of the branch.
+    complete
+        False where an interruption left some out: `interruption`, Ctrl-C or a time limit.
+    """
+
+    branch: Branch
+    points: tuple[VerifiedPoint, ...]
+    bifurcations: tuple[VerifiedBifurcation, ...]
+    tolerance: float
+    complete: bool
+    interruption: Interruption | None = None
+
+    @property
+    def agrees(self) -> bool:
+        """Whether nothing was found to be wrong."""
+        return not self.disagreements and all(item.agrees for item in self.bifurcations)
+
+    @property
+    def disagreements(self) -> list[VerifiedPoint]:
+        """The points at which the time domain contradicts."""
+        return [point for point in self.points if point.outcome == DISAGREES]
+
+    @property
+    def undecided(self) -> list[VerifiedPoint]:
+        """The points of which nothing can be told, each with its reason."""
+        return [point for point in self.points if point.outcome == OPEN]
+
+    @property
+    def summary(self) -> str:
+        """What was found, in a sentence or two."""
+        bad, left = self.disagreements, self.undecided
+        known = [point.distance for point in self.points if np.isfinite(point.distance)]
+        text = f"{sum(point.agrees for point in self.points)} of {len(self.points)} points agree with shooting"
+        if known:
+            text += f" (largest distance {max(known):.1e})"
+        if bad:
+            text += f", {len(bad)} disagree{'s' * (len(bad) == 1)}, the first at omega = {bad[0].omega:.6g}"
+        if left:
+            text += f", of {len(left)} nothing can be told"
+        confirmed = sum(item.agrees for item in self.bifurcations)
+        if self.bifurcations:
+            text += f"; {confirmed} of {len(self.bifurcations)} bifurcations are confirmed"
+        return text + ("." if self.complete else f"; {self.interruption or Interruption()} before the end.")
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Points and bifurcations with their outcomes; the branch itself is `branch.to_xarray()`."""
+        return verification_dataset(self)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: distance, true multiplier that leads, errors, verdicts, outcome and reason."""
+        import pandas as pd
+
+        names = ("index", "omega", "amplitude", "distance", "multiplier_error", "stable", "computed", "outcome")
+        more = ("multiplier_real", "multiplier_imag", "margin", "reason")
+        rows = []
+        name = self.branch.name
+        free = {} if name == "omega" else {parameter_column(name, (*names, *more)): self.branch.parameter(name)}
+        for point in self.points:
+            leading = point.multipliers[0] if len(point.multipliers) else complex("nan")
+            row = {name: getattr(point, name) for name in names} | {n: v[point.index] for n, v in free.items()}
+            rows.append(row | {"multiplier_real": leading.real, "multiplier_imag": leading.imag, "margin": point.margin,
+                               "reason": point.reason})  # fmt: skip
+        columns = [*names[:2], *free, *names[2:], *more]
+        return pd.DataFrame(rows, columns=columns)
+
+    def bifurcations_frame(self) -> pandas.DataFrame:
+        """One row per bifurcation: kind, frequencies, distance, whether it is confirmed, why."""
+        import pandas as pd
+
+        names = ["kind", "omega", "amplitude", "true_omega", "distance", "agrees", "reason"]
+        return pd.DataFrame([{name: getattr(b, name) for name in names} for b in self.bifurcations], columns=names)
+
+    def plot(self, path: Any = None, **options: Any) -> Figure:
+        """The branch with a mark on each point that was looked at: a tick, a cross where shooting disagrees.
+
+        Options are those of `pictures.plot_verified`: `title`, `size`.
+        """
+        from suboctave.pictures.verified import plot_verified
+
+        name = self.branch.name
+        at = self.branch.parameter(name)
+        places = np.array([(at[p.index], p.amplitude) for p in self.points]).reshape(-1, 2)
+        wrong = [(b.parameters.get(name, b.omega), b.amplitude) for b in self.bifurcations if not b.agrees]
+        outcomes = [point.outcome for point in self.points]
+        return plot_verified(self.branch.to_xarray(), places, outcomes, np.array(wrong).reshape(-1, 2), path, **options)
+
+    def __repr__(self) -> str:
+        wrong = [*self.disagreements, *(b for b in self.bifurcations if not b.agrees)]
+        lines = [f"BranchVerification: {self.summary}", *(f"  {one!r}" for one in wrong[:8])]
+        if len(wrong) > 8:
+            lines.append(f"  and {len(wrong) - 8} more")
+        return "\n".join(lines)
+
+
+def verification_dataset(check: BranchVerification) -> xarray.Dataset:
+    """Points and bifurcations that were looked at, and what was found; see the top of this module."""
+    import xarray
+
+    points, events = check.points, check.bifurcations
+    variables: dict[str, Any] = {
+        name: ("point", np.array([getattr(p, name) for p in points], dtype=kind))
+        for name, kind in POINT_COLUMNS.items()
+    }
+    for name in VERDICTS:
+        verdicts = (getattr(p, name) for p in points)
+        variables[name] = (
+            "point",
+            np.array([-1 if verdict is None else int(verdict) for verdict in verdicts], dtype=int),
+        )
+    variables["multipliers"] = (("point", "multiplier"), padded([p.multipliers for p in points], complex))
+    variables["multiplier_errors"] = (("point", "error"), padded([p.errors for p in points], float))
+    variables |= {
+        f"event_{name}": ("event", np.array([getattr(e, name) for e in events], dtype=kind))
+        for name, kind in EVENT_COLUMNS.items()
+    }
+    attributes = {
+        "contents": "verification",
+        "free": check.branch.name,
+        "tolerance": check.tolerance,
+        "complete": int(check.complete),
+        "said": check.summary,
+        "system": check.branch.system.name,
+        "suboctave": __version__,
+    }
+    return xarray.Dataset(dict(flat(variables)), attrs=attributes)

@@ -1,0 +1,445 @@
+"""Isolas over a design parameter: their ends, their closed branches, and that nothing depends on where one stands.
+
+Numbers of the reference oscillator by shooting (tests/data), those of the tuned absorber by harmonic balance with 5, 7
+and 9 harmonics alike; a Duffing oscillator under a load `F0 (1 - q^2)` against its closed form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+
+import suboctave as so
+from suboctave import interruption
+from suboctave.curves.identity import lies_on, mirrored
+from suboctave.interruption import Interruption
+from suboctave.maps import catalogue
+from suboctave.maps.catalogue import Catalogue, SearchRange
+from suboctave.maps.isolas.loops import Loops
+from suboctave.maps.isolas.result import Isolas
+
+OMEGA = (1.3, 4.5)
+
+
+def reference(**values):
+    return so.library.reference_oscillator(regularization=3000.0, **values)
+
+
+@pytest.fixture(scope="module")
+def isolas():
+    return so.find_isolas(reference(j=0.0), OMEGA, "j", (0.0, 1.0))
+
+
+def test_the_isola_of_the_reference_oscillator(isolas):
+    (isola,) = isolas
+    assert (isola.nu, isolas.notes, isola.notes) == (2, (), ())
+    assert (isola.born.omega, float(isola.born)) == pytest.approx((2.355660, 0.579889), abs=2e-6)
+    assert (isola.merges.omega, float(isola.merges)) == pytest.approx((2.023364, 0.176829), abs=2e-6)
+    assert (isola.born.kind, isola.merges.kind) == ("isola_centre", "isola_merging")
+    assert isola.range == (isola.merges, isola.born)
+    # the cusp of the same curve is beside it, and is not its end
+    (curve,) = (c for c in isolas.limit_points if c.bifurcations["CP"])
+    (cusp,) = curve.bifurcations["CP"]
+    assert (cusp.omega, cusp.parameter("j")) == pytest.approx((2.022540, 0.176778), abs=2e-6)
+    assert "isola centre" in repr(isolas)
+
+
+@pytest.mark.parametrize(("gap", "folds"), [(0.3, (2.082514, 2.785675)), (0.5, (2.200149, 2.514902))])
+def test_its_limit_points_by_shooting(isolas, gap, folds):
+    branch = isolas[0].at(gap)
+    assert branch.closed
+    assert sorted(b.omega for b in branch.bifurcations["LP"]) == pytest.approx(folds, abs=2e-6)
+
+
+def test_closed_branches_between_its_ends(isolas):
+    (isola,) = isolas
+    span = isola.born - isola.merges
+    for gap in (0.2, 0.3, 0.4, 0.5, isola.merges + 1e-4 * span, isola.born - 1e-4 * span):
+        branch = isola.at(gap)
+        assert branch.closed
+        assert branch.nu == 2
+        assert branch.parameter("j") == pytest.approx(gap)
+        folds = [b.omega for b in branch.bifurcations["LP"]]
+        for low, high in isola.stable_ranges(gap):
+            assert min(folds) <= low < high <= max(folds)
+    with pytest.raises(so.InputError, match=r"from 0\.17682\d* to 0\.57988\d*"):
+        isola.at(0.6)
+    assert 0.3 in isola
+    assert 0.1 not in isola
+
+
+def test_stable_parts_by_shooting(isolas):
+    """At j = 0.2 period doublings interrupt the stable part; multipliers by shooting say the same."""
+    branch = isolas[0].at(0.2)
+    parts = isolas[0].stable_ranges(0.2)
+    assert len(parts) == 2
+    first, second = (b.omega for b in branch.bifurcations["PD"])
+    assert (parts[0][1], parts[1][0]) == pytest.approx(sorted((first, second)))
+    for index in range(3, len(branch), 17):
+        assert so.verify(branch.orbits[index]).agrees
+
+
+def test_the_answer_does_not_depend_on_how_one_looks(isolas):
+    (isola,) = so.find_isolas(reference(), (1.9, 4.2), "j", (0.0, 1.0), values=2)
+    assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.3, 0.5, 0.9])
+def test_the_answer_does_not_depend_on_where_one_stands(isolas, gap):
+    (isola,) = so.find_isolas(reference(j=gap), OMEGA[::-1], "j", (1.0, 0.0))
+    assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "born", "merges"),
+    [((0.0, 0.45), None, 0.176829), ((0.25, 1.0), 0.579889, None), ((0.3, 0.5), None, None)],
+)
+def test_bounds_that_cut_its_range(bounds, born, merges):
+    (isola,) = so.find_isolas(reference(), OMEGA, "j", bounds, values=3)
+    assert isola.range == pytest.approx((merges or bounds[0], born or bounds[1]), abs=2e-6)
+    for end, expected in ((isola.born, born), (isola.merges, merges)):
+        assert end is None if expected is None else end == pytest.approx(expected, abs=2e-6)
+    assert sum("cuts its range" in reason for reason in isola.reasons) == (born is None) + (merges is None)
+    assert isola.at(0.4).closed
+
+
+def test_the_tuned_absorber():
+    (isola,) = so.find_isolas(so.library.nltva(F=0.11), (0.7, 4.0), "F", (0.05, 0.25))
+    assert isola.nu == 1
+    assert (float(isola.born), isola.born.omega) == pytest.approx((0.12466, 1.80265), abs=1e-5)
+    assert (float(isola.merges), isola.merges.omega) == pytest.approx((0.18562, 1.44059), abs=1e-5)
+    assert isola.at(0.15).closed
+
+
+def test_the_exact_law():
+    (isola,) = so.find_isolas(so.library.reference_oscillator(), OMEGA, "j", (0.0, 1.0))
+    assert (isola.born.omega, float(isola.born)) == pytest.approx((2.353543, 0.581107), abs=2e-6)
+    assert isola.at(0.4).closed
+
+
+def test_a_system_without_any():
+    system = so.System(
+        mass=1.0,
+        damping=0.1,
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient=1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 0.3},
+    )
+    isolas = so.find_isolas(system, (0.6, 2.5), "F", (0.05, 0.5))
+    assert list(isolas) == []
+    assert "No isola of T" in repr(isolas)
+    assert isolas.limit_points
+    assert len(isolas.to_dataframe()) == 0
+
+
+@pytest.fixture(scope="module")
+def damped():
+    """An oscillator whose damping falls and rises again with its velocity: over the load it has an isola.
+
+    With one harmonic `F^2 = ((1 - w^2 + 3/4 k A^2) A)^2 + D(w A)^2`, `D(u) = a u - b u^3 + c u^5`.
+    """
+    return so.System(
+        mass=1.0,
+        damping=0.0,
+        stiffness=1.0,
+        elements=[so.Expression(0, "a*v - b*v**3*4/3 + c*v**5*8/5 + k*x**3")],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 0.02, "a": 0.1, "b": 0.12, "c": 0.04, "k": 0.05},
+    )
+
+
+def damped_ends():
+    """Where F over (w, A) is stationary: (w, F) of the saddle and of the minimum."""
+
+    def load(w, a):
+        u = w * a
+        return np.hypot((1.0 - w**2 + 0.0375 * a**2) * a, 0.1 * u - 0.12 * u**3 + 0.04 * u**5)
+
+    def slopes(at):
+        w, a = at
+        h = 1e-6
+        return [load(w + h, a) - load(w - h, a), load(w, a + h) - load(w, a - h)]
+
+    roots = [fsolve(slopes, start, xtol=1e-13) for start in ((1.0, 0.58), (1.03, 1.18))]
+    return [(w, load(w, a)) for w, a in roots]
+
+
+@pytest.mark.parametrize("bounds", [(0.005, 0.06), (0.02, 0.06), (0.005, 0.03), (0.02, 0.03)])
+def test_an_isola_of_nonlinear_damping(damped, bounds):
+    """Also where it meets no other branch within the bounds: stronger loads lead to it."""
+    (isola,) = so.find_isolas(damped, (0.3, 2.0), "F", bounds, harmonics=1)
+    (w_merges, merges), (w_born, born) = damped_ends()
+    assert isola.range == pytest.approx((max(born, bounds[0]), min(merges, bounds[1])), rel=1e-7)
+    for end, omega, value in ((isola.born, w_born, born), (isola.merges, w_merges, merges)):
+        if bounds[0] < value < bounds[1]:
+            assert (float(end), end.omega) == pytest.approx((value, omega), rel=1e-7)
+        else:
+            assert end is None
+
+
+def test_two_isolas_that_join():
+    """They are told apart, each closed branch belongs to one of them, and it says where they join."""
+    first, second = so.find_isolas(reference(p=1.7), (1.8, 4.5), "j", (0.3, 1.0))
+    assert (first.born, second.born) == pytest.approx((0.846206, 0.900471), abs=2e-6)
+    joined = max(first.range[0], second.range[0])
+    assert joined == pytest.approx(0.780048, abs=2e-6)
+    assert sum("as which it goes on" in reason for isola in (first, second) for reason in isola.reasons) == 1
+    at = {
+        value: [b.bifurcations["LP"] for b in (i.at(value) for i in (first, second) if value in i)]
+        for value in (0.7, 0.8)
+    }
+    assert [len(at[0.7]), len(at[0.8])] == [1, 2]
+
+
+def test_a_third_of_the_frequency_is_searched_for():
+    """The 1/3 sub-harmonic isola of a Duffing oscillator: no branch leads to it; born as the load grows."""
+    system = so.System(
+        mass=1.0,
+        damping=0.02,
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient=0.05)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 5.0},
+    )
+    (isola,) = so.find_isolas(system, (2.5, 9.0), "F", (0.1, 5.0), search=(3,), values=[5.0])
+    assert isola.nu == 3
+    assert isola.born is not None
+    assert (isola.range[0], isola.range[1]) == (isola.born, 5.0)
+    folds = sorted(b.omega for b in isola.at(5.0).bifurcations["LP"])
+    assert folds == pytest.approx([3.081375, 7.310848], abs=2e-6)
+
+
+def test_ends_can_be_tracked_again(isolas):
+    curve = so.track(isolas[0].born, "p", (0.5, 0.6))
+    assert set(curve.isola) == {"isola_centre"}
+    (isola,) = so.find_isolas(reference(p=0.6), OMEGA, "j", (0.3, 0.9), values=3)
+    end = int(np.argmax(curve.parameter("p")))
+    assert isola.born == pytest.approx(curve.parameter("j")[end], abs=2e-6)
+
+
+def test_a_budget_ends_it_politely():
+    isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), seconds=1e-6)
+    assert list(isolas) == []
+    assert isolas.interruption == Interruption(1e-6)
+    assert any("time limit of 1e-06 s" in note for note in isolas.notes)
+
+
+def test_a_closed_branch_that_was_interrupted_is_not_kept(isolas, monkeypatch):
+    (isola,) = isolas
+    value = 0.47
+    looks = iter(range(10**6))
+    with monkeypatch.context() as patched:
+        patched.setattr(interruption, "monotonic", lambda: float(next(looks)))
+        part = isola.at(value, seconds=60)
+    assert part.interruption == Interruption(60.0)
+    assert not part.closed
+    assert value not in isola.known
+    whole = isola.at(value)
+    assert whole.closed
+    assert len(whole) > len(part)
+    assert isola.at(value, seconds=1e-9) is whole  # what is known takes no time
+
+
+@pytest.mark.parametrize("share", [0.15, 0.4, 0.6, 0.7, 0.8, 0.97])
+def test_wherever_a_time_limit_falls_the_search_says_so(share, monkeypatch, looks_of_a_search):
+    looks = iter(range(10**9))
+    monkeypatch.setattr(interruption, "monotonic", lambda: float(next(looks)))
+    found = small_search(share * looks_of_a_search)
+    assert found.interruption == Interruption(share * looks_of_a_search)
+    assert any("the time limit of" in note for note in found.notes)
+    assert not any(branch.interrupted for isola in found for branch in isola.known.values())
+    assert not any(curve.interrupted for curve in (*found.limit_points, *found.doublings))
+
+
+def small_search(seconds=None):
+    spring = so.PolynomialSpring(0, {3: "k3"})
+    system = so.System(1.0, 0.05, 1.0, [spring], [so.HarmonicLoad(0, "F")], {"F": 1.0, "k3": 1.0})
+    return so.find_isolas(
+        system, (0.5, 3.0), "F", (0.2, 1.0), 3, values=2, depth=0, levels=(), search=(), seconds=seconds
+    )
+
+
+@pytest.fixture(scope="module")
+def looks_of_a_search():
+    """How often a search looks at the clock."""
+    count = 0
+
+    def clock():
+        nonlocal count
+        count += 1
+        return float(count)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(interruption, "monotonic", clock)
+        assert not small_search(1e9).interrupted
+    return count
+
+
+def test_ctrl_c_keeps_what_is_there():
+    def stop(share, where):
+        if "closed" in where:
+            raise KeyboardInterrupt
+
+    isolas = so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), values=2, progress=stop)
+    assert list(isolas) == []
+    assert isolas.limit_points
+    assert isolas.interruption == Interruption()
+    assert any("interrupted" in note for note in isolas.notes)
+
+
+# ------------------------------------------------------------------------------------------------- symmetric systems
+def hardening(**loads):
+    """A Duffing oscillator with damping 0.05, and further loads."""
+    return so.System(
+        mass=1.0,
+        damping=0.05,
+        stiffness=1.0,
+        elements=[so.CubicSpring(dof=0, coefficient=1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F"), *(so.StaticLoad(dof=0, force=f) for f in loads.values())],
+        parameters={"F": 1.0},
+    )
+
+
+def chain():
+    """Two masses on cubic springs."""
+    pattern = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    return so.System(
+        mass=np.eye(2),
+        damping=0.1 * pattern,
+        stiffness=pattern,
+        elements=[so.CubicSpring(dof=0, coefficient=1.0), so.CubicSpring(dof=(0, 1), coefficient=0.5)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 1.0},
+    )
+
+
+def between_stops():
+    """A mass between two equal stops."""
+    return so.System(
+        mass=1.0,
+        damping=0.1,
+        stiffness=1.0,
+        elements=[so.ElasticStop(dof=0, stiffness=5.0, gap=gap) for gap in (1.0, -1.0)],
+        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
+        parameters={"F": 1.0},
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "omega", "bounds", "harmonics"),
+    [
+        (hardening(), (0.5, 1.2), (0.5, 3.0), "adaptive"),
+        (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 10.0), 9),
+        (chain(), (0.4, 2.5), (0.5, 8.0), 5),
+        pytest.param(between_stops(), (0.4, 2.5), (0.5, 6.0), "adaptive", marks=pytest.mark.slow),
+        (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 30.0), "adaptive"),
+    ],
+)
+def test_a_loop_between_pitchforks_of_the_response_is_no_isola(system, omega, bounds, harmonics):
+    """It closes on itself, and every sweep that passes one of its branch points comes to it."""
+    isolas = so.find_isolas(system, omega, "F", bounds, harmonics, values=3, levels=(), search=())
+    assert list(isolas) == []
+    assert isolas.limit_points
+
+
+def test_a_static_load_makes_such_a_loop_an_isola():
+    """It takes the response over one half of the loop; the other one closes with what was the symmetric response.
+
+    There are two such loops, at the resonances at a half and at a quarter of the natural frequency. Mirror images of
+    the response lead to them: no response begins on them.
+    """
+    system = hardening(static=0.01)
+    isolas = so.find_isolas(system, (0.5, 1.2), "F", (0.5, 3.0), 9, values=[3.0], levels=(1.5,), search=())
+    assert [isola.born.kind for isola in isolas] == ["isola_centre"] * 2
+    sweeps = [so.frequency_response(system.with_parameters(F=2.5), ends, 9) for ends in ((0.4, 1.4), (1.4, 0.4))]
+    for isola in isolas:
+        loop = isola.at(2.5)
+        assert loop.closed
+        assert isola.stable_ranges(2.5)
+        for sweep in sweeps:
+            assert sweep.omega[-1] != sweep.omega[0]
+            assert sweep.bifurcations["BP"] == []
+            assert not any(lies_on(orbit, sweep.points) for orbit in loop.orbits[::5])
+
+
+def test_a_true_isola_of_unsymmetric_motions_stays():
+    """Period-2 motions of the symmetric oscillator, isolated from all others, come in pairs: they are listed once."""
+    system = so.library.duffing(c=0.1)
+    given = {"values": [5.0], "search": (2,), "levels": (), "depth": 0, "seeds": so.Seeds(8, 6, 1)}
+    (isola,) = so.find_isolas(system, (2.9, 4.0), "F", (4.0, 5.0), 5, **given)
+    assert isola.born.kind == "isola_centre"
+    loop = isola.at(4.8)
+    image = mirrored(loop.orbits[len(loop) // 2])
+    assert image is not None
+    assert not lies_on(image, loop.points)
+
+
+def test_what_hangs_on_an_isola_is_part_of_it():
+    """The symmetric 3T isola at F = 200 has four pitchforks; the loops between them turn back there, it does not."""
+    system = so.library.duffing(c=0.1).with_parameters(F=200.0)
+    start = so.find_subharmonics(system, (3.0, 9.0), 3, seeds=so.Seeds(16, 6, 1))[0].orbits[5]
+    isola = so.continue_branch(start, "omega", (1.0, 5.0))
+    assert isola.closed
+    assert len(isola.bifurcations["BP"]) == 4
+    loops = Loops(Catalogue(system, "F", (190.0, 210.0), SearchRange(1.0, 5.0), "adaptive", {}, 0))
+    assert loops.of(isola, 200.0).detached
+    for item in isola.bifurcations["BP"][::2]:
+        hanging = so.switch_branch(item)
+        assert hanging.closed
+        loop = loops.of(hanging, 200.0)
+        assert loop.detached
+        assert lies_on(isola.orbits[len(isola) // 2], loop.branch.points)
+    # were one of these branches reached from the response, all of them would be
+    loops.met[200.0] = [isola]
+    assert not loops.of(hanging, 200.0).detached
+
+
+def test_isolas_are_in_the_order_of_their_births():
+    """A birth at 0 is one."""
+
+    class Born:
+        def __init__(self, born, top):
+            self.born, self.range = born, (-1.0, top)
+
+    given = [Born(0.5, 0.5), Born(None, 0.1), Born(0.0, 3.0), Born(-0.5, 1.0)]
+    found = Isolas(given, hardening(), "F", (-1.0, 3.0), (0.5, 1.2))
+    assert [isola.born for isola in found] == [-0.5, 0.0, 0.5, None]
+
+
+def test_notes_of_searches_under_other_loads_are_kept(monkeypatch):
+    def fails(item, name, *rest, **options):
+        raise so.ConvergenceError(f"no curve over {name}")
+
+    monkeypatch.setattr(catalogue, "track", fails)
+    given = {"values": [0.05], "levels": (6.0,), "search": (), "depth": 0}
+    isolas = so.find_isolas(so.library.duffing(c=0.1, F=0.05), (0.6, 2.0), "F", (0.01, 0.051), 3, **given)
+    assert len(isolas.notes) == 2
+    for note in isolas.notes:
+        assert note.startswith("at F = 0.05, looking at 6 times the loads: the LP at omega = ")
+        assert note.endswith("could not be followed over load_level: no curve over load_level")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"parameter": "k"}, "parameter"),
+        ({"parameter": "omega"}, "omega varies anyway"),
+        ({"values": 1}, "at least 2"),
+        ({"values": [0.5, 1.5]}, "within the bounds"),
+        ({"search": (0,)}, "periods"),
+        ({"search": "2"}, "periods"),
+        ({"levels": (0.0,)}, "levels"),
+        ({"levels": (2.0, 1.0)}, "other ones than 1"),
+        ({"depth": -1}, "depth"),
+        ({"seconds": 0.0}, "seconds"),
+        ({"max_curves": True}, "max_curves"),
+        ({"seeds": 3}, "Seeds"),
+        ({"omega": (0.0, 1.0)}, "omega"),
+    ],
+)
+def test_wrong_input_is_refused(changes, said):
+    given = {"system": reference(), "omega": OMEGA, "parameter": "j", "bounds": (0.0, 1.0), **changes}
+    with pytest.raises(so.InputError, match=said):
+        so.find_isolas(**given)
