@@ -226,7 +226,8 @@ class RealCrossing(CurveTest):
         critical = sample.evaluation.critical
         assert critical is not None
         apart = abs(critical - target) > _RESONANT
-        return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL))
+        error = float(sample.evaluation.floquet.errors.max(initial=0.0))
+        return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL + error))
 
 
 @dataclass(frozen=True)
