@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from suboctave.interruption import Interruption
 from suboctave.model.system import System
-from suboctave.store.registry import save
+from suboctave.store.registry import Stored
 from suboctave.store.table import Table, write_csv
 from suboctave.version import __version__
 
@@ -20,15 +20,13 @@ if TYPE_CHECKING:
 __all__ = ["TimeResult"]
 
 
-class TimeResult(ABC):
+class TimeResult(Stored, ABC):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
     `interruption`: what stopped it before its end, Ctrl-C or a time limit (`seconds`); None if nothing did.
     """
 
     interruption: Interruption | None = None
-    #: how long it took; nan where nobody measured
-    seconds: float = float("nan")
 
     @abstractmethod
     def to_xarray(self) -> xarray.Dataset:
@@ -37,16 +35,6 @@ class TimeResult(ABC):
     @abstractmethod
     def to_dataframe(self) -> pandas.DataFrame:
         """The result as a table."""
-
-    def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """All of it as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
-
-        Raises
-        ------
-        InputError
-            If the file exists and `overwrite` is not given, or cannot be written there.
-        """
-        return save(self, path, overwrite)
 
     def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
         """The table as comma-separated text (.csv)."""

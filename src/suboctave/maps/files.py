@@ -1,9 +1,10 @@
-"""What the files of maps have in common: a head with the map's table and its record, curves' pieces by number."""
+"""What the files of maps have in common: a head with a record, branches and curves, pieces of curves by number."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from suboctave.harmonic.linear_part import LinearPart
     from suboctave.store.table import Table
 
-__all__ = ["CLASSES", "map_datasets", "map_record", "options_of", "piece_number"]
+__all__ = ["map_datasets", "opened", "options_of", "piece_number", "table_head"]
 
 CLASSES: dict[str, type] = {
     c.__name__: c for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, KoopmanHill, Monodromy, Interruption)
@@ -34,39 +35,73 @@ CLASSES: dict[str, type] = {
 
 
 def map_datasets(
-    system: System, table: Table, record: Mapping[str, Any], branches: Mapping[str, Branch], seconds: float
+    item: Any,
+    variables: Mapping[Any, Any],
+    attributes: Mapping[str, Any],
+    record: Mapping[str, Any],
+    parts: Mapping[str, Branch],
 ) -> dict[str, xarray.Dataset]:
-    """The head under the name "", with `table`, and `record` as JSON; `branches` under names that the head lists."""
+    """The head under the name "", `record` as JSON and the item's system with it; `parts` under names that it lists."""
     import xarray
 
-    described, arrays = written_system(system)
-    columns = {parameter_column(name, ("record",)): ("row", column) for name, column in table.columns.items()}
-    text = to_json({**record, "system": described})
-    own: dict[str, Any] = {"record": ((), np.array(text), {"long_name": "what else there is of the map, as JSON"})}
+    described, arrays = written_system(item.system)
+    text = to_json({**record, "notes": item.notes, "interruption": item.interruption, "system": described})
+    own: dict[str, Any] = {"record": ((), np.array(text), {"long_name": "what else there is, as JSON"})}
     own |= {name: (tuple(f"{name}_{i}" for i in range(array.ndim)), array) for name, array in arrays.items()}
-    attributes: dict[str, Any] = {"title": table.title, "system": system.name, "parts": "\n".join(branches)}
-    if seconds == seconds:
-        attributes["seconds"] = float(seconds)
-    head = xarray.Dataset(dict(flat({**columns, **own})), attrs=attributes)
-    return {"": head} | {name: branch_to_dataset(branch) for name, branch in branches.items()}
+    head = xarray.Dataset(dict(flat({**variables, **own})), attrs={**attributes, "parts": "\n".join(parts)})
+    if item.seconds == item.seconds:
+        head.attrs["seconds"] = float(item.seconds)
+    return {"": head} | {name: branch_to_dataset(part) for name, part in parts.items()}
 
 
-def map_record(
-    groups: Mapping[str, xarray.Dataset], classes: Mapping[str, type], allow_code: bool, linear: LinearPart | None
-) -> tuple[dict[str, Any], System, dict[str, Any], float]:
-    """The record, the system, the branches by name, and the seconds of the datasets that `map_datasets` laid out.
+def table_head(item: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and attributes of a head that holds the table of a map."""
+    table: Table = item.to_table()
+    columns = {parameter_column(name, ("record",)): ("row", column) for name, column in table.columns.items()}
+    return columns, {"title": table.title, "system": item.system.name}
 
-    Raises InputError where some are missing.
+
+class Opened(NamedTuple):
+    """What `map_datasets` laid out: the head, the record, the system, the parts by name, and the seconds."""
+
+    head: xarray.Dataset
+    record: dict[str, Any]
+    system: System
+    parts: dict[str, Any]
+    seconds: float
+
+    def named(self, beginning: str) -> list[Any]:
+        """The parts whose names begin in one way, in order."""
+        return [part for name, part in self.parts.items() if name.startswith(beginning)]
+
+
+@contextmanager
+def opened(
+    groups: Mapping[str, xarray.Dataset],
+    words: str,
+    allow_code: bool,
+    linear: LinearPart | None,
+    classes: Mapping[str, type] | None = None,
+) -> Iterator[Opened]:
+    """Read what `map_datasets` laid out; InputError where that fails, here or within: "this is no" or "these are no"
+    `words`, or parts are missing.
     """
-    head = groups[""]
-    names = str(head.attrs["parts"]).splitlines()
-    missing = [name for name in names if name not in groups]
-    if missing:
-        raise InputError(f"{missing[0]} of the map is missing")
-    record = from_json(str(head["record"].item()), {**CLASSES, **classes})
-    branches = {name: branch_from_dataset(groups[name], allow_code, linear) for name in names}
-    system = build(record["system"], system_arrays(head), allow_code)
-    return record, system, branches, float(head.attrs.get("seconds", np.nan))
+    plural = words.endswith("s")
+    try:
+        head = groups[""]
+        names = str(head.attrs["parts"]).splitlines()
+        missing = [name for name in names if name not in groups]
+        if missing:
+            raise InputError(f"{missing[0]} of the {words if plural else 'map'} is missing")
+        record = from_json(str(head["record"].item()), {**CLASSES, **(classes or {})})
+        parts = {name: branch_from_dataset(groups[name], allow_code, linear) for name in names}
+        system = build(record["system"], system_arrays(head), allow_code)
+        yield Opened(head, record, system, parts, float(head.attrs.get("seconds", np.nan)))
+    except InputError:  # which is a ValueError
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, StopIteration) as error:
+        no = "these are no" if plural else "this is no"
+        raise InputError(f"{no} {words} of suboctave: {type(error).__name__}: {error}") from None
 
 
 def piece_number(piece: MonotonePiece, pieces: Sequence[MonotonePiece]) -> int:

@@ -10,7 +10,16 @@ import numpy as np
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.errors import InputError, is_number, shortened
 
-__all__ = ["COARSE", "MOST_VALUES", "check_count", "check_seeds", "checked_orders", "checked_values"]
+__all__ = [
+    "COARSE",
+    "MOST_VALUES",
+    "check_count",
+    "check_seeds",
+    "checked_orders",
+    "checked_values",
+    "is_count",
+    "listed",
+]
 
 #: values of a parameter at which whole responses are followed
 MOST_VALUES = 10_000
@@ -18,11 +27,21 @@ MOST_VALUES = 10_000
 COARSE = Seeds(8, 4, 3)
 
 
+def is_count(number: Any, least: int) -> bool:
+    """Whether something is a whole number that is not too small."""
+    return isinstance(number, int) and not isinstance(number, bool) and number >= least
+
+
 def check_count(name: str, number: Any, least: int) -> int:
     """A whole number that is not too small."""
-    if isinstance(number, bool) or not isinstance(number, int) or number < least:
+    if not is_count(number, least):
         raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
-    return number
+    return int(number)
+
+
+def listed(values: Any) -> list[Any]:
+    """The items of a sequence or an array; a single None for anything else."""
+    return list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [None]
 
 
 def check_seeds(seeds: Any) -> Seeds | None:
@@ -34,10 +53,10 @@ def check_seeds(seeds: Any) -> Seeds | None:
 
 def checked_orders(search: Any, least: int) -> tuple[int, ...]:
     """Periods, in periods of the load, of a search among resonances."""
-    given = tuple(search) if isinstance(search, Sequence) and not isinstance(search, str) else (None,)
-    if not all(isinstance(order, int) and not isinstance(order, bool) and order >= least for order in given):
+    given = listed(search)
+    if not all(is_count(order, least) for order in given):
         raise InputError(f"search must be periods in periods of the load, {least} or more, as (2, 3), not {search!r}")
-    return given
+    return tuple(given)
 
 
 def checked_values(values: Any, bounds: tuple[float, float]) -> list[float]:
@@ -50,7 +69,7 @@ def checked_values(values: Any, bounds: tuple[float, float]) -> list[float]:
                 f"{shortened(values)}"
             )
         return [float(v) for v in np.linspace(low, high, values)]
-    given = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
+    given = listed(values)
     if not given or not all(is_number(v) and low <= v <= high for v in given):
         raise InputError(f"values must be how many, or numbers within the bounds ({low:g}, {high:g}), not {values!r}")
     return sorted({float(v) for v in given})

@@ -108,6 +108,10 @@ class MonotonePiece:
         """Whether it reaches a value of `along`."""
         return self.low <= value <= self.high
 
+    def leads_to(self, other: MonotonePiece) -> bool:
+        """Whether it ends in the event at which another piece begins."""
+        return self.ends[1] is not None and self.ends[1] is other.ends[0]
+
     # ------------------------------------------------------------------------------------------------- interpolation
     def across(self, values: Array | float) -> Array:
         """Where it lies at values of `along`; nan outside its range."""

@@ -22,7 +22,7 @@ from suboctave.interruption import Interruption
 from suboctave.model.system import System
 from suboctave.results.readings.readings import BranchReadings, columns, with_readings
 from suboctave.store.columns import parameter_column
-from suboctave.store.registry import save
+from suboctave.store.registry import Stored
 from suboctave.store.table import write_csv
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from suboctave.results.readings.sweep import SweepPath
 
 
-class Branch(BranchReadings):
+class Branch(Stored, BranchReadings):
     """A curve of periodic motions along one free parameter.
 
     Attributes
@@ -89,7 +89,6 @@ class Branch(BranchReadings):
         self.audit = audit or Audit()
         self.departs = departs
         self.arrives = arrives
-        self.seconds = float("nan")
 
     def __len__(self) -> int:
         return len(self.points)
@@ -248,16 +247,6 @@ class Branch(BranchReadings):
             "residual": [p.orbit.residual for p in self.points],
             **columns(self, readings),
         }
-
-    def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """All of the branch as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
-
-        Raises
-        ------
-        InputError
-            If the file exists and `overwrite` is not given, or cannot be written there.
-        """
-        return save(self, path, overwrite)
 
     def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
         """The points, or the "bifurcations", as comma-separated text (.csv)."""

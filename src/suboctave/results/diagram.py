@@ -18,7 +18,7 @@ from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch
 from suboctave.results.readings.readings import shared
 from suboctave.store.columns import led_by
-from suboctave.store.registry import save
+from suboctave.store.registry import Stored
 from suboctave.store.table import write_csv
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class DiagramBranch:
         return f"<branch {self.number}: {self.label}, {len(self.branch)} points, {count} branches leave it>"
 
 
-class BifurcationDiagram:
+class BifurcationDiagram(Stored):
     """A response and the branches that bifurcate from it, as a tree; print it to see all of it.
 
     `diagram[2]` is the place of branch 2 in the tree, `diagram["4T"]` that of the one branch whose label begins so;
@@ -125,7 +125,6 @@ class BifurcationDiagram:
         self.root = root
         self.stopped = stopped
         self.interruption = interruption
-        self.seconds = float("nan")
         for number, node in enumerate(root):
             node.number = number
 
@@ -235,16 +234,6 @@ class BifurcationDiagram:
             f"{node.number}: {node.label}": node.branch.to_xarray(names)
             for node, names in zip(nodes, chosen, strict=True)
         }
-
-    def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """All of it as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
-
-        Raises
-        ------
-        InputError
-            If the file exists and `overwrite` is not given, or cannot be written there.
-        """
-        return save(self, path, overwrite)
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """Draw all branches, periods in their own colours; options are those of `suboctave.plot`."""

@@ -23,7 +23,7 @@ from suboctave.version import __version__
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Codec", "Datasets", "contents", "from_datasets", "provenance", "register", "save", "to_datasets"]
+__all__ = ["Codec", "Datasets", "Stored", "contents", "from_datasets", "provenance", "register", "to_datasets"]
 
 Datasets = Mapping[str, "xarray.Dataset"]
 
@@ -88,11 +88,23 @@ def from_datasets(
     return codec.read(groups, allow_code, linear), details
 
 
-def save(item: Any, path: str | Path, overwrite: bool = False) -> Path:
-    """A result as a NetCDF file (.nc) of its own."""
-    target = files.free_place(path, overwrite, (".nc",))
-    files.write(target, to_datasets(item), provenance())
-    return target
+class Stored:
+    """A result that has a codec."""
+
+    #: how long it took; nan where nobody measured
+    seconds: float = float("nan")
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """All of it as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).
+
+        Raises
+        ------
+        InputError
+            If the file exists and `overwrite` is not given, or cannot be written there.
+        """
+        target = files.free_place(path, overwrite, (".nc",))
+        files.write(target, to_datasets(self), provenance())
+        return target
 
 
 def provenance() -> dict[str, str]:

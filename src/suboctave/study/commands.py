@@ -13,9 +13,8 @@ import numpy as np
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.time_result import TimeResult
 from suboctave.interruption import Interruption
-from suboctave.maps.isolas.isola import Isola, isola_row
 from suboctave.maps.isolas.region import IsolaMap
-from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.isolas.result import Isola, Isolas, isola_row
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.progress import bar
 from suboctave.results.diagram import BifurcationDiagram

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from suboctave.bifurcation.tracked import TrackedEvent
-from suboctave.maps.isolas.isola import IsolaEnd
 from suboctave.maps.isolas.loops import Loop, Loops
+from suboctave.maps.isolas.result import IsolaEnd
 from suboctave.maps.pieces import MonotonePiece
 
 __all__ = ["Existence", "extend"]

@@ -8,7 +8,7 @@ the curve and the number along it, their ends, by the curve and the index of the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,19 +17,13 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
-from suboctave.maps.files import CLASSES, map_datasets, map_record, options_of, piece_number
-from suboctave.maps.isolas.isola import Isola, IsolaEnd
-from suboctave.maps.isolas.region import IsolaMap, IsolaRegion, Probe
-from suboctave.maps.isolas.result import Isolas, head_dataset
-from suboctave.maps.isolas.sheets import Span
+from suboctave.maps.files import Opened, map_datasets, opened, options_of, piece_number, table_head
+from suboctave.maps.isolas.region import IsolaMap, IsolaRegion, Probe, Span
+from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas, head_dataset
 from suboctave.maps.pieces import MonotonePiece, pieces_of
-from suboctave.model.system import System, build
-from suboctave.results.files.branch import branch_from_dataset, branch_to_dataset
+from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch
-from suboctave.store.arrays import flat
-from suboctave.store.plain import from_json, to_json
 from suboctave.store.registry import Codec, register
-from suboctave.store.systems import system_arrays, written_system
 
 if TYPE_CHECKING:
     import xarray
@@ -50,27 +44,14 @@ def isolas_to_datasets(isolas: Isolas) -> dict[str, xarray.Dataset]:
     names = {id(curve): name for name, curve in parts.items()}
     closed = [branch for isola in isolas for branch in isola.known.values()]
     parts |= {f"closed_{i}": branch for i, branch in enumerate(closed)}
-    system, arrays = written_system(isolas.system)
     record = {
-        "system": system,
         "listed": len(isolas.limit_points),
         "bounds": tuple(isolas.bounds),
         "omega": tuple(isolas.omega),
-        "notes": isolas.notes,
-        "interruption": isolas.interruption,
         "isolas": [_written(isola, names, curves) for isola in isolas],
     }
     head = head_dataset(isolas)
-    variables = {str(name): (v.dims, v.values, v.attrs) for name, v in head.variables.items()}
-    variables["record"] = ((), np.array(to_json(record)), {"long_name": "ends, curves and options, as JSON"})
-    for name, array in arrays.items():
-        variables[name] = (tuple(f"{name}_{axis}" for axis in range(array.ndim)), array, {})
-    import xarray
-
-    stored = xarray.Dataset(dict(flat(variables)), attrs={**head.attrs, "parts": "\n".join(parts)})
-    if isolas.seconds == isolas.seconds:
-        stored.attrs["seconds"] = float(isolas.seconds)
-    return {"": stored} | {name: branch_to_dataset(part) for name, part in parts.items()}
+    return map_datasets(isolas, {k: (v.dims, v.values, v.attrs) for k, v in head.items()}, head.attrs, record, parts)
 
 
 def _written(isola: Isola, names: Mapping[int, str], curves: Sequence[TrackedBranch]) -> dict[str, Any]:
@@ -104,38 +85,22 @@ def isolas_from_datasets(
 
     Raises InputError where the datasets are not those of isolas, or some are missing.
     """
-    head = groups[""]
-    try:
-        names = str(head.attrs["parts"]).splitlines()
-        missing = [name for name in names if name not in groups]
-        if missing:
-            raise InputError(f"{missing[0]} of the isolas is missing")
-        parts: dict[str, Any] = {name: branch_from_dataset(groups[name], allow_code, linear) for name in names}
-        record = from_json(str(head["record"].item()), CLASSES)
-        system = build(record["system"], system_arrays(head), allow_code)
-        parameter = str(head.attrs["isolas"])
-        closed = (branch for name, branch in parts.items() if name.startswith("closed_"))
-        isola_items = []
-        for given in record["isolas"]:
-            known = [(float(value), next(closed)) for value in given["known"]]
-            isola_items.append(_isola(given, parts, system, parameter, record["omega"], known))
+    with opened(groups, "isolas", allow_code, linear) as stored:
+        record, parameter = stored.record, str(stored.head.attrs["isolas"])
+        closed = iter(stored.named("closed_"))
         isolas = Isolas(
-            isola_items,
-            system,
+            [_isola(given, stored, parameter, closed) for given in record["isolas"]],
+            stored.system,
             parameter,
             record["bounds"],
             record["omega"],
-            [parts[name] for name in names if name.startswith("limit_points_")][: record["listed"]],
-            [parts[name] for name in names if name.startswith("doublings_")],
+            stored.named("limit_points_")[: record["listed"]],
+            stored.named("doublings_"),
             record["notes"],
-            str(head.attrs["said"]),
+            str(stored.head.attrs["said"]),
             record["interruption"] if "interruption" in record else _interruption_of(record["notes"]),
         )
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, StopIteration) as error:
-        raise InputError(f"these are no isolas of suboctave: {type(error).__name__}: {error}") from None
-    isolas.seconds = float(head.attrs.get("seconds", np.nan))
+        isolas.seconds = stored.seconds
     return isolas
 
 
@@ -144,37 +109,29 @@ def _interruption_of(notes: Sequence[str]) -> Interruption | None:
     return Interruption() if any(note.startswith("interrupted") for note in notes) else None
 
 
-def _isola(
-    given: Mapping[str, Any],
-    parts: Mapping[str, Any],
-    system: System,
-    parameter: str,
-    omega: tuple[float, float],
-    known: Sequence[tuple[float, Any]],
-) -> Isola:
-    ends: list[IsolaEnd | None] = []
-    for stored in given["ends"]:
-        if stored is None:
-            ends.append(None)
-            continue
-        kind, curve, place = stored
-        event = parts[curve].bifurcations.met[place]
-        if not isinstance(event, TrackedEvent):
-            raise InputError(f"an end of an isola is a {event.kind} that lies on no curve")
-        ends.append(IsolaEnd.of(event, parameter, kind == "isola_centre"))
-    pieces = [pieces_of(parts[curve], parameter)[number] for curve, number in given["legs"]]
+def _isola(given: Mapping[str, Any], stored: Opened, parameter: str, closed: Iterator[Branch]) -> Isola:
+    """One isola; the next of the closed branches are its own."""
+    low, high = (None if end is None else _read_end(end, stored, parameter) for end in given["ends"])
     return Isola(
-        system,
+        stored.system,
         parameter,
-        omega,
-        (ends[0], ends[1]),
+        stored.record["omega"],
+        (low, high),
         given["range"],
         given["reasons"],
-        pieces,
+        tuple(pieces_of(stored.parts[curve], parameter)[number] for curve, number in given["legs"]),
         given["options"],
-        given["notes"],
-        known,
+        tuple(given["notes"]),
+        {float(value): next(closed) for value in given["known"]},
     )
+
+
+def _read_end(given: Sequence[Any], stored: Opened, parameter: str) -> IsolaEnd:
+    kind, curve, place = given
+    event = stored.parts[curve].bifurcations.met[place]
+    if not isinstance(event, TrackedEvent):
+        raise InputError(f"an end of an isola is a {event.kind} that lies on no curve")
+    return IsolaEnd.of(event, parameter, kind == "isola_centre")
 
 
 # ------------------------------------------------------------------------------------------------------------ the map
@@ -195,8 +152,6 @@ def isola_map_to_datasets(isola_map: IsolaMap) -> dict[str, xarray.Dataset]:
         "second": isola_map.second,
         "within": isola_map.within,
         "bounds": tuple(isola_map.bounds),
-        "notes": isola_map.notes,
-        "interruption": isola_map.interruption,
         "regions": [
             {
                 "isola": list(isolas).index(region.isola),
@@ -213,16 +168,15 @@ def isola_map_to_datasets(isola_map: IsolaMap) -> dict[str, xarray.Dataset]:
     }
     parts = {f"{_ISOLAS}/{name}" if name else _ISOLAS: part for name, part in isolas_to_datasets(isolas).items()}
     named = {f"curve_{i}": curve for i, curve in enumerate(curves)}
-    return map_datasets(isola_map.system, isola_map.to_table(), record, named, isola_map.seconds) | parts
+    return map_datasets(isola_map, *table_head(isola_map), record, named) | parts
 
 
 def isola_map_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> IsolaMap:
     """The map that `isola_map_to_datasets` wrote; InputError where the datasets are not those of one."""
-    try:
-        record, system, branches, seconds = map_record(groups, {"Probe": Probe}, allow_code, linear)
-        curves: list[Any] = list(branches.values())
+    with opened(groups, "map of isolas", allow_code, linear, {"Probe": Probe}) as stored:
+        record, curves = stored.record, list(stored.parts.values())
         own = {name[len(_ISOLAS) + 1 :]: part for name, part in groups.items() if name.split("/")[0] == _ISOLAS}
         isolas = isolas_from_datasets(own, allow_code, linear)
         parameter, second = record["parameter"], record["second"]
@@ -234,12 +188,8 @@ def isola_map_from_datasets(
             beside = tuple(curves[i] for i in given["curves"])
             regions.append(IsolaRegion(isolas[given["isola"]], second, span, beside, tuple(given["probes"])))
         bounds, notes, interruption = record["bounds"], record["notes"], record["interruption"]
-        loaded = IsolaMap(regions, system, parameter, second, record["within"], bounds, notes, interruption)
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is no map of isolas of suboctave: {type(error).__name__}: {error}") from None
-    loaded.seconds = seconds
+        loaded = IsolaMap(regions, stored.system, parameter, second, record["within"], bounds, notes, interruption)
+        loaded.seconds = stored.seconds
     return loaded
 
 

@@ -21,10 +21,9 @@ from suboctave.curves.points import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.interruption import Interruption, pass_on
 from suboctave.maps.catalogue import SearchRange, branch_through, carrier_of
-from suboctave.maps.isolas.isola import Isola, IsolaEnd
-from suboctave.maps.isolas.region import IsolaMap, IsolaRegion, Probe
-from suboctave.maps.isolas.result import Isolas
-from suboctave.maps.isolas.sheets import spans_of
+from suboctave.maps.inputs import is_count, listed
+from suboctave.maps.isolas.region import IsolaMap, IsolaRegion, Probe, spans_of
+from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter
 from suboctave.model.timed import timed
@@ -132,10 +131,7 @@ def _checked(isolas: Any) -> list[Isola]:
 
 
 def _check_probes(probes: Any, low: float, high: float) -> None:
-    if isinstance(probes, int) and not isinstance(probes, bool) and probes >= 0:
-        return
-    given: list[Any] = list(probes) if isinstance(probes, Iterable) and not isinstance(probes, str) else [None]
-    if not all(is_number(value) and low <= value <= high for value in given):
+    if not is_count(probes, 0) and not all(is_number(value) and low <= value <= high for value in listed(probes)):
         raise InputError(f"probes must be how many, or numbers within the bounds ({low:g}, {high:g}), not {probes!r}")
 
 

@@ -17,8 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Unpack
 
-import numpy as np
-
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.curves.discretisation import Harmonics
@@ -26,9 +24,8 @@ from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, is_number
 from suboctave.interruption import Interruption
 from suboctave.maps.catalogue import Catalogue
-from suboctave.maps.inputs import COARSE, check_count, check_seeds, checked_orders, checked_values
-from suboctave.maps.isolas.isola import Isola
-from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.inputs import COARSE, check_count, check_seeds, checked_orders, checked_values, listed
+from suboctave.maps.isolas.result import Isola, Isolas
 from suboctave.maps.isolas.search import Search
 from suboctave.maps.isolas.strategies import FromLoadLevels, FromResonances, FromResponses, Strategy
 from suboctave.model.system import System
@@ -137,7 +134,7 @@ def _resonances(orders: tuple[int, ...] | None, seeds: Seeds | None) -> FromReso
 def _checked_levels(levels: Any) -> tuple[float, ...] | None:
     if levels is None:
         return None
-    given = tuple(levels) if isinstance(levels, Sequence | np.ndarray) and not isinstance(levels, str) else (None,)
+    given = listed(levels)
     if not all(is_number(level) and level > 0.0 for level in given):
         raise InputError(f"levels must be positive numbers, those of the loads in units of their own, not {levels!r}")
     if any(level == 1.0 for level in given):
@@ -159,10 +156,10 @@ def _result(search: Search) -> Isolas:
             one.ends,
             (one.low, one.high),
             one.reasons,
-            one.pieces,
+            tuple(one.pieces),
             catalogue.options,
-            one.notes,
-            [(loop.value, loop.branch) for loop in one.loops],
+            tuple(one.notes),
+            {loop.value: loop.branch for loop in one.loops},
         )
         for one in search.isolas
     ]

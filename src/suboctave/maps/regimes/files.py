@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.maps.catalogue import Catalogue, SearchRange
-from suboctave.maps.files import map_datasets, map_record, options_of, piece_number
+from suboctave.maps.files import map_datasets, opened, options_of, piece_number, table_head
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.maps.regimes.arcs import Arc, Edge
 from suboctave.maps.regimes.map import RegimeMap
@@ -51,8 +50,6 @@ def regime_map_to_datasets(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
         "options": options_of(regimes.options),
         "depth": regimes.depth,
         "resolution": regimes.resolution,
-        "notes": regimes.notes,
-        "interruption": regimes.interruption,
         "slices": [
             {"value": each.value, "arcs": [_written(arc, places, pieces) for arc in each.arcs]} for each in slices
         ],
@@ -60,7 +57,7 @@ def regime_map_to_datasets(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
             (s.low, s.high, None if s.slice is None else slices.index(s.slice), s.examined) for s in regimes.strips
         ],
     }
-    return map_datasets(regimes.system, regimes.to_table(), record, branches, regimes.seconds)
+    return map_datasets(regimes, *table_head(regimes), record, branches)
 
 
 def _pieces(curves: Sequence[TrackedBranch], parameter: str) -> list[MonotonePiece]:
@@ -85,36 +82,24 @@ def regime_map_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> RegimeMap:
     """The map that `regime_map_to_datasets` wrote; InputError where the datasets are not those of one."""
-    try:
-        record, system, branches, seconds = map_record(groups, {}, allow_code, linear)
-        curves: list[Any] = [branch for name, branch in branches.items() if name.startswith("curve_")]
+    with opened(groups, "regime map", allow_code, linear) as stored:
+        record, branches, curves = stored.record, stored.parts, stored.named("curve_")
         pieces = _pieces(curves, record["parameter"])
         catalogue = Catalogue(
-            system, record["parameter"], record["bounds"], SearchRange(*record["omega"]), "adaptive", record["options"],
-            len(curves), curves, pieces, list(record["notes"]), interruption=record["interruption"],
+            stored.system, record["parameter"], record["bounds"], SearchRange(*record["omega"]), "adaptive",
+            record["options"], len(curves), curves, pieces, list(record["notes"]), interruption=record["interruption"],
         )  # fmt: skip
-        slices = [
-            Slice(
-                given["value"],
-                catalogue,
-                2 ** record["depth"],
-                branches=[
-                    (branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name
-                ],
-                arcs=[_arc(arc, branches, pieces) for arc in given["arcs"]],
-            )
-            for given in record["slices"]
-        ]
+        slices = []
+        for given in record["slices"]:
+            met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]
+            arcs = [_arc(arc, branches, pieces) for arc in given["arcs"]]
+            slices.append(Slice(given["value"], catalogue, 2 ** record["depth"], branches=met, arcs=arcs))
         strips = [
             Strip(low, high, None if number is None else slices[number], examined)
             for low, high, number, examined in record["strips"]
         ]
         regimes = RegimeMap(catalogue, strips, record["depth"], record["resolution"])
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is no regime map of suboctave: {type(error).__name__}: {error}") from None
-    regimes.seconds = seconds
+        regimes.seconds = stored.seconds
     return regimes
 
 

@@ -16,7 +16,7 @@ from suboctave.interruption import limited
 from suboctave.maps.regimes.check import RegimeCheck, check_regimes
 from suboctave.maps.regimes.strips import LabelledPlane, Regime, Strip, regime_of
 from suboctave.store.columns import parameter_column
-from suboctave.store.registry import save
+from suboctave.store.registry import Stored
 from suboctave.store.table import Table
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Region:
     values: tuple[float, float]
 
 
-class RegimeMap(LabelledPlane):
+class RegimeMap(LabelledPlane, Stored):
     """Which stable motions exist over omega and a design parameter.
 
     Attributes
@@ -165,16 +165,6 @@ class RegimeMap(LabelledPlane):
     def to_dataframe(self) -> pandas.DataFrame:
         """`to_table` as a table of pandas."""
         return self.to_table().to_dataframe()
-
-    def save(self, path: str | Path, overwrite: bool = False) -> Path:
-        """All of it as a NetCDF file (.nc), from which `load` gives it back (layout: docs/results.md).
-
-        Raises
-        ------
-        InputError
-            If the file exists and `overwrite` is not given, or cannot be written there.
-        """
-        return save(self, path, overwrite)
 
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
         """The plane coloured by regime, with the borders; options are those of `pictures.regimes.plot_regimes`."""

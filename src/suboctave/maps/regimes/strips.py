@@ -74,23 +74,7 @@ class Strip:
 
 
 class LabelledPlane:
-    """Stable arcs over omega and a design parameter, strip by strip: what `RegimeMap` says of a point.
-
-    Attributes
-    ----------
-    system, parameter, omega, bounds
-        What vibrates, the design parameter, both ranges (ascending).
-    depth
-        How many period doublings deep branches were followed.
-    curves
-        The curves of bifurcations that the labels rest on.
-    strips
-        The stretches of the parameter within which the order of the regimes is the same.
-    notes
-        What could not be settled; empty if nothing was left open.
-    interruption
-        What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
-    """
+    """What `RegimeMap` says of a point: stable arcs over omega and a design parameter, strip by strip."""
 
     def __init__(self, catalogue: Catalogue, strips: Sequence[Strip], depth: int, resolution: float) -> None:
         self.system = catalogue.system
@@ -104,7 +88,6 @@ class LabelledPlane:
         self.resolution = resolution
         self.notes = tuple(catalogue.notes)
         self.interruption = catalogue.interruption
-        self.seconds = float("nan")
 
     def strip(self, value: float) -> Strip:
         """The strip that a value of the parameter lies in; InputError outside the bounds."""

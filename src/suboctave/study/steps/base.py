@@ -16,8 +16,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 from suboctave.analysis.diagram import Keeper
 from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
-from suboctave.maps.isolas.isola import Isola
-from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.isolas.result import Isola, Isolas
 from suboctave.model.system import System
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
