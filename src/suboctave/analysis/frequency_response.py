@@ -6,19 +6,16 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.making import make_branch
-from suboctave.analysis.options import CurveOptions, options_of, settings_of
+from suboctave.analysis.options import CurveOptions, settings_of
+from suboctave.analysis.run import CurveRun
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.analysis.switching import leave_along
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions, SteppingOptions
-from suboctave.continuation.linear import one_thread
-from suboctave.curves.discretisation import Harmonics, make_curve, own_linear_part
-from suboctave.curves.follow import follow
+from suboctave.curves.discretisation import Harmonics, harmonics_of, own_linear_part
 from suboctave.curves.points import BranchPoint
-from suboctave.curves.starts import linear_response, start_point
+from suboctave.curves.starts import start_point
 from suboctave.curves.trace import Trace
-from suboctave.curves.ways import both_ways
 from suboctave.errors import InputError, is_number
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -27,7 +24,6 @@ from suboctave.model.inputs import check_bounds, check_parameter, check_range, c
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import RunOptions, with_options
-from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 
 
@@ -76,24 +72,21 @@ def frequency_response(
     """
     first, last = check_range("omega", omega, positive=True)
     check_system(system, (first, last))
-    settings = settings_of(system, options)
+    run = CurveRun(system, "omega", (first, last), harmonics, settings_of(system, options))
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
     nu = _period(start, subharmonic)
-    curve = make_curve(system, "omega", first, abs(last - first), harmonics, nu, linear)
-    with one_thread(), reporting(options.get("progress"), "frequency response") as report:
-        settings = settings.reporting_to(report, (first, last))
-        if report is not None:
-            # in a fresh installation the start waits for kernels to be compiled
-            report(0.0, f"omega = {first:.6g}")
+    curve = run.curve(first, nu, linear)
+    with run.reporting(options.get("progress"), "frequency response") as run:
+        # in a fresh installation the start waits for kernels to be compiled
+        run.report(0.0, f"omega = {first:.6g}")
         if start is None and nu > 1:
-            trace = subharmonic_start(curve, (first, last), settings)
+            trace = subharmonic_start(curve, run)
         else:
-            point = start_point(curve, first, start, settings.newton)
-            trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
+            trace = run.follow(start_point(curve, first, start, run.settings.newton))
             given = _written(harmonics, options, subharmonic=subharmonic, linear=linear)
             _warn_of_return(trace, "omega", first, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
-    return make_branch(system, "omega", trace, settings, options_of(settings, harmonics, {"omega": (first, last)}))
+    return run.branch(trace)
 
 
 def _period(start: Any, subharmonic: int | None) -> int:
@@ -148,28 +141,24 @@ def continue_branch(
     orbit = start
     system = orbit.system
     check_parameter(system, parameter)
-    first, last = check_bounds(system, parameter, bounds)
+    ends = check_bounds(system, parameter, bounds)
     value = orbit.omega if parameter == "omega" else orbit.values[parameter]
-    low, high = min(first, last), max(first, last)
+    low, high = sorted(ends)
     slack = 1e-12 * (high - low)
     if not low - slack <= value <= high + slack:
         raise InputError(f"the motion has {parameter}={value:.6g}, outside the bounds ({low:g}, {high:g})")
     if omega is not None and not (is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
         raise InputError(f"omega={omega!r} differs from the motion's {orbit.omega:g}: leave it out")
-    settings = settings_of(system, options)
-    basis = orbit.basis
-    wanted: Harmonics = harmonics if harmonics is not None else orbit.adaptive or max(1, basis.harmonics // basis.nu)
-    curve = make_curve(system, parameter, orbit.omega, high - low, wanted, basis.nu, own_linear_part(orbit))
-    with one_thread(), reporting(options.get("progress"), f"along {parameter}") as report:
-        settings = settings.reporting_to(report, (low, high))
-        ahead = float(np.sign(last - first))
+    wanted = harmonics_of(orbit) if harmonics is None else harmonics
+    run = CurveRun(system, parameter, ends, wanted, settings_of(system, options))
+    curve = run.curve(orbit.omega, orbit.basis.nu, own_linear_part(orbit))
+    with run.reporting(options.get("progress"), f"along {parameter}") as run:
         if crossing is not None and crossing.tangent is not None:
             # two branches cross: go on along that on which the point was found
-            trace = leave_along(crossing, curve, np.array(crossing.tangent), ahead, (low, high), settings)
+            trace = leave_along(crossing, curve, np.array(crossing.tangent), run)
         else:
-            point = start_point(curve, min(high, max(low, value)), orbit, settings.newton)
-            trace = both_ways(point, ahead, (low, high), settings)
-    return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
+            trace = run.both_ways(start_point(curve, min(high, max(low, value)), orbit, run.settings.newton))
+    return run.branch(trace)
 
 
 def _from_system(
@@ -190,18 +179,15 @@ def _from_system(
     first, last = check_bounds(system, parameter, bounds)
     if omega is None or not (is_number(omega) and omega > 0.0):
         raise InputError(f"continue_branch from a system along {parameter!r} needs a positive omega=, got {omega!r}")
-    settings = settings_of(system, options)
-    curve = make_curve(system, parameter, float(omega), abs(last - first), wanted, 1, None)
-    # a size of the motion to scale with, should the branch begin at rest
-    curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
-    with one_thread(), reporting(options.get("progress"), f"along {parameter}") as report:
-        settings = settings.reporting_to(report, (first, last))
-        point = start_point(curve, first, None, settings.newton)
-        trace = follow(point, np.sign(last - first), (min(first, last), max(first, last)), settings)
+    run = CurveRun(system, parameter, (first, last), wanted, settings_of(system, options))
+    # the branch may begin at rest
+    curve = run.scaled(run.curve(float(omega), 1, None))
+    with run.reporting(options.get("progress"), f"along {parameter}") as run:
+        trace = run.follow(start_point(curve, first, None, run.settings.newton))
     given = _written(wanted, options)
     call = f"so.continue_branch(system, {parameter!r}, ({last!r}, {first!r}), omega={float(omega)!r}{given})"
     _warn_of_return(trace, parameter, first, call)
-    return make_branch(system, parameter, trace, settings, options_of(settings, wanted, {parameter: (first, last)}))
+    return run.branch(trace)
 
 
 def _written(harmonics: Harmonics, options: CurveOptions, **more: Any) -> str:

@@ -160,12 +160,6 @@ class Inherited:
         """The DOF whose amplitude is reported, None where it is not known."""
         return self.known.get("observe")
 
-    @property
-    def harmonics(self) -> Harmonics:
-        """Rule or number, as the motion was computed."""
-        orbit = self.item.orbit
-        return orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
-
     def under(self, options: CurveOptions) -> CurveOptions:
         """Options that are given, and where they are not those of the bifurcation."""
         given = {name: value for name, value in options.items() if value is not None}

@@ -19,8 +19,8 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.making import make_branch
-from suboctave.analysis.options import CurveOptions, SearchOptions, options_of, settings_of
+from suboctave.analysis.options import CurveOptions, SearchOptions, settings_of
+from suboctave.analysis.run import CurveRun
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import Solved
@@ -31,8 +31,7 @@ from suboctave.curves.identity import lies_on, relation
 from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import linear_response, start_point
-from suboctave.curves.trace import Settings, Trace
-from suboctave.curves.ways import both_ways
+from suboctave.curves.trace import Trace
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
@@ -43,7 +42,7 @@ from suboctave.interruption import Interruption, limited, pass_on
 from suboctave.model.inputs import check_range, check_system
 from suboctave.model.system import System
 from suboctave.options import with_options
-from suboctave.progress import Report, reporting
+from suboctave.progress import Report
 from suboctave.results.branch import Branch
 from suboctave.timedomain import integrate
 
@@ -111,17 +110,14 @@ def find_subharmonics(
     After Ctrl-C, or a time limit, the list's `interruption` says so. Errors as of `frequency_response`.
     """
     order = check_order(subharmonic)
-    first, last = check_range("omega", omega, positive=True)
-    check_system(system, (first, last))
+    ends = check_range("omega", omega, positive=True)
+    check_system(system, ends)
     if seeds is not None and not isinstance(seeds, Seeds):
         raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
-    settings = settings_of(system, options)
-    curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, linear)
-    curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
-    kept = options_of(settings, harmonics, {"omega": (first, last)})
-    with one_thread(), reporting(options.get("progress"), f"{period_name(order)} motions") as report:
-        search = None if report is None else _Search(report)
-        return Branches.of(_branches(curve, (first, last), seeds or Seeds(), settings, kept, search=search))
+    run = CurveRun(system, "omega", ends, harmonics, settings_of(system, options))
+    curve = run.curve(ends[0], order, linear)
+    with run.reporting(options.get("progress"), f"{period_name(order)} motions") as run:
+        return Branches.of(_branches(curve, seeds or Seeds(), run))
 
 
 class Branches(list[Branch]):
@@ -155,62 +151,53 @@ def isolated_branches(
     **options: Unpack[SearchOptions],
 ) -> list[Branch]:
     """As `find_subharmonics`, without the branches that are known."""
-    first, last = omega
-    settings = settings_of(system, options)
-    curve = make_curve(system, "omega", first, abs(last - first), harmonics, order, None)
-    curve.reference = max(curve.size(linear_response(curve, v)) for v in omega)
-    kept = options_of(settings, harmonics, {"omega": omega})
+    run = CurveRun(system, "omega", omega, harmonics, settings_of(system, options))
     with one_thread():
-        branches = list(_branches(curve, omega, seeds or Seeds(), settings, kept, known))
+        branches = list(_branches(run.curve(omega[0], order, None), seeds or Seeds(), run, known))
     for branch in branches:
         pass_on(branch.interruption)
     return branches
 
 
-def _branches(
-    curve: MotionProblem,
-    bounds: tuple[float, float],
-    seeds: Seeds,
-    settings: Settings,
-    options: dict[str, Any],
-    known: Sequence[Branch] = (),
-    search: _Search | None = None,
-) -> Iterator[Branch]:
+def _branches(curve: MotionProblem, seeds: Seeds, run: CurveRun, known: Sequence[Branch] = ()) -> Iterator[Branch]:
     """The branches of the motions that a search meets, each once, without those that are known."""
-    first, last = bounds
     branches = list(known)
-    for point in _motions(curve, bounds, seeds, settings, None if search is None else search.at):
-        if search is not None:
-            settings = settings.reporting_to(search.along, bounds)
+    searched = 0.0
+
+    def looking(share: float, where: str) -> None:
+        nonlocal searched
+        searched = share
+        run.report(share, where)
+
+    # the share reported is that of the range that was searched: following branches on the way adds nothing
+    silent = run.settings.report is None
+    following = None if silent else lambda _, where: run.report(searched, where)
+    for point in _motions(run.scaled(curve), seeds, run, looking):
         if any(lies_on(_orbit(point), branch.points) for branch in branches):
             continue
-        trace = both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
+        own = replace(run, settings=run.settings.reporting_to(following, run.ends))
+        trace = own.both_ways(point)
         if trace.points:
-            branches.append(make_branch(curve.balance.system, "omega", trace, settings, options))
+            branches.append(own.branch(trace))
             yield branches[-1]
         if trace.interrupted:
             return
 
 
-def subharmonic_start(
-    curve: MotionProblem, bounds: tuple[float, float], settings: Settings, seeds: Seeds | None = None
-) -> Trace:
+def subharmonic_start(curve: MotionProblem, run: CurveRun) -> Trace:
     """The first branch of a curve's sub-harmonic motions that a search over the range finds, followed both ways.
 
     Raises ConvergenceError where it finds none.
     """
-    first, last = bounds
-    curve.reference = max(curve.size(linear_response(curve, v)) for v in (first, last))
-    report = None if settings.report is None else settings.report.report
-    look = None if report is None else lambda share, where: report(0.0, where)
-    point = next(_motions(curve, bounds, seeds or Seeds(), settings, look), None)
+    point = next(_motions(run.scaled(curve), Seeds(), run, lambda share, where: run.report(0.0, where)), None)
     if point is None:
+        first, last = run.ends
         raise ConvergenceError(
             f"no motion of {curve.balance.basis.nu} load periods was found between {curve.name} = {first:g} and "
             f"{last:g}: the search starts near nonlinear resonances of the linear modes at fractions of omega. Give a "
             "state or an orbit as start="
         )
-    return both_ways(point, float(np.sign(last - first)), (min(bounds), max(bounds)), settings)
+    return run.both_ways(point)
 
 
 @limited
@@ -278,35 +265,15 @@ def _orbit(point: CurvePoint) -> PeriodicOrbit:
 
 
 # ------------------------------------------------------------------------------------------------------------- search
-class _Search:
-    """Progress of a search: the share of the range that was searched; following branches on the way adds nothing."""
-
-    def __init__(self, report: Report) -> None:
-        self.report = report
-        self.share = 0.0
-
-    def at(self, share: float, where: str) -> None:
-        """The search has come so far."""
-        self.share = share
-        self.report(share, where)
-
-    def along(self, share: float, where: str) -> None:
-        """A branch is followed."""
-        self.report(self.share, where)
-
-
-def _motions(
-    curve: MotionProblem, bounds: tuple[float, float], seeds: Seeds, settings: Settings, report: Report | None
-) -> Iterator[CurvePoint]:
+def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) -> Iterator[CurvePoint]:
     """Solved sub-harmonic motions over the range, as the search meets them."""
     nu = curve.balance.basis.nu
-    patient = replace(settings.newton, iterations=25, damped=True)
-    first, last = bounds
+    patient = replace(run.settings.newton, iterations=25, damped=True)
+    first, last = run.ends
     # away from the ends, where branches may just end
     values = first + (last - first) * (np.arange(seeds.frequencies) + 0.5) / seeds.frequencies
     for number, value in enumerate(values):
-        if report is not None:
-            report(number / len(values), f"looking at {curve.where(np.array([value]))}")
+        report(number / len(values), f"looking at {curve.where(np.array([value]))}")
         met: list[PeriodicOrbit] = []
         for guess in _guesses(curve, float(value), seeds):
             try:
@@ -319,7 +286,7 @@ def _motions(
                 continue
             met.append(start)
             try:
-                point = start_point(curve, float(value), start, settings.newton)
+                point = start_point(curve, float(value), start, run.settings.newton)
             except ConvergenceError:
                 continue
             own = point.curve

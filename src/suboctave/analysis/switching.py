@@ -13,15 +13,15 @@ from typing import Unpack
 
 import numpy as np
 
-from suboctave.analysis.making import make_branch
-from suboctave.analysis.options import CurveOptions, Inherited, options_of, settings_of
+from suboctave.analysis.options import CurveOptions, Inherited, settings_of
+from suboctave.analysis.run import CurveRun
 from suboctave.bifurcation import KINDS, Bifurcation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation
 from suboctave.continuation import CurvePoint
-from suboctave.continuation.linear import length, one_thread
+from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
-from suboctave.curves.discretisation import Harmonics, make_curve, own_linear_part
+from suboctave.curves.discretisation import Harmonics, harmonics_of, own_linear_part
 from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import follow, same_event
 from suboctave.curves.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
@@ -32,7 +32,6 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.model.inputs import check_bounds
 from suboctave.model.timed import timed
 from suboctave.options import with_options
-from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 
 __all__ = ["check_left", "leave_along", "switch_branch"]
@@ -97,24 +96,18 @@ def switch_branch(
         )
     orbit, name = bifurcation.orbit, bifurcation.parameter_name
     known = Inherited(bifurcation)
-    first, last = check_bounds(orbit.system, name, known.bounds(name) if bounds is None else bounds)
+    ends = check_bounds(orbit.system, name, known.bounds(name) if bounds is None else bounds)
     value = bifurcation.parameter(name)
-    low, high = min(first, last), max(first, last)
+    low, high = sorted(ends)
     if not low <= value <= high:
         raise InputError(f"the {KINDS[kind]} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
-    settings = settings_of(orbit.system, known.under(options))
-    settings = replace(settings, half=kind == "BP" and side is not None)
+    settings = replace(settings_of(orbit.system, known.under(options)), half=kind == "BP" and side is not None)
     nu = orbit.basis.nu * (2 if kind == "PD" else 1)
-    wanted = known.harmonics if harmonics is None else harmonics
-    curve = make_curve(orbit.system, name, orbit.omega, high - low, wanted, nu, own_linear_part(orbit))
-    title = f"{period_name(nu)} branch along {name}"
-    with one_thread(), reporting(options.get("progress"), title) as report:
-        settings = settings.reporting_to(report, (low, high))
-        if kind == "PD":
-            trace = _doubled(bifurcation, curve, 1.0 if side is None else float(side), (low, high), settings)
-        else:
-            trace = _other(bifurcation, curve, side, np.sign(last - first), (low, high), settings)
-    return make_branch(orbit.system, name, trace, settings, options_of(settings, wanted, {name: (first, last)}))
+    run = CurveRun(orbit.system, name, ends, harmonics_of(orbit) if harmonics is None else harmonics, settings)
+    curve = run.curve(orbit.omega, nu, own_linear_part(orbit))
+    with run.reporting(options.get("progress"), f"{period_name(nu)} branch along {name}") as run:
+        trace = _doubled(bifurcation, curve, side or 1, run) if kind == "PD" else _other(bifurcation, curve, side, run)
+    return run.branch(trace)
 
 
 def check_left(kind: str) -> None:
@@ -124,9 +117,7 @@ def check_left(kind: str) -> None:
 
 
 # ------------------------------------------------------------------------------------------------------- departures
-def _doubled(
-    item: Bifurcation, curve: MotionProblem, sign: float, bounds: tuple[float, float], settings: Settings
-) -> Trace:
+def _doubled(item: Bifurcation, curve: MotionProblem, sign: float, run: CurveRun) -> Trace:
     """The branch of twice the period."""
     parent = item.orbit
     if curve.adaptive is not None:
@@ -138,21 +129,10 @@ def _doubled(
     _scale_from_rest(curve, u, direction)
     weights = curve.weights(u, 0.0)
     direction *= sign / length(weights * direction)
-    notes: list[str] = []
-    trace = follow(_away(item, curve, u, direction, weights, settings, notes), 0.0, bounds, settings)
-    trace.warnings[:0] = notes
-    trace.departs = replace(item, arclength=0.0)
-    return trace
+    return _departing(item, curve, u, direction, run)
 
 
-def _other(
-    item: Bifurcation,
-    curve: MotionProblem,
-    side: int | None,
-    ahead: float,
-    bounds: tuple[float, float],
-    settings: Settings,
-) -> Trace:
+def _other(item: Bifurcation, curve: MotionProblem, side: int | None, run: CurveRun) -> Trace:
     """The branch that crosses another at a branch point, or one half of it."""
     state = item.orbit.state()
     equation = branching_equation(state, curve.name, curve.span, item.null_vectors)
@@ -162,34 +142,31 @@ def _other(
     else:
         direction = equation.other(np.array(item.tangent))
     direction = _oriented(direction, equation.weights)
-    curve, u, weights = _at(item, curve)
+    curve, u = _at(item, curve)
     _scale_from_rest(curve, u, direction)
     if side is None:
-        return leave_along(item, curve, direction, ahead, bounds, settings)
-    weights = curve.weights(u, 0.0)
+        return leave_along(item, curve, direction, run)
+    return _departing(item, curve, u, side * direction, run)
+
+
+def _departing(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, run: CurveRun) -> Trace:
+    """The branch that leaves a bifurcation in one direction."""
     notes: list[str] = []
-    trace = follow(_away(item, curve, u, side * direction, weights, settings, notes), 0.0, bounds, settings)
+    trace = follow(_away(item, curve, u, direction, run.settings, notes), 0.0, run.bounds, run.settings)
     trace.warnings[:0] = notes
     trace.departs = replace(item, arclength=0.0)
     return trace
 
 
-def leave_along(
-    item: Bifurcation,
-    curve: MotionProblem,
-    direction: Array,
-    ahead: float,
-    bounds: tuple[float, float],
-    settings: Settings,
-) -> Trace:
-    """The branch through a branch point along a direction, both ways; it ends where it is `ahead` in the parameter."""
-    if direction[-1] * ahead < 0.0:
+def leave_along(item: Bifurcation, curve: MotionProblem, direction: Array, run: CurveRun) -> Trace:
+    """The branch through a branch point along a direction, both ways; it ends where it is ahead in the parameter."""
+    if direction[-1] * run.ahead < 0.0:
         direction = -direction
-    curve, u, weights = _at(item, curve)
+    curve, u = _at(item, curve)
     notes: list[str] = []
-    one, other = (_away(item, curve, u, sign * direction, weights, settings, notes) for sign in (1.0, -1.0))
+    one, other = (_away(item, curve, u, sign * direction, run.settings, notes) for sign in (1.0, -1.0))
     here = replace(item, tangent=tuple(direction.tolist()))
-    forward = follow(one, 0.0, bounds, settings)
+    forward = follow(one, 0.0, run.bounds, run.settings)
     forward.warnings[:0] = notes
     if forward.closed or forward.interrupted:
         # a closed curve comes back through the branch point, located there with other harmonics perhaps
@@ -199,7 +176,7 @@ def leave_along(
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
         forward.settle_end(reach)
         return forward
-    back = follow(other, 0.0, bounds, settings)
+    back = follow(other, 0.0, run.bounds, run.settings)
     gap = _distance(one, u, curve) + _distance(other, u, curve)
     trace = back.reversed_before(forward, gap)
     place = back.points[-1].arclength + _distance(other, u, curve)
@@ -231,12 +208,10 @@ def _distance(point: CurvePoint, u: Array, curve: MotionProblem) -> float:
     return length(point.weights * (point.u - point.curve.transfer(u, curve)))
 
 
-def _at(item: Bifurcation, curve: MotionProblem) -> tuple[MotionProblem, Array, Array]:
-    """The curve in the harmonics of a bifurcation, that point on it, and the weights there."""
-    orbit = item.orbit
-    curve = curve.with_basis(orbit.basis)
-    u = curve.join(orbit.coefficients, item.parameter(item.parameter_name))
-    return curve, u, curve.weights(u, 0.0)
+def _at(item: Bifurcation, curve: MotionProblem) -> tuple[MotionProblem, Array]:
+    """The curve in the harmonics of a bifurcation, and that point on it."""
+    curve = curve.with_basis(item.orbit.basis)
+    return curve, curve.join(item.orbit.coefficients, item.parameter(item.parameter_name))
 
 
 def _oriented(direction: Array, weights: Array) -> Array:
@@ -247,15 +222,10 @@ def _oriented(direction: Array, weights: Array) -> Array:
 
 
 def _away(
-    item: Bifurcation,
-    curve: MotionProblem,
-    u: Array,
-    direction: Array,
-    weights: Array,
-    settings: Settings,
-    notes: list[str],
+    item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings, notes: list[str]
 ) -> CurvePoint:
     """The first point of a branch that leaves a bifurcation, in the harmonics that it needs."""
+    weights = curve.weights(u, 0.0)
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
     expected = doubled(item.floquet) if item.kind == "PD" else item.floquet.multipliers

@@ -13,7 +13,7 @@ from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TRACKED_KINDS, TrackedEvent
 from suboctave.continuation import CurvePoint, SteppingOptions
 from suboctave.continuation.linear import one_thread
-from suboctave.curves.discretisation import check_unknowns, own_linear_part
+from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.subharmonic_part import repeats_earlier
@@ -259,7 +259,7 @@ def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range
 def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | None, HarmonicBasis]:
     """Harmonics wanted, the rule for them, and the basis that tracking begins with; by default as those of a start."""
     orbit = item.orbit
-    wanted = given if given is not None else orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
+    wanted = harmonics_of(orbit) if given is None else given
     adaptive, basis = discretisation(orbit.basis, wanted)
     check_unknowns(orbit.balance.size, basis)
     return wanted, adaptive, basis

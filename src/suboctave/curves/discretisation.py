@@ -15,7 +15,7 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.system import System
 
-__all__ = ["Harmonics", "check_unknowns", "make_curve", "own_linear_part", "rule_of"]
+__all__ = ["Harmonics", "check_unknowns", "harmonics_of", "make_curve", "own_linear_part", "rule_of"]
 
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
@@ -51,6 +51,11 @@ def rule_of(harmonics: Any) -> AdaptiveHarmonics | int:
     )
 
 
+def harmonics_of(orbit: PeriodicOrbit) -> Harmonics:
+    """The rule or the number of harmonics of the load that a motion was computed with."""
+    return orbit.adaptive or max(1, orbit.basis.harmonics // orbit.basis.nu)
+
+
 def check_unknowns(size: int, basis: HarmonicBasis) -> None:
     """Refuse bases whose dense matrices would not fit; `size`: unknown DOFs."""
     unknowns = size * basis.size
@@ -63,7 +68,8 @@ def check_unknowns(size: int, basis: HarmonicBasis) -> None:
         )
 
 
-def own_linear_part(orbit: PeriodicOrbit) -> LinearPart | None:
-    """The linear part an orbit was solved with, at its parameters; None for its system's own matrices."""
+def own_linear_part(orbit: PeriodicOrbit, system: System | None = None) -> LinearPart | None:
+    """The linear part an orbit was solved with, at its or a system's parameters; None for its system's own matrices."""
     linear = orbit.balance.linear
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(orbit.values)
+    values = orbit.values if system is None else dict(system.parameters)
+    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(values)

@@ -21,7 +21,7 @@ from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions
-from suboctave.curves.discretisation import Harmonics, make_curve, own_linear_part, rule_of
+from suboctave.curves.discretisation import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of
 from suboctave.curves.identity import gap_to, lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
@@ -264,12 +264,8 @@ def motion_near(orbit: PeriodicOrbit, system: System, omega: float) -> PeriodicO
     ConvergenceError
         Where Newton's method arrives at none there.
     """
-    linear = own_linear_part(orbit)
-    if linear is not None:
-        linear = linear.rebuilt(dict(system.parameters))
-    nu = orbit.basis.nu
-    harmonics: Harmonics = orbit.adaptive or max(1, orbit.basis.harmonics // nu)
-    start = make_curve(system, "omega", omega, omega, harmonics, nu, linear)
+    linear = own_linear_part(orbit, system)
+    start = make_curve(system, "omega", omega, omega, harmonics_of(orbit), orbit.basis.nu, linear)
     point = start_point(start, omega, orbit, NewtonOptions())
     curve = point.curve
     assert isinstance(curve, MotionProblem)

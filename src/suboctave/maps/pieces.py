@@ -218,10 +218,7 @@ class MonotonePiece:
         span = float(np.ptp(self.positions)) or omega
         options = self.curve.options
         system = orbit.system.with_parameters({**orbit.values, self.along: value})
-        linear = own_linear_part(orbit)
-        if linear is not None:
-            linear = linear.rebuilt(dict(system.parameters))
-        balance = HarmonicBalance(system, orbit.basis, linear=linear).settle(x, omega)
+        balance = HarmonicBalance(system, orbit.basis, linear=own_linear_part(orbit, system)).settle(x, omega)
         solution = LIMIT_POINT.solve(Guess(balance, x, omega, dict(balance.values), "omega", span))
         curve = MotionProblem.response(solution.state.balance, "omega", omega, span, orbit.adaptive)
         point = solved_bifurcation(LIMIT_POINT, solution, curve, int(options["observe"]), [])
