@@ -16,8 +16,8 @@ from suboctave.curves.identity import lies_on, mirrored
 from suboctave.interruption import Interruption
 from suboctave.maps import catalogue
 from suboctave.maps.catalogue import Catalogue, SearchRange
-from suboctave.maps.isolas.loops import Loops
 from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.isolas.search import Search
 
 OMEGA = (1.3, 4.5)
 
@@ -383,17 +383,17 @@ def test_what_hangs_on_an_isola_is_part_of_it():
     isola = so.continue_branch(start, "omega", (1.0, 5.0))
     assert isola.closed
     assert len(isola.bifurcations["BP"]) == 4
-    loops = Loops(Catalogue(system, "F", (190.0, 210.0), SearchRange(1.0, 5.0), "adaptive", {}, 0))
-    assert loops.of(isola, 200.0).detached
+    search = Search(Catalogue(system, "F", (190.0, 210.0), SearchRange(1.0, 5.0), "adaptive", {}, 0))
+    assert search.of(isola, 200.0).detached
     for item in isola.bifurcations["BP"][::2]:
         hanging = so.switch_branch(item)
         assert hanging.closed
-        loop = loops.of(hanging, 200.0)
+        loop = search.of(hanging, 200.0)
         assert loop.detached
         assert lies_on(isola.orbits[len(isola) // 2], loop.branch.points)
     # were one of these branches reached from the response, all of them would be
-    loops.met[200.0] = [isola]
-    assert not loops.of(hanging, 200.0).detached
+    search.met[200.0] = [isola]
+    assert not search.of(hanging, 200.0).detached
 
 
 def test_isolas_are_in_the_order_of_their_births():

@@ -8,6 +8,7 @@ a curve a branch can be followed at any value that the curve reaches.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -38,7 +39,7 @@ from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.results.tracked_branch import TrackedBranch
 
-__all__ = ["Catalogue", "SearchRange", "branch_through", "carrier_of", "motion_near"]
+__all__ = ["FAILURES", "Catalogue", "SearchRange", "branch_through", "carrier_of", "motion_near"]
 
 #: share of the range of omega by which branches are followed beyond what they are to hold
 _MARGIN = 0.02
@@ -46,6 +47,8 @@ _MARGIN = 0.02
 _SAME_OMEGA = 2e-5
 #: share of a closed branch's length by which points are beside a bifurcation, not at it
 _CLEAR = 1e-4
+#: errors of verbs that start from a bifurcation
+FAILURES = (ConvergenceError, InputError)
 
 
 class SearchRange(NamedTuple):
@@ -138,6 +141,14 @@ class Catalogue:
         if text not in self.notes:
             self.notes.append(text)
 
+    @contextmanager
+    def noting(self, what: str, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
+        """Note what could not be computed within, and why."""
+        try:
+            yield
+        except errors as failure:
+            self.note(f"{what}: {failure}")
+
     def progress(self, share: float, where: str) -> None:
         """Report how far the work has come."""
         if self.report is not None:
@@ -152,16 +163,13 @@ class Catalogue:
         """The response at a value with what bifurcates from it; that from the other end as well if it is another."""
         low, high = omega
         for ends in ((high, low), (low, high)):
-            try:
+            with self.noting(f"at {self.name} = {value:.6g}"):
                 diagram = diagram_of(self.at(value), ends, self.harmonics, followed, self.options)
-            except ConvergenceError as failure:
-                self.note(f"at {self.name} = {value:.6g}: {failure}")
-                continue
-            self.note_failures(diagram, value)
-            yield diagram
-            root = diagram.root.branch
-            if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
-                return
+                self.note_failures(diagram, value)
+                yield diagram
+                root = diagram.root.branch
+                if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
+                    return
 
     def resonant(
         self, value: float, order: int, seeds: Seeds, known: Sequence[Branch], share: float = 0.0
@@ -223,15 +231,13 @@ class Catalogue:
             self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
             return None
         self.progress(-1.0, where)
-        try:
+        with self.noting(f"the {where} could not be followed over {self.name}", FAILURES):
             curve = track(item, self.name, self.bounds, omega=self.omega.around, **self.options)
             pass_on(curve.interruption)
             self.add(curve)
             piece = self.piece_of(item, value)
             if piece is None:
                 self.note(f"the {where} is not on its curve")
-        except (ConvergenceError, InputError) as failure:
-            self.note(f"the {where} could not be followed over {self.name}: {failure}")
         if piece is None:
             self._lost.append((value, item))
         return piece
@@ -244,11 +250,7 @@ class Catalogue:
 
 
 def branch_through(
-    limit_point: Bifurcation,
-    omega: SearchRange,
-    name: str,
-    pieces: Iterable[MonotonePiece],
-    options: SearchOptions,
+    limit_point: Bifurcation, omega: SearchRange, name: str, pieces: Iterable[MonotonePiece], options: SearchOptions
 ) -> Branch:
     """The branch over omega through a limit point, in a range that holds the limit points of pieces at that value."""
     value = limit_point.parameter(name)
@@ -277,7 +279,7 @@ def motion_near(orbit: PeriodicOrbit, system: System, omega: float) -> PeriodicO
     return PeriodicOrbit(curve.balance, x.copy(), reached, dict(values), residual, error, start.adaptive)
 
 
-# ------------------------------------------------------------------------------------------------------ closed branches
+# ----------------------------------------------------------------------------------------------------- closed branches
 def carrier_of(branch: Branch, attached: Iterable[Branch], options: SearchOptions) -> Branch | None:
     """Of the closed branches that one is connected with by branch points that on which the others hang; None if one of
     them is not closed, or meets a branch that leads to the ends of the range, as those `attached` do.

@@ -5,9 +5,7 @@ Every strategy leads to limit points or closed branches at values of the design 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -21,54 +19,42 @@ from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
 from suboctave.maps.catalogue import Catalogue, motion_near
-from suboctave.maps.isolas.loops import Loop
-from suboctave.maps.isolas.search import PREPARATION, Search
+from suboctave.maps.isolas.search import PREPARATION, Loop, Search
 from suboctave.model.system import System
 from suboctave.results.branch import Branch
 
-__all__ = ["FromLoadLevels", "FromResonances", "FromResponses", "Strategy"]
+__all__ = ["from_load_levels", "from_resonances", "from_responses"]
 
+#: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola
+_LEVELS, _ORDERS = (1.5, 2.2, 3.2, 4.7), (2,)
 #: motions of a branch whose mirror images lead to another one, if there is any
 _IMAGES = 12
 #: name of the parameter that scales all loads
 _LEVEL = "load_level"
 
 
-class Strategy(Protocol):
-    """A way into the search."""
+def from_responses(search: Search, depth: int) -> None:
+    """Responses at all values, with what bifurcates from them so many bifurcations deep."""
+    catalogue = search.catalogue
+    for number, value in enumerate(search.values):
+        catalogue.progress(PREPARATION * number / len(search.values), f"{catalogue.name} = {value:.6g}")
+        for branch in _responses(catalogue, value, depth):
+            search.attach(Loop(value, branch, search.pieces_on(branch, value), False))
+    catalogue.progress(PREPARATION, "closed branches")
+    search.settle(search.values)
 
-    def run(self, search: Search) -> None:
-        """Look for isolas at the values of a search."""
-        ...
 
-
-@dataclass(frozen=True)
-class FromResponses:
-    """Responses at all values, with what bifurcates from them `depth` bifurcations deep."""
-
-    depth: int
-
-    def run(self, search: Search) -> None:
-        """See `Strategy.run`."""
-        catalogue, loops = search.catalogue, search.loops
-        for number, value in enumerate(search.values):
-            catalogue.progress(PREPARATION * number / len(search.values), f"{catalogue.name} = {value:.6g}")
-            for branch in self.branches(catalogue, value):
-                loops.attach(Loop(value, branch, loops.pieces_on(branch, value), False))
-        catalogue.progress(PREPARATION, "closed branches")
-        search.settle(search.values)
-
-    def branches(self, catalogue: Catalogue, value: float) -> Iterator[Branch]:
-        """Branches at a value that a response leads to, their period doublings followed over the parameter."""
-        for diagram in catalogue.responses(value, catalogue.omega, ByDepth(self.depth)):
-            for node in diagram:
-                if node.depth < self.depth:
-                    _follow_doublings(catalogue, node.branch, value)
-                yield node.branch
-            for branch in _mirror_images(diagram.branches, catalogue, value):
-                if self.depth > 0:
-                    _follow_doublings(catalogue, branch, value)
-                yield branch
+def _responses(catalogue: Catalogue, value: float, depth: int) -> Iterator[Branch]:
+    """Branches at a value that a response leads to, their period doublings followed over the parameter."""
+    for diagram in catalogue.responses(value, catalogue.omega, ByDepth(depth)):
+        for node in diagram:
+            if node.depth < depth:
+                _follow_doublings(catalogue, node.branch, value)
+            yield node.branch
+        for branch in _mirror_images(diagram.branches, catalogue, value):
+            if depth > 0:
+                _follow_doublings(catalogue, branch, value)
+            yield branch
 
 
 def _follow_doublings(catalogue: Catalogue, branch: Branch, value: float) -> None:
@@ -101,63 +87,51 @@ def _mirror_images(branches: list[Branch], catalogue: Catalogue, value: float) -
             yield known[-1]
 
 
-@dataclass(frozen=True)
-class FromLoadLevels:
+def from_load_levels(search: Search, levels: Sequence[float] | None, depth: int) -> None:
     """Responses at other levels of all loads together, in units of their own: most isolas join the main branch there.
 
     Limit points met there are followed over the level to the loads' own one, where they lie on branches of the system
-    itself. `until_one`: only as long as no isola is known, and at few values.
+    itself. Without levels some, as long as no isola is known, and at few values.
     """
+    catalogue = search.catalogue
+    for level in _LEVELS if levels is None else levels:
+        if levels is None and search.isolas:
+            break
+        for value in search.few if levels is None else search.values:
+            catalogue.progress(PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
+            for branch in _under_other_loads(search, value, level, depth):
+                search.meet(branch, value)
 
-    levels: tuple[float, ...]
-    depth: int
-    until_one: bool
 
-    def run(self, search: Search) -> None:
-        """See `Strategy.run`."""
-        catalogue = search.catalogue
-        for level in self.levels:
-            if self.until_one and search.isolas:
-                break
-            for value in search.few if self.until_one else search.values:
-                catalogue.progress(PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
-                for branch in self._branches(search, value, level):
-                    search.meet(branch, value)
+def _under_other_loads(search: Search, value: float, level: float, depth: int) -> Iterator[Branch]:
+    """Branches at a value that a level of the loads leads to and the search has not met, each once.
 
-    def _branches(self, search: Search, value: float, level: float) -> Iterator[Branch]:
-        """Branches at a value that a level of the loads leads to and the search has not met, each once.
-
-        Where nothing oscillates but elements there are none.
-        """
-        catalogue = search.catalogue
-        system = catalogue.at(value)
-        if not any(c.harmonic for c in system.load_components()):
-            return
-        bounds = (min(1.0, level), max(1.0, level))
-        scaled = system.with_scaled_loads(_LEVEL)
-        other = Catalogue(
-            scaled, _LEVEL, bounds, catalogue.omega, catalogue.harmonics, catalogue.options, catalogue.most
-        )
-        try:
-            for branch in FromResponses(self.depth).branches(other, level):
-                for item in branch.bifurcations["LP"]:
-                    other.known(item, level)
-        finally:
-            for note in other.notes:
-                catalogue.note(f"at {catalogue.name} = {value:.6g}, looking at {level:g} times the loads: {note}")
-        known = list(search.loops.met.get(value, []))
-        for piece in other.limit_points:
-            if not piece.contains(1.0):
+    Where nothing oscillates but elements there are none.
+    """
+    catalogue = search.catalogue
+    system = catalogue.at(value)
+    if not any(c.harmonic for c in system.load_components()):
+        return
+    bounds = (min(1.0, level), max(1.0, level))
+    scaled = system.with_scaled_loads(_LEVEL)
+    other = Catalogue(scaled, _LEVEL, bounds, catalogue.omega, catalogue.harmonics, catalogue.options, catalogue.most)
+    try:
+        for branch in _responses(other, level, depth):
+            for item in branch.bifurcations["LP"]:
+                other.known(item, level)
+    finally:
+        for note in other.notes:
+            catalogue.note(f"at {catalogue.name} = {value:.6g}, looking at {level:g} times the loads: {note}")
+    known = list(search.met.get(value, []))
+    for piece in other.limit_points:
+        if not piece.contains(1.0):
+            continue
+        with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
+            orbit = _unscaled(piece.solve_at(1.0).orbit, system)
+            if any(lies_on(orbit, branch.points, images=True) for branch in known):
                 continue
-            try:
-                orbit = _unscaled(piece.solve_at(1.0).orbit, system)
-                if any(lies_on(orbit, branch.points, images=True) for branch in known):
-                    continue
-                bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
-                known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
-            except ConvergenceError as failure:
-                catalogue.note(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads: {failure}")
-                continue
+            bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
+            known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
             yield known[-1]
 
 
@@ -171,24 +145,15 @@ def _unscaled(orbit: PeriodicOrbit, system: System) -> PeriodicOrbit:
     )
 
 
-@dataclass(frozen=True)
-class FromResonances:
+def from_resonances(search: Search, orders: Sequence[int] | None, seeds: Seeds) -> None:
     """Motions of some periods near nonlinear resonances of the linear modes (`find_subharmonics`).
 
-    `until_one`: only where no isola is known, and at few values.
+    Without periods those of 2T, where no isola is known, at few values.
     """
-
-    orders: tuple[int, ...]
-    seeds: Seeds
-    until_one: bool
-
-    def run(self, search: Search) -> None:
-        """See `Strategy.run`."""
-        catalogue = search.catalogue
-        if self.until_one and search.isolas:
-            return
-        for value in search.few if self.until_one else search.values:
-            for order in self.orders:
-                known = [branch for branch in search.loops.met.get(value, []) if branch.nu == order]
-                for branch in catalogue.resonant(value, order, self.seeds, known, PREPARATION):
-                    search.meet(branch, value)
+    if orders is None and search.isolas:
+        return
+    for value in search.few if orders is None else search.values:
+        for order in _ORDERS if orders is None else orders:
+            known = [branch for branch in search.met.get(value, []) if branch.nu == order]
+            for branch in search.catalogue.resonant(value, order, seeds, known, PREPARATION):
+                search.meet(branch, value)

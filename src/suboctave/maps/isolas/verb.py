@@ -1,11 +1,11 @@
 """`find_isolas`: closed branches that no sweep leads to, over a design parameter.
 
 1. At several values of the parameter the response is followed, with the branches that bifurcate from it
-   (`strategies.FromResponses`; where that leads to no isola, responses under other loads and resonances).
+   (`strategies.from_responses`; where that leads to no isola, responses under other loads and resonances).
 2. Every limit point met is followed over the parameter, through its extrema; every period doubling as well.
 3. Where the curve of limit points has a definite extremum a closed branch shrinks to a point. Limit points at the
    values of 1. that lie on none of the branches met there lie on others (`search`).
-4. A branch through such a limit point is followed. If it closes, `existence` finds the range in which it does.
+4. A branch through such a limit point is followed. If it closes, the search finds the range in which it does.
 
 None of this depends on the value that the parameter happens to have, nor begins at an extremum of period doublings,
 where sub-harmonic motions appear beside their parent (Alcorta et al., Nonlinear Dynamics 98, 2019, section 3.6, begin
@@ -27,16 +27,13 @@ from suboctave.maps.catalogue import Catalogue
 from suboctave.maps.inputs import COARSE, check_count, check_seeds, checked_orders, checked_values, listed
 from suboctave.maps.isolas.result import Isola, Isolas
 from suboctave.maps.isolas.search import Search
-from suboctave.maps.isolas.strategies import FromLoadLevels, FromResonances, FromResponses, Strategy
+from suboctave.maps.isolas.strategies import from_load_levels, from_resonances, from_responses
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
 
 __all__ = ["find_isolas"]
-
-#: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola
-_LEVELS, _ORDERS = (1.5, 2.2, 3.2, 4.7), (2,)
 
 
 @with_options(SearchOptions)
@@ -106,29 +103,20 @@ def find_isolas(
     """
     catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
     search_at = checked_values(values, catalogue.bounds)
-    strategies: list[Strategy] = [
-        FromResponses(check_count("depth", depth, 0)),
-        _loads(_checked_levels(levels), depth),
-        _resonances(None if search is None else checked_orders(search, 2), check_seeds(seeds)),
-    ]
+    check_count("depth", depth, 0)
+    other_levels, fine = _checked_levels(levels), check_seeds(seeds) or COARSE
+    orders = None if search is None else checked_orders(search, 2)
     state = Search(catalogue, search_at)
     with reporting(options.get("progress"), f"isolas over {parameter}") as report:
         catalogue.report = report
         try:
-            for strategy in strategies:
-                strategy.run(state)
+            from_responses(state, depth)
+            from_load_levels(state, other_levels, depth)
+            from_resonances(state, orders, fine)
         except KeyboardInterrupt as cause:
             catalogue.interruption = Interruption.of(cause)
             catalogue.note(f"{catalogue.interruption}: what is here is what had been found by then")
     return _result(state)
-
-
-def _loads(levels: tuple[float, ...] | None, depth: int) -> FromLoadLevels:
-    return FromLoadLevels(_LEVELS if levels is None else levels, depth, until_one=levels is None)
-
-
-def _resonances(orders: tuple[int, ...] | None, seeds: Seeds | None) -> FromResonances:
-    return FromResonances(_ORDERS if orders is None else orders, seeds or COARSE, until_one=orders is None)
 
 
 def _checked_levels(levels: Any) -> tuple[float, ...] | None:

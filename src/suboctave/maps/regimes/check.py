@@ -26,7 +26,7 @@ from suboctave.experiments.poincare import poincare_sections
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
 from suboctave.maps.inputs import check_count
-from suboctave.maps.regimes.arcs import Arc
+from suboctave.maps.regimes.slices import Arc
 from suboctave.maps.regimes.strips import LabelledPlane
 from suboctave.model.system import System
 from suboctave.progress import reporting

@@ -15,9 +15,8 @@ from suboctave.harmonic.linear_part import LinearPart
 from suboctave.maps.catalogue import Catalogue, SearchRange
 from suboctave.maps.files import map_datasets, opened, options_of, piece_number, table_head
 from suboctave.maps.pieces import MonotonePiece, pieces_of
-from suboctave.maps.regimes.arcs import Arc, Edge
 from suboctave.maps.regimes.map import RegimeMap
-from suboctave.maps.regimes.slices import Slice
+from suboctave.maps.regimes.slices import Arc, Edge, Slice
 from suboctave.maps.regimes.strips import Strip
 from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch

@@ -10,20 +10,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+import numpy as np
+
 from suboctave.analysis.diagram import ByPeriod, grown_from
 from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
+from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.curves.points import BranchPoint
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import Catalogue, SearchRange, branch_through
+from suboctave.maps.catalogue import FAILURES, Catalogue, SearchRange, branch_through
 from suboctave.maps.pieces import MonotonePiece
-from suboctave.maps.regimes.arcs import Arc, Edge
 from suboctave.maps.stretches import Stretch, same_branch, stretches
 from suboctave.results.branch import Branch
 
-__all__ = ["Slice", "follow_curves_beside", "follow_curves_of"]
+__all__ = ["Arc", "Edge", "Slice", "follow_curves_beside", "follow_curves_of"]
 
 #: ends of branches this close to the end of the range, relatively, lie on it
 _AT_END = 1e-6
@@ -31,6 +33,63 @@ _AT_END = 1e-6
 _NARROW = 1e-4
 #: where along an arc its motions are compared with those of another
 _SAMPLES = (0.1, 0.3, 0.5, 0.7, 0.9)
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """What ends a stable arc: a border that can be followed, or a frequency that stays as it is.
+
+    `bound` where the range of omega ends it; `kind` of the bifurcation, empty where there is none.
+    """
+
+    omega: float
+    border: MonotonePiece | None = None
+    kind: str = ""
+    bound: bool = False
+
+    def across(self, values: Array | float) -> Array:
+        """The frequency at values of the design parameter; nan where the border does not reach."""
+        if self.border is not None:
+            return self.border.across(values)
+        return np.full(np.shape(values), self.omega)
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """A stable stretch of a branch at one value of the design parameter: `nu`, whether it lies on an isola, two edges.
+
+    The edges are in ascending order of omega; `points` are its motions. With `followed` False it stands for what leaves
+    the deepest branches at period doublings: `nu` is the period of the first such motions, `points` are those of the
+    branch that they leave, which is unstable there by one multiplier below -1.
+    """
+
+    nu: int
+    isolated: bool
+    edges: tuple[Edge, Edge]
+    points: tuple[BranchPoint, ...]
+    followed: bool = True
+
+    @property
+    def nearly_doubled(self) -> float:
+        """How close a multiplier comes to -1 within the arc and turns back; infinite where none does.
+
+        Where that vanishes, as the parameter changes, a pair of period doublings appears. Of motions of the load's
+        period only real multipliers count: a pair passes -1 at some distance wherever omega is twice a frequency of
+        the structure.
+        """
+        gaps = []
+        for point in self.points:
+            mu = point.floquet.multipliers
+            if self.nu == 1:
+                mu = mu[np.abs(mu.imag) <= 1e-9 * np.abs(mu)]
+            gaps.append(float(np.abs(mu + 1.0).min(initial=np.inf)))
+        inner = [b for a, b, c in zip(gaps, gaps[1:], gaps[2:], strict=False) if b <= a and b <= c]
+        return min(inner, default=np.inf)
+
+    def range(self, values: Array | float) -> tuple[Array, Array]:
+        """Between which frequencies it has a motion, at values of the design parameter."""
+        low, high = (edge.across(values) for edge in self.edges)
+        return low, high
 
 
 @dataclass(eq=False)
@@ -108,12 +167,10 @@ class Slice:
     def _through(self, piece: MonotonePiece) -> Iterator[tuple[Branch, bool]]:
         """The branch through a limit point, its mirror image if that is another one, and what bifurcates from them."""
         catalogue, value, options = self.catalogue, self.value, self.catalogue.options
-        try:
+        met: list[Branch] = []
+        where = f"omega = {float(piece.across(value)):.6g}, {catalogue.name} = {value:.6g}"
+        with catalogue.noting(f"the branch through the limit point at {where} could not be followed", FAILURES):
             met = self._both_images(piece)
-        except (ConvergenceError, InputError) as failure:
-            where = f"omega = {float(piece.across(value)):.6g}, {catalogue.name} = {value:.6g}"
-            catalogue.note(f"the branch through the limit point at {where} could not be followed: {failure}")
-            return
         for one in met:
             if self._is_known(one):
                 self.explained.append(piece)
@@ -220,16 +277,12 @@ def follow_curves_beside(value: float, catalogue: Catalogue) -> None:
     """
     low, high = catalogue.omega
     around = catalogue.omega.around
-    try:
+    with catalogue.noting(f"at {catalogue.name} = {value:.6g} the response beside the range of omega was not found"):
         wide = frequency_response(catalogue.at(value), around[::-1], catalogue.harmonics, **catalogue.options)
-    except ConvergenceError as failure:
-        where = f"at {catalogue.name} = {value:.6g}"
-        catalogue.note(f"{where} the response beside the range of omega was not found: {failure}")
-        return
-    pass_on(wide.interruption)
-    folds: list[Bifurcation] = wide.bifurcations["LP"]
-    places = [float(wide.omega[0]), *(b.omega for b in folds), float(wide.omega[-1])]
-    for number, (one, other) in enumerate(pairwise(places)):
-        if min(one, other) < high and max(one, other) > low:
-            for item in folds[max(number - 1, 0) : number + 1]:
-                catalogue.known(item, value)
+        pass_on(wide.interruption)
+        folds: list[Bifurcation] = wide.bifurcations["LP"]
+        places = [float(wide.omega[0]), *(b.omega for b in folds), float(wide.omega[-1])]
+        for number, (one, other) in enumerate(pairwise(places)):
+            if min(one, other) < high and max(one, other) > low:
+                for item in folds[max(number - 1, 0) : number + 1]:
+                    catalogue.known(item, value)

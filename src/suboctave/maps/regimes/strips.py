@@ -1,4 +1,6 @@
-"""The plane of omega and a design parameter in strips, in which stable arcs keep their order; labels of its points."""
+"""The plane of omega and a design parameter in strips, in which stable arcs keep their order; labels and motions of its
+points.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +8,27 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from suboctave.continuation.linear import one_thread
+from suboctave.curves.identity import apart
 from suboctave.curves.junction import period_name
-from suboctave.errors import InputError, is_number
+from suboctave.errors import ConvergenceError, InputError, is_number
+from suboctave.floquet import floquet_multipliers
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.maps.catalogue import Catalogue
-from suboctave.maps.regimes.arcs import Arc
-from suboctave.maps.regimes.motions import motion_at
-from suboctave.maps.regimes.slices import Slice
+from suboctave.maps.catalogue import Catalogue, motion_near
+from suboctave.maps.regimes.slices import Arc, Slice
+from suboctave.model.system import System
 from suboctave.results.tracked_branch import TrackedBranch
 
 __all__ = ["LabelledPlane", "Regime", "Strip", "regime_of"]
+
+#: steps of the way, shares of it: the first, the smallest
+_FIRST, _SMALLEST = 0.5, 1e-3
+#: a step may change the harmonics of a motion by this share of them
+_MOST = 0.35
+#: and keeps this share of what a motion of a shorter period has not: else it fell back onto that
+_KEPT = 0.3
 
 
 @dataclass(frozen=True)
@@ -138,3 +151,70 @@ def regime_of(arcs: Sequence[Arc]) -> Regime:
     """The label of motions that coexist."""
     known, beyond = ([(a.nu, a.isolated) for a in arcs if a.followed is followed] for followed in (True, False))
     return Regime(tuple(sorted(known)), tuple(sorted(beyond)))
+
+
+# ------------------------------------------------------------------------------------------------- motions at points
+def motion_at(
+    arc: Arc, seen: float, system: System, name: str, within: tuple[float, float], omega: float, value: float
+) -> PeriodicOrbit:
+    """The motion of an arc at (omega, value), from its own motions at the value `seen`, step by step.
+
+    On the way it keeps its place between the two ends of its arc, so that the path stays on the arc.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method loses it on the way.
+    """
+    low, high = _range(arc, value, within)
+    share = (omega - low) / ((high - low) or 1.0)
+
+    def place(way: float) -> tuple[float, float]:
+        there = seen + way * (value - seen)
+        first, last = _range(arc, there, within)
+        return first + share * (last - first), there
+
+    begin = place(0.0)[0]
+    orbit = min((p.orbit for p in arc.points), key=lambda o: abs(o.omega - begin))
+    way, step = 0.0, _FIRST
+    with one_thread():
+        while way < 1.0:
+            target = min(1.0, way + step)
+            at = (omega, value) if target == 1.0 else place(target)
+            motion = _solved(orbit, system, name, *at)
+            if motion is None or not _follows(orbit, motion):
+                step *= 0.5
+                if step < _SMALLEST:
+                    where = f"omega = {omega:.6g}, {name} = {value:.6g}"
+                    raise ConvergenceError(f"the motion of {arc.nu} load periods at {where} was not found again")
+                continue
+            orbit, way = motion, target
+    return orbit
+
+
+def _range(arc: Arc, value: float, within: tuple[float, float]) -> tuple[float, float]:
+    low, high = arc.range(value)
+    return max(float(low), within[0]), min(float(high), within[1])
+
+
+def _follows(orbit: PeriodicOrbit, motion: PeriodicOrbit) -> bool:
+    """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
+    lasting = _own(motion) >= _KEPT * _own(orbit)
+    return lasting and apart(orbit, motion) <= _MOST and bool(floquet_multipliers(motion.state()).stable)
+
+
+def _own(orbit: PeriodicOrbit) -> float:
+    """Size of the harmonics that motions of half the period, or of the load's, do not have; of the latter all."""
+    sizes = np.linalg.norm(orbit.amplitudes, axis=1)
+    orders, nu = np.arange(len(sizes)), orbit.basis.nu
+    if nu == 1:
+        return float(np.linalg.norm(sizes))
+    return float(np.linalg.norm(sizes[orders % 2 == 1] if nu % 2 == 0 else sizes[orders % nu != 0]))
+
+
+def _solved(orbit: PeriodicOrbit, system: System, name: str, omega: float, value: float) -> PeriodicOrbit | None:
+    """The motion near another one at other values; None if Newton's method arrives at none there."""
+    try:
+        return motion_near(orbit, system.with_parameters({name: value}), omega)
+    except ConvergenceError:
+        return None

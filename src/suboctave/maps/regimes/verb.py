@@ -28,7 +28,7 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
-from suboctave.errors import ConvergenceError, InputError, is_number, shortened
+from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, pass_on, unlimited
 from suboctave.maps.catalogue import Catalogue
@@ -173,14 +173,11 @@ def _follow_motions(motions: Sequence[PeriodicOrbit], catalogue: Catalogue) -> N
         if any(v == value and lies_on(orbit, b.points) for v, b in known):
             continue
         catalogue.progress(0.0, f"{period_name(orbit.basis.nu)} at {catalogue.name} = {value:.6g}")
-        try:
+        with catalogue.noting(f"the branch through {orbit!r} could not be followed"):
             branch = continue_branch(orbit, "omega", catalogue.omega.around, **catalogue.options)
-        except ConvergenceError as failure:
-            catalogue.note(f"the branch through {orbit!r} could not be followed: {failure}")
-            continue
-        pass_on(branch.interruption)
-        known.append((value, branch))
-        follow_curves_of(branch, value, catalogue)
+            pass_on(branch.interruption)
+            known.append((value, branch))
+            follow_curves_of(branch, value, catalogue)
 
 
 @dataclass
