@@ -15,7 +15,6 @@ derivative is taken from the side where the stop is open at rest.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -133,10 +132,13 @@ class ElasticStop(Element):
         if not self.regularised:
             slope = c[0] * self._contact(u, c)
             return slope * (u - c[1]), slope, None
-        k, b, s = c
-        rest = at_rest(self._sign, b, s)
-        force, slope = _kernels().regularised_tangent(np.ascontiguousarray(u), k, b, s, self._sign, rest)
-        return force, slope, None
+        k, b, s = c.tolist()
+        y = u - b
+        phi_y = _phi_y(y, s)
+        shape = _phi(y, phi_y, s)
+        if self._sign < 0:
+            shape, phi_y = u - shape, 1.0 - phi_y
+        return k * (shape + at_rest(self._sign, b, s)), k * phi_y, None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
         """`f_uu`; for the exact law its regular part, which is zero."""
@@ -157,8 +159,15 @@ class ElasticStop(Element):
             contact = self._contact(u, c)
             f_c = np.array([contact * (u - c[1]), -c[0] * contact])
             return f_c, np.array([contact, np.zeros_like(u)]), None
-        f_c, f_uc = _kernels().regularised_rates(np.ascontiguousarray(u), *self._numbers(c))
-        return f_c, f_uc, None
+        k, b, s = c.tolist()
+        sign, y = self._sign, u - b
+        phi_y = _phi_y(y, s)
+        phi = _phi(y, phi_y, s)
+        f_k = (phi if sign > 0 else u - phi) + at_rest(sign, b, s)
+        f_uk = phi_y if sign > 0 else 1.0 - phi_y
+        f_b = k * (at_rest_by_gap(sign, b, s) - sign * phi_y)
+        f_s = k * (at_rest_by_sharpness(sign, b, s) + sign * _phi_s(y, s))
+        return np.array([f_k, f_b, f_s]), np.array([f_uk, -k * sign * _phi_yy(y, s), k * sign * _phi_ys(y, s)]), None
 
     def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
         """See `Element.smoothness_change`."""
@@ -173,14 +182,6 @@ class ElasticStop(Element):
         if sharpness:
             constant += k * sharpness * at_rest_by_sharpness(sign, b, s)
         return SharpSampling((gap,), (-sharpness / s**2,), constant, 0.5 * by_stiffness, (sign * by_stiffness,))
-
-    def _numbers(self, c: Array) -> tuple[float, ...]:
-        """Stiffness, gap, sharpness and side, the constant that makes the force right at `u = 0`, and what it adds to
-        the derivatives by gap and sharpness per unit of stiffness.
-        """
-        k, b, s = c.tolist()
-        side = self._sign
-        return k, b, s, side, at_rest(side, b, s), at_rest_by_gap(side, b, s), at_rest_by_sharpness(side, b, s)
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
@@ -207,11 +208,9 @@ class ElasticStop(Element):
         return sign * (_phi_y(-b, s) - _phi_y(y, s)) - preloaded
 
 
-@functools.cache
-def _kernels() -> Any:
-    from suboctave.model.elements import stop_kernel
-
-    return stop_kernel
+def _phi(y: Any, phi_y: Any, s: float) -> Any:
+    """phi, from its derivative."""
+    return y * phi_y - np.log1p((s * y) ** 2) / (2.0 * np.pi * s)
 
 
 def _phi_y(y: Any, s: float) -> Any:
