@@ -26,7 +26,7 @@ from suboctave.harmonic.aft.law import Along, Member, Second, Third
 from suboctave.harmonic.aft.sampled import Sampled
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import graded
-from suboctave.harmonic.trigonometric import FAST, displacement, slope, spectra
+from suboctave.harmonic.trigonometric import FAST, motion, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import Element
 from suboctave.model.elements.smoothness import SharpSampling
@@ -59,9 +59,7 @@ class ArctanSteps(Sampled):
 
     def _path(self) -> tuple[Array, Array, Array, Array, Array]:
         zr, zi, w, u = self._nodes
-        rate = np.empty_like(u)
-        displacement(slope(self.along.motion, 1.0), zr, zi, rate)
-        return zr, zi, w, u, rate
+        return zr, zi, w, u, motion(self.along.motion, zr, zi)[1]
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
