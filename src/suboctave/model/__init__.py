@@ -8,7 +8,6 @@ from __future__ import annotations
 from suboctave.model import library
 from suboctave.model.elements.base import Element
 from suboctave.model.elements.callable import Callable
-from suboctave.model.elements.clearance import Clearance, Freeplay
 from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.elements.dampers import QuadraticDamper, TanhFriction
 from suboctave.model.elements.derivative_check import DerivativeReport, check_derivatives
@@ -23,7 +22,7 @@ from suboctave.model.elements.smoothness import (
     SharpVelocitySampling,
 )
 from suboctave.model.elements.springs import CubicSpring, PolynomialSpring
-from suboctave.model.elements.stops import ElasticStop
+from suboctave.model.elements.stops import Clearance, ElasticStop, Freeplay
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
 from suboctave.model.loads import (
     BaseAcceleration,

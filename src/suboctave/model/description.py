@@ -96,8 +96,8 @@ def constructor_arguments(cls: type) -> list[str]:
     return [p.name for p in list(_signature(cls).parameters.values())[1:] if p.kind not in kinds]
 
 
-def _signature(cls: type) -> inspect.Signature:
-    return inspect.signature(cls.__init__)  # type: ignore[misc]
+def _signature(cls: Any) -> inspect.Signature:
+    return inspect.signature(cls.__init__)
 
 
 def _kept(value: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["STEP", "central_difference", "step_of"]
+__all__ = ["STEP", "central_difference", "shift_derivative", "shifted", "step_of"]
 
 #: step as a share of the length over which a law changes: truncation (step^4 / 30 times a fifth derivative) and
 #: rounding (1e-16 / step, more behind a sharp corner) both stay below 1e-7 there
@@ -22,3 +22,15 @@ def central_difference(law: Callable[[float], Any], step: float) -> Any:
 def step_of(at: Any, width: float = np.inf) -> float:
     """The step for an argument `at` of a law that changes over its largest size, or over a smaller width."""
     return STEP * min(float(np.max(np.abs(at), initial=0.0)) or 1.0, width)
+
+
+def shifted(at: Any, i: Any, by: float) -> Any:
+    """A copy of an array with one of its entries, or rows, moved."""
+    moved = at.copy()
+    moved[i] += by
+    return moved
+
+
+def shift_derivative(law: Callable[[Any], Any], at: Any, i: Any, step: float) -> Any:
+    """The derivative of a function of an array by one of its entries, or along one of its rows."""
+    return central_difference(lambda h: law(shifted(at, i, h)), step)

@@ -477,8 +477,8 @@ class _Forces:
         if (any(rates) and any(slopes)) or not any(used) or not all(slope.is_number for slope in used):
             return None
         first = next(slope for slope in used if slope)
-        ratios = tuple(_real(slope / first) for slope in used)
-        return None if None in ratios else ratios  # type: ignore[return-value]
+        ratios = tuple(ratio for slope in used if (ratio := _real(slope / first)) is not None)
+        return ratios if len(ratios) == len(used) else None
 
 
 def _fresh(name: str, taken: set[str]) -> str:

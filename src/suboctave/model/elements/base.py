@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError, located
 from suboctave.model.description import Recorded
-from suboctave.model.differences import central_difference, step_of
+from suboctave.model.differences import central_difference, shift_derivative, shifted, step_of
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
 from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
@@ -105,11 +105,13 @@ class BaseElement(Recorded, ABC, family="element"):
     def __init__(
         self,
         dof: Dof | None = None,
-        coefficients: Sequence[float | str | Coefficient] = (),
+        coefficients: Sequence[float | str | Coefficient | None] = (),
         *,
         direction: ArrayLike | None = None,
     ) -> None:
         kind = type(self).__name__
+        if len(coefficients) == len(self.coefficient_names):
+            required(kind, **dict(zip(self.coefficient_names, coefficients, strict=True)))
         self.place = Place(kind, dof, direction)
         if len(coefficients) != len(self.coefficient_names):
             raise InputError(f"{kind} takes {len(self.coefficient_names)} coefficients, got {len(coefficients)}")
@@ -173,13 +175,8 @@ class BaseElement(Recorded, ABC, family="element"):
         rates = np.zeros((len(levels(c)), len(c)))
         for i, value in enumerate(c):
             h = 1e-3 * (abs(float(value)) or 1.0)
-            near = []
-            for share in (1.0, -1.0, 2.0, -2.0):
-                moved = c.copy()
-                moved[i] += share * h
-                near.append(levels(moved))
-            if {len(there) for there in near} == {len(rates)}:
-                rates[:, i] = (8.0 * (near[0] - near[1]) - (near[2] - near[3])) / (12.0 * h)
+            if all(len(levels(shifted(c, i, share * h))) == len(rates) for share in (1.0, -1.0, 2.0, -2.0)):
+                rates[:, i] = shift_derivative(levels, c, i, h)
         return rates
 
     def check(self, values: Mapping[str, float], first: bool) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, shortened
-from suboctave.model.differences import central_difference, step_of
+from suboctave.model.differences import central_difference, shift_derivative, step_of
 from suboctave.model.elements.base import Array, Dof, Element, required
 from suboctave.model.elements.smoothness import AdaptiveSampling
 from suboctave.model.expressions.coefficients import Coefficient
@@ -200,30 +200,20 @@ class Callable(Element):
         f_vv = central_difference(lambda h: self._slopes(u, v + h, c)[1], step_of(v))
         return f_uu, f_uv, f_vv
 
-    def _shifted(self, c: Array, i: int, h: float) -> Array:
-        moved = c.copy()
-        moved[i] += h
-        return moved
-
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
         """See `Element.coefficient_tangent`; by differences."""
+
+        def law(c: Array) -> Array:
+            return np.array([self._value(u, v, c), *self._slopes(u, v, c)])
+
         out = np.zeros((3, len(c), len(u)))
         for i, value in enumerate(c):
-
-            def law(h: float, i: int = i) -> Array:
-                moved = self._shifted(c, i, h)
-                return np.array([self._value(u, v, moved), *self._slopes(u, v, moved)])
-
-            out[:, i] = central_difference(law, step_of(value))
+            out[:, i] = shift_derivative(law, c, i, step_of(value))
         return out[0], out[1], out[2]
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; by differences."""
         out = np.zeros((len(c), len(c), len(u)))
         for i, value in enumerate(c):
-
-            def law(h: float, i: int = i) -> Array:
-                return self.coefficient_tangent(u, v, self._shifted(c, i, h))[0]
-
-            out[i] = central_difference(law, step_of(value))
+            out[i] = shift_derivative(lambda c: self.coefficient_tangent(u, v, c)[0], c, i, step_of(value))
         return 0.5 * (out + out.transpose(1, 0, 2))

@@ -38,7 +38,7 @@ class CoupledElement(BaseElement):
         self,
         dof: Dof | None = None,
         inputs: Sequence[Dof | ArrayLike] = (),
-        coefficients: Sequence[float | str | Coefficient] = (),
+        coefficients: Sequence[float | str | Coefficient | None] = (),
         *,
         direction: ArrayLike | None = None,
     ) -> None:

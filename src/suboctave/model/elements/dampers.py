@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
-from suboctave.model.elements.base import Array, Dof, Element, required
+from suboctave.model.elements.base import Array, Dof, Element
 from suboctave.model.elements.batch_form import BatchForm, QuadraticForm, TanhForm
 from suboctave.model.elements.smoothness import CornerSampling, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient
@@ -20,7 +20,19 @@ __all__ = ["QuadraticDamper", "TanhFriction"]
 Number = float | str | Coefficient
 
 
-class QuadraticDamper(Element):
+class _Damper(Element):
+    """A force of the velocity alone, integrated at nodes of its own; its first coefficient is its size."""
+
+    depends_on_velocity = True
+    own_nodes = True
+
+    def check(self, values: Mapping[str, float], first: bool) -> None:
+        """Say when a system is made that it is driven instead of damped."""
+        if first and self.coefficients[0].value(values) < 0.0:
+            warn_of_negative(f"{self.label} feeds energy into motions")
+
+
+class QuadraticDamper(_Damper):
     """`f = coefficient * v |v|`: drag of a fluid, turbulent orifice. Unit: force / velocity^2.
 
     Dissipates `8/3 coefficient omega^2 a^3` per cycle of a motion `a cos(omega t)`. Exact: its corner at v = 0 lies
@@ -28,19 +40,11 @@ class QuadraticDamper(Element):
     """
 
     coefficient_names = ("coefficient",)
-    depends_on_velocity = True
-    own_nodes = True
 
     def __init__(
         self, dof: Dof | None = None, coefficient: Number | None = None, *, direction: ArrayLike | None = None
     ) -> None:
-        required("QuadraticDamper", coefficient=coefficient)
-        super().__init__(dof, [coefficient], direction=direction)  # type: ignore[list-item]
-
-    def check(self, values: Mapping[str, float], first: bool) -> None:
-        """Say when a system is made that it is driven instead of damped."""
-        if first and self.coefficients[0].value(values) < 0.0:
-            warn_of_negative(f"{self.label} feeds energy into motions")
+        super().__init__(dof, [coefficient], direction=direction)
 
     def batch_form(self, c: Array) -> BatchForm:
         """See `BaseElement.batch_form`."""
@@ -79,7 +83,7 @@ class QuadraticDamper(Element):
 _SLOWEST = 1e-100
 
 
-class TanhFriction(Element):
+class TanhFriction(_Damper):
     """`f = force * tanh(v / velocity)`: dry friction, smoothed over the velocity given. Units: force, velocity.
 
     There is no sticking: what would stick creeps with a velocity below `velocity`. The smaller that is, the closer to
@@ -87,8 +91,6 @@ class TanhFriction(Element):
     """
 
     coefficient_names = ("force", "velocity")
-    depends_on_velocity = True
-    own_nodes = True
 
     def __init__(
         self,
@@ -98,15 +100,13 @@ class TanhFriction(Element):
         *,
         direction: ArrayLike | None = None,
     ) -> None:
-        required("TanhFriction", force=force, velocity=velocity)
-        super().__init__(dof, [force, velocity], direction=direction)  # type: ignore[list-item]
+        super().__init__(dof, [force, velocity], direction=direction)
         if self.coefficients[1].constant:
             self._check_velocity(self.coefficients[1].value({}))
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
         """Refuse a velocity that is not positive; say when a system is made that friction drives."""
-        if first and self.coefficients[0].value(values) < 0.0:
-            warn_of_negative(f"{self.label} feeds energy into motions")
+        super().check(values, first)
         self._check_velocity(self.coefficients[1].value(values))
 
     def _check_velocity(self, v: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, check_numbers, shortened
-from suboctave.model.differences import STEP, central_difference, step_of
+from suboctave.model.differences import STEP, central_difference, shifted, step_of
 from suboctave.model.elements.base import Array, BaseElement, Element
 from suboctave.model.elements.coupled import CoupledElement, as_coupled
 from suboctave.model.elements.smoothness import (
@@ -216,10 +216,10 @@ def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
         errors[name] = max(errors.get(name, 0.0), 0.0 if error <= noise else error / largest)
 
     def moved(tensor: Tensor, i: int, pick: tuple[int, ...]) -> Callable[[float], Array]:
-        return lambda h: np.asarray(tensor(_shifted(q, i, h), c)[pick])
+        return lambda h: np.asarray(tensor(shifted(q, i, h), c)[pick])
 
     def changed(tensor: Tensor, k: int, pick: tuple[int, ...]) -> Callable[[float], Array]:
-        return lambda h: np.asarray(tensor(q, _shifted(c, k, h))[pick])
+        return lambda h: np.asarray(tensor(q, shifted(c, k, h))[pick])
 
     tensors: list[Tensor] = [
         lambda q, c: law.tangent(q, theta, c)[0],
@@ -251,12 +251,6 @@ def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
         f, again = (law.tangent(q, phase, c)[0] for phase in (theta, theta + 2.0 * np.pi))
         errors["period"] = float(np.max(np.abs(again - f))) / (float(np.max(np.abs(f))) or 1.0)
     return errors
-
-
-def _shifted(values: Array, i: int, h: float) -> Array:
-    moved = values.copy()
-    moved[i] += h
-    return moved
 
 
 def _smoothness_errors(element: BaseElement, at: _Places, c: Array) -> dict[str, float]:

@@ -16,7 +16,6 @@ __all__ = [
     "Piece",
     "PiecewiseLinear",
     "PolynomialSampling",
-    "RoundedPiece",
     "Sampling",
     "SharpSampling",
     "SharpVelocitySampling",
@@ -43,18 +42,6 @@ class PolynomialSampling:
 
 
 @dataclass(frozen=True)
-class RoundedPiece:
-    """An elastic stop rounded by an arctan step (`rounding`): indices of its stiffness, gap and sharpness among the
-    element's coefficients, and its side.
-    """
-
-    stiffness: int
-    gap: int
-    sharpness: int
-    side: int
-
-
-@dataclass(frozen=True)
 class SharpSampling:
     """Analytic on the real axis, with complex singularities at `u = points[i] +- 1j * widths[i]` (unit: length).
 
@@ -66,9 +53,6 @@ class SharpSampling:
 
     constant
         Unit: force; `slope` and `steps` are stiffnesses.
-    rounded
-        The rounded stops whose steps these are, if the whole law is a sum of them: it is then followed along a
-        parameter without asking the element.
     """
 
     points: tuple[float, ...]
@@ -76,13 +60,10 @@ class SharpSampling:
     constant: float = 0.0
     slope: float = 0.0
     steps: tuple[float, ...] | None = None
-    rounded: tuple[RoundedPiece, ...] | None = None
 
     def __post_init__(self) -> None:
         if len(self.points) != len(self.widths) or len(self.steps or self.points) != len(self.points):
             raise InputError("a sharp law has as many widths (and steps, if it tells them) as points")
-        if self.rounded is not None and len(self.rounded) != len(self.steps or ()):
-            raise InputError("a sharp law that is a sum of rounded stops tells the step of every one of them")
 
 
 @dataclass(frozen=True)

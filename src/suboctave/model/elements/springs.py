@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -30,7 +31,7 @@ class PolynomialSpring(Element):
     def __init__(
         self,
         dof: Dof | None = None,
-        coefficients: Mapping[int, Number] | Sequence[Number] | None = None,
+        coefficients: Mapping[int, Number | None] | Sequence[Number] | None = None,
         *,
         direction: ArrayLike | None = None,
     ) -> None:
@@ -49,30 +50,25 @@ class PolynomialSpring(Element):
             factors[power] = float(factor)
         return PolynomialSampling(max(self.powers), tuple(factors))
 
+    def _derivative(self, order: int, u: Array, c: Array) -> Array:
+        """The derivative of this order by u."""
+        out = np.zeros_like(u)
+        for power, factor in zip(self.powers, c, strict=True):
+            if power >= order:
+                out += factor * math.perm(power, order) * _power(u, power - order)
+        return out
+
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.tangent`."""
-        f, f_u = np.zeros_like(u), np.zeros_like(u)
-        for power, factor in zip(self.powers, c, strict=True):
-            lower = _power(u, power - 1)
-            f += factor * lower * u
-            f_u += factor * power * lower
-        return f, f_u, None
+        return self._derivative(0, u, c), self._derivative(1, u, c), None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
         """See `Element.curvature`."""
-        f_uu = np.zeros_like(u)
-        for power, factor in zip(self.powers, c, strict=True):
-            if power > 1:
-                f_uu += factor * power * (power - 1) * _power(u, power - 2)
-        return f_uu, None, None
+        return self._derivative(2, u, c), None, None
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
         """See `Element.third`."""
-        f_uuu = np.zeros_like(u)
-        for power, factor in zip(self.powers, c, strict=True):
-            if power > 2:
-                f_uuu += factor * power * (power - 1) * (power - 2) * _power(u, power - 3)
-        return f_uuu, None, None, None
+        return self._derivative(3, u, c), None, None, None
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`."""
@@ -93,8 +89,7 @@ class CubicSpring(PolynomialSpring):
     def __init__(
         self, dof: Dof | None = None, coefficient: Number | None = None, *, direction: ArrayLike | None = None
     ) -> None:
-        required("CubicSpring", coefficient=coefficient)
-        super().__init__(dof, {3: coefficient}, direction=direction)  # type: ignore[dict-item]
+        super().__init__(dof, {3: coefficient}, direction=direction)
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.tangent`."""
@@ -108,7 +103,7 @@ def _power(u: Array, power: int) -> Array:
     return u**power
 
 
-def _read(kind: str, coefficients: Any) -> tuple[tuple[int, ...], list[Number]]:
+def _read(kind: str, coefficients: Any) -> tuple[tuple[int, ...], list[Number | None]]:
     """Powers in increasing order with their factors; factors that are the number zero are left out."""
     if isinstance(coefficients, Mapping):
         terms = list(coefficients.items())
@@ -116,7 +111,7 @@ def _read(kind: str, coefficients: Any) -> tuple[tuple[int, ...], list[Number]]:
         terms = list(enumerate(coefficients, start=1))
     else:
         raise InputError(f"{kind}: coefficients must be {{power: coefficient}} or a list, not {coefficients!r}")
-    read: dict[int, Number] = {}
+    read: dict[int, Number | None] = {}
     for power, factor in terms:
         try:
             index = operator.index(power)
