@@ -27,7 +27,7 @@ from suboctave.experiments.common import (
     starting_states,
     varied_grid,
 )
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
@@ -65,6 +65,12 @@ class BruteForceDiagram(TimeResult):
         False where an interruption (Ctrl-C) left values out.
     """
 
+    layout = Layout(
+        "brute force",
+        {"starts": ("start",), "values": ("value",), "largest": ("start", "value", "section", "dof")},
+        {"name": str, "transient": int, "tolerance": float, "method": str, "observed": int, "complete": bool},
+        {"starts": "start", "values": "value", "name": "varied"},
+    )
     name: str
     values: Array
     starts: tuple[str, ...]
@@ -110,32 +116,15 @@ class BruteForceDiagram(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Points on (start, value, section, dof), periods and amplitudes on (start, value)."""
-        n = self.system.n
-        axes = ("start", "value", "section", "dof")
-        return self._dataset(
-            self.system,
-            "brute force",
-            {
-                "displacement": (axes, self.points[..., :n]),
-                "velocity": (axes, self.points[..., n:]),
-                "largest": (axes, self.largest),
-                "period": (axes[:2], self.period),
-                "amplitude": (axes[:2], self.amplitude),
-            },
-            {
-                "start": list(self.starts),
-                "value": self.values,
-                "dof": list(self.system.dof_names or range(n)),
-            },
-            varied=self.name,
-            **({} if self.omega is None else {"omega": self.omega}),
-            transient=self.transient,
-            tolerance=self.tolerance,
-            method=self.method,
-            observed=self.observed,
-            dofs=n,
-            complete=int(self.complete),
-        )
+        n, axes = self.system.n, ("start", "value", "section", "dof")
+        variables = {
+            "displacement": (axes, self.points[..., :n]),
+            "velocity": (axes, self.points[..., n:]),
+            "period": (axes[:2], self.period),
+            "amplitude": (axes[:2], self.amplitude),
+        }
+        attributes: dict[str, Any] = {} if self.omega is None else {"omega": self.omega}
+        return self._dataset(variables, attributes=attributes)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per value and start: what was varied, start, period, amplitude, defect of the repetition."""

@@ -8,7 +8,7 @@ computed again when it is needed. docs/results.md describes the variables.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +44,7 @@ def _read(kind: _Kind, groups: Datasets, allow_code: bool, linear: Any) -> TimeR
     try:
         record = from_json(str(dataset["record"].item()), _CLASSES)
         system = build(record["system"], system_arrays(dataset), allow_code)
-        result: TimeResult = kind.made(**kind.read(_Read(dataset, record, system)), system=system)
+        result: TimeResult = kind.made(**kind.arguments(_Read(dataset, record, system)), system=system)
         result.seconds = float(record["seconds"])
     except InputError:  # which is a ValueError
         raise
@@ -90,91 +90,41 @@ class _Read:
         """The values of parameters by name."""
         return dict(zip(self.texts("parameter"), self["parameters"].tolist(), strict=True))
 
-    def attributes(self, **kinds: type) -> dict[str, Any]:
-        """Attributes by name, each of its kind."""
-        return {name: kind(self.dataset.attrs[name]) for name, kind in kinds.items()}
-
-    def arrays(self, *names: str) -> dict[str, Any]:
-        """Variables by name."""
-        return {name: self[name] for name in names}
-
 
 @dataclass(frozen=True)
 class _Kind:
-    """What a dataset of these contents becomes: arguments but the system; and what the record holds besides."""
+    """A class of results: what is read besides its layout, and what the record holds."""
 
-    made: Any
-    read: Callable[[_Read], dict[str, Any]]
+    made: type[Any]
+    read: Callable[[_Read], dict[str, Any]] = lambda d: {}
     more: Callable[[Any], dict[str, Any]] = lambda item: {}
 
-
-def _trajectory(d: _Read) -> dict[str, Any]:
-    return {
-        **d.arrays("time", "displacement", "velocity", "largest"),
-        **d.attributes(omega=float, steps_per_period=int, method=str),
-        "parameters": d.parameters(),
-    }
+    def arguments(self, d: _Read) -> dict[str, Any]:
+        """Arguments of the class, but the system."""
+        layout, named = self.made.layout, {one.name for one in fields(self.made)}
+        given = {one: d[layout.names.get(one, one)] for one in layout.arrays}
+        given |= {one: kind(d.dataset.attrs[layout.names.get(one, one)]) for one, kind in layout.attributes.items()}
+        if "parameters" in named:
+            given["parameters"] = d.parameters()
+        return given | self.read(d)
 
 
 def _sections(d: _Read) -> dict[str, Any]:
     names, values = d.texts("parameter"), d["parameters"]
     return {
         "points": d.state(),
-        **d.arrays("largest", "omega", "failed", "finished"),
         "varied": {name: values[:, names.index(name)].copy() for name in d.record["varied"]},
-        **d.attributes(tolerance=float, transient=int, method=str, observed=int),
     }
 
 
 def _brute_force(d: _Read) -> dict[str, Any]:
     omega = d.dataset.attrs.get("omega")
-    return {
-        "name": str(d.dataset.attrs["varied"]),
-        "values": d["value"],
-        "starts": tuple(d.texts("start")),
-        "points": d.state(),
-        "omega": None if omega is None else float(omega),
-        **d.arrays("largest"),
-        **d.attributes(complete=bool, transient=int, tolerance=float, method=str, observed=int),
-    }
-
-
-def _stepped(d: _Read) -> dict[str, Any]:
-    return {
-        **d.arrays("omega", "response", "largest", "period", "ends", "tapped"),
-        "directions": tuple(d.texts("direction")),
-        "multiples": d["multiple"],
-        "components": d["component"],
-        **d.attributes(settle=int, measure=int, noise=float, observed=int, complete=bool),
-    }
-
-
-def _exponents(d: _Read) -> dict[str, Any]:
-    return {
-        **d.arrays("exponents", "standard_errors", "by_trajectory", "stretches", "running", "end"),
-        **d.attributes(omega=float, divergence=float, smooth=bool, transient=int, tolerance=float),
-        "parameters": d.parameters(),
-    }
-
-
-def _map(d: _Read) -> dict[str, Any]:
-    return {
-        "name": str(d.dataset.attrs["varied"]),
-        "values": d["value"],
-        **d.arrays("omega", "exponent", "standard_error"),
-        **d.attributes(complete=bool, periods=int, transient=int),
-    }
+    starts = tuple(d.texts("start"))
+    return {"starts": starts, "points": d.state(), "omega": None if omega is None else float(omega)}
 
 
 def _separation(d: _Read) -> dict[str, Any]:
-    return {
-        "rates": d["rate"],
-        "settings": np.stack([d["value"], d["offset"]], axis=1),
-        **d.arrays("time", "distance"),
-        **d.attributes(omega=float),
-        "parameters": d.parameters(),
-        "method": d.record["method"],
-    }
+    return {"settings": np.stack([d["value"], d["offset"]], axis=1), "method": d.record["method"]}
 
 
 def _basins(d: _Read) -> dict[str, Any]:
@@ -187,14 +137,8 @@ def _basins(d: _Read) -> dict[str, Any]:
         )
         for i, name in enumerate(d.texts("attractor"))
     ]  # fmt: skip
-    return {
-        **d.arrays("x", "y", "settling", "rest"),
-        "labels": d["label"],
-        "attractors": known,
-        "plane": (str(d.dataset.attrs["plane_x"]), str(d.dataset.attrs["plane_y"])),
-        "parameters": d.parameters(),
-        **d.attributes(omega=float, followed=int, contradicted=int, complete=bool, observed=int),
-    }
+    plane = (str(d.dataset.attrs["plane_x"]), str(d.dataset.attrs["plane_y"]))
+    return {"attractors": known, "plane": plane}
 
 
 def _of_basins(item: Basins) -> dict[str, Any]:
@@ -206,16 +150,14 @@ def _of_basins(item: Basins) -> dict[str, Any]:
     }
 
 
-#: by what the attribute `contents` says
-_KINDS: dict[str, _Kind] = {
-    "trajectory": _Kind(Trajectory, _trajectory),
-    "poincare sections": _Kind(PoincareSections, _sections, lambda item: {"varied": list(item.varied)}),
-    "brute force": _Kind(BruteForceDiagram, _brute_force),
-    "stepped sine": _Kind(SteppedSine, _stepped),
-    "lyapunov exponents": _Kind(LyapunovExponents, _exponents),
-    "lyapunov map": _Kind(LyapunovMap, _map),
-    "separation": _Kind(Separation, _separation, lambda item: {"method": item.method}),
-    "basins": _Kind(Basins, _basins, _of_basins),
-}
-for _name, _kind in _KINDS.items():
-    register(Codec(_name, _kind.made, partial(_written, _kind), partial(_read, _kind)))
+for _kind in (
+    _Kind(Trajectory),
+    _Kind(PoincareSections, _sections, lambda item: {"varied": list(item.varied)}),
+    _Kind(BruteForceDiagram, _brute_force),
+    _Kind(SteppedSine, lambda d: {"directions": tuple(d.texts("direction"))}),
+    _Kind(LyapunovExponents),
+    _Kind(LyapunovMap),
+    _Kind(Separation, _separation, lambda item: {"method": item.method}),
+    _Kind(Basins, _basins, _of_basins),
+):
+    register(Codec(_kind.made.layout.contents, _kind.made, partial(_written, _kind), partial(_read, _kind)))

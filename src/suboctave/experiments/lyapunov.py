@@ -22,7 +22,7 @@ import numpy as np
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.attractors import state_sizes
 from suboctave.experiments.common import ParallelOptions, check_continuous, period_count, start_state
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.experiments.two_trajectories import Separation, TwoTrajectories, separate
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
@@ -70,6 +70,18 @@ class LyapunovExponents(TimeResult):
         Whether smooth weights gave the smaller standard errors.
     """
 
+    layout = Layout(
+        "lyapunov exponents",
+        {
+            "exponents": ("exponent",),
+            "standard_errors": ("exponent",),
+            "by_trajectory": ("trajectory", "exponent"),
+            "stretches": ("stretch", "exponent"),
+            "running": ("period", "exponent"),
+            "end": ("state",),
+        },
+        {"omega": float, "divergence": float, "smooth": bool, "transient": int, "tolerance": float},
+    )
     exponents: Array
     standard_errors: Array
     divergence: float
@@ -124,25 +136,7 @@ class LyapunovExponents(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Exponents with their errors, what trajectories and stretches give, the running averages."""
-        return self._dataset(
-            self.system,
-            "lyapunov exponents",
-            {
-                "exponents": (("exponent",), self.exponents),
-                "standard_errors": (("exponent",), self.standard_errors),
-                "by_trajectory": (("trajectory", "exponent"), self.by_trajectory),
-                "stretches": (("stretch", "exponent"), self.stretches),
-                "running": (("period", "exponent"), self.running),
-                "end": (("state",), self.end),
-            },
-            {"period": np.arange(1, len(self.running) + 1)},
-            omega=self.omega,
-            divergence=self.divergence,
-            smooth=int(self.smooth),
-            transient=self.transient,
-            tolerance=self.tolerance,
-            dofs=self.system.n,
-        )
+        return self._dataset(coordinates={"period": np.arange(1, len(self.running) + 1)})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row for each exponent."""

@@ -19,7 +19,7 @@ from suboctave.experiments.common import (
     varied_grid,
 )
 from suboctave.experiments.lyapunov import smooth_weights
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_parameter, read_values
 from suboctave.model.system import System
@@ -70,6 +70,17 @@ class LyapunovMap(TimeResult):
         False where an interruption (Ctrl-C) left points out.
     """
 
+    layout = Layout(
+        "lyapunov map",
+        {
+            "values": ("value",),
+            "omega": ("omega",),
+            "exponent": ("value", "omega"),
+            "standard_error": ("value", "omega"),
+        },
+        {"name": str, "periods": int, "transient": int, "complete": bool},
+        {"values": "value", "name": "varied"},
+    )
     name: str
     omega: Array
     values: Array
@@ -89,21 +100,7 @@ class LyapunovMap(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Exponent, its standard error and what counts as chaos on (value, omega)."""
-        axes = ("value", "omega")
-        return self._dataset(
-            self.system,
-            "lyapunov map",
-            {
-                "exponent": (axes, self.exponent),
-                "standard_error": (axes, self.standard_error),
-                "chaotic": (axes, self.chaotic),
-            },
-            {"value": self.values, "omega": self.omega},
-            varied=self.name,
-            periods=self.periods,
-            transient=self.transient,
-            complete=int(self.complete),
-        )
+        return self._dataset({"chaotic": (("value", "omega"), self.chaotic)})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per point: frequency, value, exponent, its standard error, whether it counts as chaos."""

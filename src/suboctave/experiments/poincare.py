@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.errors import InputError
 from suboctave.experiments.attractors import Attractor, attractor_of, distinct
 from suboctave.experiments.common import SectionOptions, checked_integration, period_count, start_state
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
 from suboctave.model.timed import timed
@@ -51,6 +51,16 @@ class PoincareSections(TimeResult):
         Relative tolerance of the recognition of periods.
     """
 
+    layout = Layout(
+        "poincare sections",
+        {
+            "largest": ("trajectory", "section", "dof"),
+            "omega": ("trajectory",),
+            "failed": ("trajectory",),
+            "finished": ("trajectory",),
+        },
+        {"transient": int, "method": str, "tolerance": float, "observed": int},
+    )
     points: Array
     largest: Array
     omega: Array
@@ -104,35 +114,16 @@ class PoincareSections(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Points on (trajectory, section, dof), periods, and what produced them."""
-        n = self.system.n
-        names: Any = self.system.dof_names or range(n)
-        axes = ("trajectory", "section", "dof")
-        return self._dataset(
-            self.system,
-            "poincare sections",
-            {
-                "displacement": (axes, self.points[:, :, :n]),
-                "velocity": (axes, self.points[:, :, n:]),
-                "largest": (axes, self.largest),
-                "omega": (axes[:1], self.omega),
-                "period": (axes[:1], self.periods),
-                "failed": (axes[:1], self.failed),
-                "finished": (axes[:1], self.finished),
-                "parameters": (("trajectory", "parameter"), self._parameters()),
-            },
-            {"dof": list(names)},
-            varied="\n".join(self.varied),
-            transient=self.transient,
-            method=self.method,
-            tolerance=self.tolerance,
-            observed=self.observed,
-            dofs=n,
-        )
-
-    def _parameters(self) -> Array:
-        """(B, parameters): the values of all of them."""
-        columns = [self.varied.get(name, np.full(len(self), value)) for name, value in self.system.parameters.items()]
-        return np.array(columns, dtype=float).reshape(-1, len(self)).T
+        n, axes = self.system.n, ("trajectory", "section", "dof")
+        columns = [self.varied.get(name, np.full(len(self), v)) for name, v in self.system.parameters.items()]
+        parameters = np.array(columns, dtype=float).reshape(-1, len(self)).T
+        variables = {
+            "displacement": (axes, self.points[:, :, :n]),
+            "velocity": (axes, self.points[:, :, n:]),
+            "period": (axes[:1], self.periods),
+            "parameters": (("trajectory", "parameter"), parameters),
+        }
+        return self._dataset(variables, attributes={"varied": "\n".join(self.varied)})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per point: trajectory, what varies, number of the period, state, period of the motion."""

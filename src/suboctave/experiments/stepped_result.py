@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.common import ComplexArray, observed_dof
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
 
@@ -52,6 +52,22 @@ class SteppedSine(TimeResult):
         False where an interruption (Ctrl-C) left steps out.
     """
 
+    layout = Layout(
+        "stepped sine",
+        {
+            "directions": ("direction",),
+            "omega": ("omega",),
+            "multiples": ("multiple",),
+            "components": ("direction", "omega", "multiple", "dof"),
+            "response": ("direction", "omega", "dof"),
+            "largest": ("direction", "omega", "dof"),
+            "period": ("direction", "omega"),
+            "ends": ("direction", "omega", "state"),
+            "tapped": ("direction",),
+        },
+        {"settle": int, "measure": int, "noise": float, "observed": int, "complete": bool},
+        {"directions": "direction", "multiples": "multiple", "components": "component"},
+    )
     omega: Array
     directions: tuple[str, ...]
     multiples: Array
@@ -113,33 +129,7 @@ class SteppedSine(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Components on (direction, omega, multiple, dof), real and imaginary parts apart, and what produced them."""
-        axes = ("direction", "omega")
-        return self._dataset(
-            self.system,
-            "stepped sine",
-            {
-                "response_real": ((*axes, "dof"), self.response.real),
-                "response_imag": ((*axes, "dof"), self.response.imag),
-                "component_real": ((*axes, "multiple", "dof"), self.components.real),
-                "component_imag": ((*axes, "multiple", "dof"), self.components.imag),
-                "largest": ((*axes, "dof"), self.largest),
-                "period": (axes, self.period),
-                "ends": ((*axes, "state"), self.ends),
-                "tapped": (axes[:1], self.tapped),
-            },
-            {
-                "direction": list(self.directions),
-                "omega": self.omega,
-                "multiple": self.multiples,
-                "dof": list(self.system.dof_names or range(self.system.n)),
-            },
-            settle=self.settle,
-            measure=self.measure,
-            noise=self.noise,
-            observed=self.observed,
-            dofs=self.system.n,
-            complete=int(self.complete),
-        )
+        return self._dataset()
 
     def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
         """Draw the measured fundamentals, over branches and beside data of a rig if any are given; saved to a path.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from suboctave.interruption import Interruption
 from suboctave.model.system import System
+from suboctave.store.arrays import flat
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table, write_csv
 from suboctave.version import __version__
@@ -17,7 +19,20 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["TimeResult"]
+__all__ = ["Layout", "TimeResult"]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What of a result is written as it is: arrays with their axes, and attributes with their kinds.
+
+    An array on the one axis of its own name is the coordinate there. `names`: variables that are not called as here.
+    """
+
+    contents: str
+    arrays: Mapping[str, tuple[str, ...]]
+    attributes: Mapping[str, type]
+    names: Mapping[str, str] = field(default_factory=dict)
 
 
 class TimeResult(Stored, ABC):
@@ -26,6 +41,8 @@ class TimeResult(Stored, ABC):
     `interruption`: what stopped it before its end, Ctrl-C or a time limit (`seconds`); None if nothing did.
     """
 
+    layout: ClassVar[Layout]
+    system: System
     interruption: Interruption | None = None
 
     @abstractmethod
@@ -50,20 +67,26 @@ class TimeResult(Stored, ABC):
 
     def _dataset(
         self,
-        system: System,
-        contents: str,
-        variables: Mapping[str, Any],
-        coordinates: Mapping[str, Any],
-        **attributes: Any,
+        variables: Mapping[str, Any] | None = None,
+        coordinates: Mapping[str, Any] | None = None,
+        attributes: Mapping[str, Any] | None = None,
     ) -> xarray.Dataset:
-        """A dataset of these contents, with the parameters' values and what produced it."""
+        """A dataset of everything in the layout, of what is given besides, and of what produced it."""
         import numpy as np
         import xarray
 
+        layout, system = self.layout, self.system
         values = getattr(self, "parameters", system.parameters)
-        parameters = (("parameter",), np.array(list(values.values()), dtype=float))
-        return xarray.Dataset(
-            {"parameters": parameters, **variables},
-            coords={**coordinates, "parameter": list(values)},
-            attrs={"contents": contents, **attributes, "system": system.name, "suboctave": __version__},
+        arrays = {layout.names.get(one, one): (axes, getattr(self, one)) for one, axes in layout.arrays.items()}
+        arrays |= {"parameters": (("parameter",), np.array(list(values.values()), dtype=float)), **(variables or {})}
+        own = {layout.names.get(one, one): getattr(self, one) for one in layout.attributes}
+        plain = {name: int(value) if isinstance(value, bool) else value for name, value in own.items()}
+        produced = {"dofs": system.n, "system": system.name, "suboctave": __version__}
+        dataset = xarray.Dataset(
+            dict(flat(arrays)),
+            coords={**(coordinates or {}), "parameter": list(values)},
+            attrs={"contents": layout.contents, **plain, **(attributes or {}), **produced},
         )
+        if "dof" in dataset.dims:
+            dataset = dataset.assign_coords(dof=list(system.dof_names or range(system.n)))
+        return dataset

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from suboctave.experiments.common import FEW, period_count, start_state, steps_of
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_omega, read_values
@@ -48,6 +48,11 @@ class Trajectory(TimeResult):
         How long it took.
     """
 
+    layout = Layout(
+        "trajectory",
+        {"time": ("time",), "displacement": ("time", "dof"), "velocity": ("time", "dof"), "largest": ("dof",)},
+        {"omega": float, "method": str, "steps_per_period": int},
+    )
     time: Array
     displacement: Array
     velocity: Array
@@ -77,22 +82,7 @@ class Trajectory(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Displacement and velocity on (time, dof), and what produced them."""
-        names: Any = self.system.dof_names or range(self.system.n)
-        return self._dataset(
-            self.system,
-            "trajectory",
-            {
-                "displacement": (("time", "dof"), self.displacement),
-                "velocity": (("time", "dof"), self.velocity),
-                "largest": (("dof",), self.largest),
-            },
-            {"time": self.time, "dof": list(names)},
-            omega=self.omega,
-            method=self.method,
-            steps_per_period=self.steps_per_period,
-            dofs=self.system.n,
-            observed=self.system.observed_dof,
-        )
+        return self._dataset(attributes={"observed": self.system.observed_dof})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per sample: time, displacements, velocities."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
@@ -98,6 +98,12 @@ class Separation(TimeResult):
         (P + 1,) and (S, P + 1): the distance at phase 0 of the load, displacements by omega times their value.
     """
 
+    layout = Layout(
+        "separation",
+        {"time": ("time",), "rates": ("setting",), "distance": ("setting", "time")},
+        {"omega": float},
+        {"rates": "rate"},
+    )
     rates: Array
     settings: Array
     time: Array
@@ -122,22 +128,14 @@ class Separation(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Rates and settings, distances over time."""
-        return self._dataset(
-            self.system,
-            "separation",
-            {
-                "rate": (("setting",), self.rates),
-                "value": (("setting",), self.settings[:, 0]),
-                "offset": (("setting",), self.settings[:, 1]),
-                "distance": (("setting", "time"), self.distance),
-            },
-            {"time": self.time},
-            omega=self.omega,
-            exponent=self.exponent,
-            spread=self.spread,
-            integrator=self.method.integrator,
-            saturation=self.method.saturation,
-        )
+        variables = {"value": (("setting",), self.settings[:, 0]), "offset": (("setting",), self.settings[:, 1])}
+        attributes = {
+            "exponent": self.exponent,
+            "spread": self.spread,
+            "integrator": self.method.integrator,
+            "saturation": self.method.saturation,
+        }
+        return self._dataset(variables, attributes=attributes)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per setting: steps per period or tolerance, offset, exponent."""

@@ -13,7 +13,7 @@ from suboctave.errors import InputError, suggest
 from suboctave.experiments.basins.attractors import BasinAttractor, Catalogue, read_attractors
 from suboctave.experiments.basins.run import APERIODIC, GONE, OPEN, BasinRun
 from suboctave.experiments.common import BasinOptions, checked_integration, start_state
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_omega, check_range, read_values
@@ -53,6 +53,12 @@ class Basins(TimeResult):
         end where they were said to.
     """
 
+    layout = Layout(
+        "basins",
+        {"x": ("x",), "y": ("y",), "labels": ("y", "x"), "settling": ("y", "x"), "rest": ("state",)},
+        {"omega": float, "complete": bool, "followed": int, "contradicted": int, "observed": int},
+        {"labels": "label"},
+    )
     x: Array
     y: Array
     labels: NDArray[np.int_]
@@ -115,38 +121,22 @@ class Basins(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Labels and settling times on (y, x), and the attractors."""
-        known = self.attractors
-        multipliers = padded([one.multipliers for one in known], complex)
+        known, one = self.attractors, ("attractor",)
         points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
         shares, errors, grid = self.shares, self.standard_errors, self.grid_errors
-        return self._dataset(
-            self.system,
-            "basins",
-            {
-                "label": (("y", "x"), self.labels),
-                "settling": (("y", "x"), self.settling),
-                "period": (("attractor",), np.array([one.period for one in known], dtype=int)),
-                "amplitude": (("attractor",), np.array([one.amplitude for one in known])),
-                "given": (("attractor",), np.array([one.given for one in known], dtype=bool)),
-                "multipliers_real": (("attractor", "multiplier"), multipliers.real),
-                "multipliers_imag": (("attractor", "multiplier"), multipliers.imag),
-                "points": (("section", "state"), points),
-                "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
-                "share": (("kind",), np.array([shares[name] for name in shares])),
-                "standard_error": (("kind",), np.array([errors[name] for name in shares])),
-                "grid_error": (("kind",), np.array([grid[name] for name in shares])),
-                "rest": (("state",), self.rest),
-            },
-            {"x": self.x, "y": self.y, "attractor": [one.name for one in known], "kind": list(shares)},
-            plane_x=self.plane[0],
-            plane_y=self.plane[1],
-            omega=self.omega,
-            complete=int(self.complete),
-            followed=self.followed,
-            contradicted=self.contradicted,
-            observed=self.observed,
-            dofs=self.system.n,
-        )
+        variables = {
+            "period": (one, np.array([one.period for one in known], dtype=int)),
+            "amplitude": (one, np.array([one.amplitude for one in known])),
+            "given": (one, np.array([one.given for one in known], dtype=bool)),
+            "multipliers": (("attractor", "multiplier"), padded([one.multipliers for one in known], complex)),
+            "points": (("section", "state"), points),
+            "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
+            "share": (("kind",), np.array([shares[name] for name in shares])),
+            "standard_error": (("kind",), np.array([errors[name] for name in shares])),
+            "grid_error": (("kind",), np.array([grid[name] for name in shares])),
+        }
+        coordinates = {"attractor": [one.name for one in known], "kind": list(shares)}
+        return self._dataset(variables, coordinates, {"plane_x": self.plane[0], "plane_y": self.plane[1]})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row for each label that occurs: name, period, amplitude, share and its errors."""
