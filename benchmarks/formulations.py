@@ -14,8 +14,10 @@ are the shortest of 20. For "alcorta2019" also
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,10 +25,13 @@ from threadpoolctl import threadpool_limits
 
 import suboctave as so
 from suboctave.bifurcation.bordered import null_vectors
-from suboctave.curves.events.alcorta import PublishedDoubling, equations, jacobian, locate_published
-from suboctave.curves.events.extended import locate_extended
-from suboctave.curves.events.locate import Guess, locate_singular
+from suboctave.curves.events.alcorta import locate_doubling
+from suboctave.curves.events.locate import Guess, Singular, locate_singular
+from suboctave.curves.kinds.extended import ExtendedOperator
 from suboctave.harmonic.perturbation import Kind
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+from published import equations, jacobian, published_vector
 
 REPEATS, STEPS, AWAY = 20, 50, 5e-3
 #: positions by shooting
@@ -52,26 +57,27 @@ def timed(solve: Callable[[], Any]) -> tuple[Any, float]:
     return found, min(times)
 
 
-def singular_values(found: PublishedDoubling) -> tuple[float, float]:
+def singular_values(found: Singular) -> tuple[float, float]:
     """Smallest singular value of Eq. 20 at a solution, as it stands and with the phase condition."""
-    state, n = found.solved.state, found.solved.state.balance.dimension
-    matrix = jacobian(state, found.phi, found.q)
+    state, n = found.state, found.state.balance.dimension
+    phi, q, _ = published_vector(state)
+    matrix = jacobian(state, phi, q)
     scale = state.omega**2
     matrix[: 3 * n] /= scale
     phase = np.zeros((1, 3 * n + 1))
-    phase[0, n : 2 * n] = found.q
+    phase[0, n : 2 * n] = q
     printed, completed = (np.linalg.svd(m, compute_uv=False)[-1] for m in (matrix, np.vstack((matrix, phase))))
     return float(printed), float(completed)
 
 
-def plain(guess: Guess, found: PublishedDoubling, tolerance: float = 1e-8) -> str:
+def plain(guess: Guess, found: Singular, tolerance: float = 1e-8) -> str:
     """Steps of plain Newton iteration with Eq. 20 from the guess, or "never" and its smallest increment."""
     balance, n = guess.balance, guess.balance.dimension
-    x, omega, phi = guess.x.ravel().copy(), guess.omega, found.phi.copy()
+    x, omega, (phi, q, b) = guess.x.ravel().copy(), guess.omega, published_vector(found.state)
     least = np.inf
     for step in range(1, STEPS + 1):
         state = balance.at(x, omega)
-        change = np.linalg.solve(jacobian(state, phi, found.q), equations(state, phi, found.q, found.b))
+        change = np.linalg.solve(jacobian(state, phi, q), equations(state, phi, q, b))
         size = np.linalg.norm(np.concatenate((x, phi.real, phi.imag, [omega])))
         x, omega = x - change[:n], omega - float(change[-1])
         phi = phi - change[n : 2 * n] - 1j * change[2 * n : 3 * n]
@@ -84,14 +90,14 @@ def plain(guess: Guess, found: PublishedDoubling, tolerance: float = 1e-8) -> st
     return f"never ({least:.0e})"
 
 
-def misfit(found: PublishedDoubling) -> float:
+def misfit(found: Singular) -> float:
     """Relative distance of the two null vectors as functions of time, best complex factor."""
-    state = found.solved.state
+    state, (phi, _, _) = found.state, published_vector(found.state)
     half = null_vectors(state, Kind.HALF).right
     tau = np.linspace(0.0, 2.0 * np.pi, 512, endpoint=False)
     high = state.basis.harmonics
     k = np.arange(1, high + 1)[:, None]
-    phi = found.phi[0] + found.phi[1::2] @ np.cos(k * tau) + found.phi[2::2] @ np.sin(k * tau)
+    phi = phi[0] + phi[1::2] @ np.cos(k * tau) + phi[2::2] @ np.sin(k * tau)
     published = np.exp(0.5j * tau) * phi
     k = np.arange(high + 1)[:, None] + 0.5
     real = half[::2] @ np.cos(k * tau) + half[1::2] @ np.sin(k * tau)
@@ -105,13 +111,13 @@ def main() -> None:
     for law, regularization, harmonics, places in CASES:
         for omega in places:
             guess = start(regularization, harmonics, omega)
-            published = locate_published(guess)
+            published = locate_doubling(guess)
             bare, completed = singular_values(published)
             more = f"| {bare:.0e} | {completed:.2f} | {plain(guess, published)} | {misfit(published):.0e} |"
             for name, solve, extra in (
                 ("bordered", lambda g=guess: locate_singular(g, Kind.HALF), "| | | | |"),
-                ("extended", lambda g=guess: locate_extended(g, Kind.HALF), "| | | | |"),
-                ("alcorta2019", lambda g=guess: locate_published(g).solved, more),
+                ("extended", lambda g=guess: locate_singular(g, Kind.HALF, ExtendedOperator), "| | | | |"),
+                ("alcorta2019", lambda g=guess: locate_doubling(g), more),
             ):
                 found, ms = timed(solve)
                 at = found.state.omega

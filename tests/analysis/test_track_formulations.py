@@ -67,7 +67,8 @@ def test_derivatives_by_differences(kind):
     omega, names, kappa = 1.3, ("omega", "s"), 0.3
     state = balance.at(x, omega)
     if kind == "published":
-        augmentation, extra = PublishedDoubling.started(state, names), np.zeros(0)
+        own, extra = PublishedDoubling.started(state, names=names)
+        augmentation = own.at(state, extra, names).renewed()
     else:
         augmentation, extra = ExtendedOperator.started(state, kind, kappa)
         extra = extra + 0.01 * rng.standard_normal(len(extra))

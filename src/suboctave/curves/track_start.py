@@ -18,9 +18,8 @@ from suboctave.continuation.newton import correct, tangent
 from suboctave.continuation.point import make_point
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.discretisation import rule_of
-from suboctave.curves.events.formulation import BORDERED, Alcorta2019, ExtendedSystem, Formulation
+from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
-from suboctave.curves.kinds.extended import ExtendedOperator, PublishedDoubling
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
 from suboctave.curves.kinds.grazing import GrazingContactEquations
@@ -90,16 +89,10 @@ def _augmentation(
     if kind_of(item) == "BP":
         return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
     kind = _OPERATORS[kind_of(item)]
-    extra = np.zeros(0)
+    kappa = 0.0
     if kind is Kind.FREE:
         kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
-        extra = np.array([kappa])
-    kappa = float(extra.sum())
-    if isinstance(formulation, Alcorta2019) and kind is Kind.HALF:
-        return PublishedDoubling.started(state, names), extra
-    if isinstance(formulation, ExtendedSystem) or (isinstance(formulation, Alcorta2019) and kind is Kind.INTEGER):
-        return ExtendedOperator.started(state, kind, kappa)
-    return SingularOperator.of(state, kind, kappa), extra
+    return formulation.operator(kind).started(state, kind, kappa, names=names)
 
 
 def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
 """How bifurcations are solved for, as objects: `formulation=...` of the verbs.
 
-- `BorderedSystem()`, "bordered": the minimally augmented system `[R; g]` (`solve`), the default;
-- `ExtendedSystem()`, "extended": `[R; J phi; phi.phi - 1]` with the null vector among the unknowns (`extended`);
+- `BorderedSystem()`, "bordered": the minimally augmented system `[R; g]` (`locate`), the default;
+- `ExtendedSystem()`, "extended": `[R; J phi; phi.phi - 1]` with the null vector among the unknowns (`kinds.extended`);
 - `Alcorta2019()`, "alcorta2019": the published system for period doublings with its own test functions (`alcorta`), the
   extended one for limit points.
 
@@ -11,13 +11,14 @@ rounding, the third to what the harmonics left out make.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from dataclasses import dataclass
 from typing import ClassVar
 
 from suboctave.curves.events.alcorta import locate_doubling
-from suboctave.curves.events.extended import locate_extended
 from suboctave.curves.events.locate import Guess, Singular, locate_singular
+from suboctave.curves.kinds.extended import ExtendedOperator, PublishedDoubling
+from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.perturbation import Kind
 
@@ -40,9 +41,13 @@ class Formulation(ABC):
 
     name: ClassVar[str]
 
-    @abstractmethod
+    def operator(self, kind: Kind) -> type[SingularOperator]:
+        """The equations that single them out."""
+        return SingularOperator
+
     def locate(self, guess: Guess, kind: Kind) -> Singular:
         """Locate one from a guess; raises ConvergenceError."""
+        return locate_singular(guess, kind, self.operator(kind))
 
     @property
     def doubling_test(self) -> str | None:
@@ -56,20 +61,16 @@ class BorderedSystem(Formulation):
 
     name: ClassVar[str] = "bordered"
 
-    def locate(self, guess: Guess, kind: Kind) -> Singular:
-        """See `Formulation.locate`."""
-        return locate_singular(guess, kind)
-
 
 @dataclass(frozen=True)
 class ExtendedSystem(Formulation):
-    """The extended system `[R; J_kappa phi; phi^H phi - 1]`, solved with the factors of its small blocks."""
+    """The extended system `[R; J_kappa phi; phi^H phi - 1]`."""
 
     name: ClassVar[str] = "extended"
 
-    def locate(self, guess: Guess, kind: Kind) -> Singular:
-        """See `Formulation.locate`."""
-        return locate_extended(guess, kind)
+    def operator(self, kind: Kind) -> type[SingularOperator]:
+        """See `Formulation.operator`."""
+        return ExtendedOperator
 
 
 @dataclass(frozen=True)
@@ -94,11 +95,15 @@ class Alcorta2019(Formulation):
         if self.test not in DOUBLING_TESTS:
             raise InputError(f"unknown test function {self.test!r}{suggest(str(self.test), DOUBLING_TESTS)}")
 
+    def operator(self, kind: Kind) -> type[SingularOperator]:
+        """See `Formulation.operator`."""
+        if kind is Kind.HALF:
+            return PublishedDoubling
+        return ExtendedOperator if kind is Kind.INTEGER else SingularOperator
+
     def locate(self, guess: Guess, kind: Kind) -> Singular:
         """See `Formulation.locate`."""
-        if kind is Kind.HALF:
-            return locate_doubling(guess)
-        return locate_extended(guess, kind) if kind is Kind.INTEGER else locate_singular(guess, kind)
+        return locate_doubling(guess) if kind is Kind.HALF else super().locate(guess, kind)
 
     @property
     def doubling_test(self) -> str | None:

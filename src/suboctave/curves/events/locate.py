@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import NullVectors, null_vectors
+from suboctave.bifurcation.bordered import NullVectors
 from suboctave.continuation import kernels
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.curves.augmentation import Augmentation
@@ -61,6 +61,10 @@ class Guess:
     def parameter(self) -> float:
         """Value of the free parameter."""
         return self.omega if self.name == "omega" else self.values[self.name]
+
+    def parameter_at(self, state: BalanceState) -> float:
+        """The same at another motion."""
+        return state.omega if self.name == "omega" else state.values[self.name]
 
     def problem(self, augmentation: Augmentation = PLAIN, force: float = 0.0) -> MotionProblem:
         """The motions in the free parameter that an augmentation singles out; force: unit of its equations."""
@@ -130,22 +134,21 @@ def solve(guess: Guess, begin: BalanceState, augmentation: Augmentation, extra: 
     return evaluation, solved.iterations
 
 
-def locate_singular(guess: Guess, kind: Kind) -> Singular:
+def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] = SingularOperator) -> Singular:
     """Locate a motion at which J_kappa is singular, kappa = 0, w0/2, or free (starting from `guess.kappa`).
+
+    `operator`: the equations that say so.
 
     Raises
     ------
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
-    begin = guess.state()
-    extra = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(0)
-    vectors = guess.vectors
-    if vectors is None:
-        vectors = null_vectors(begin, kind, guess.kappa)
-    else:
+    begin, vectors = guess.state(), guess.vectors
+    if vectors is not None:
         vectors = vectors.resized(guess.balance.basis, guess.balance.size, kind)
-    found, iterations = solve(guess, begin, SingularOperator(kind, vectors, guess.omega**2), extra)
+    own, extra = operator.started(begin, kind, guess.kappa, vectors, (guess.name,))
+    found, iterations = solve(guess, begin, own, extra)
     equations = found.equations
     assert isinstance(equations, SingularEquations)
     return Singular(found.state, equations.bordered.vectors, equations.kappa, found.error, iterations)

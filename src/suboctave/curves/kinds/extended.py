@@ -40,11 +40,18 @@ class ExtendedOperator(SingularOperator):
     size: int = 1
 
     @classmethod
-    def started(cls, state: BalanceState, kind: Kind, kappa: float = 0.0) -> tuple[ExtendedOperator, Array]:
-        """The augmentation at a motion, and the start of its unknowns (kappa, phi)."""
-        vectors = null_vectors(state, kind, kappa)
-        own = cls(kind, vectors, state.omega**2, len(vectors.right), state.balance.size)
-        return own, own.packed(vectors.right, kappa)
+    def started(
+        cls,
+        state: BalanceState,
+        kind: Kind,
+        kappa: float = 0.0,
+        vectors: NullVectors | None = None,
+        names: tuple[str, ...] = ("omega",),
+    ) -> tuple[ExtendedOperator, Array]:
+        """See `SingularOperator.started`; the unknowns are (kappa, phi)."""
+        borders = null_vectors(state, kind, kappa) if vectors is None else vectors
+        own = cls(kind, borders, state.omega**2, len(borders.right), state.balance.size)
+        return own, own.packed(borders.right, kappa)
 
     @property
     def extras(self) -> int:
@@ -168,17 +175,24 @@ class ExtendedEquations(SingularEquations):
 # ---------------------------------------------------------------------------------------------------------- published
 @dataclass(frozen=True)
 class PublishedDoubling(SingularOperator):
-    """Where |N phi| is least along the response curve; `waves` border N, `turn` is c."""
+    """Where |N phi| is least along the response curve; `waves` border N, `turn` is c, None for that of the motion."""
 
     waves: NullVectors | None = None
-    turn: complex = 1.0 + 0.0j
+    turn: complex | None = None
 
     @classmethod
-    def started(cls, state: BalanceState, names: tuple[str, ...]) -> PublishedDoubling:
-        """The augmentation at a motion."""
+    def started(
+        cls,
+        state: BalanceState,
+        kind: Kind = Kind.HALF,
+        kappa: float = 0.0,
+        vectors: NullVectors | None = None,
+        names: tuple[str, ...] = ("omega",),
+    ) -> tuple[PublishedDoubling, Array]:
+        """See `SingularOperator.started`."""
         waves = null_vectors(state, Kind.FREE, 0.5 * state.rate)
-        own = cls(Kind.HALF, null_vectors(state, Kind.HALF), state.omega**2, waves)
-        return PublishedEquations(own, state, 0.0, names).renewed()
+        borders = null_vectors(state, Kind.HALF) if vectors is None else vectors
+        return cls(Kind.HALF, borders, state.omega**2, waves), np.zeros(0)
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> PublishedEquations:
         """See `Augmentation.at`."""
@@ -203,35 +217,44 @@ class PublishedEquations(SingularEquations):
         return bordered(self.state, Kind.FREE, self.of.waves, 0.5 * self.state.rate)
 
     @lazy
+    def turn(self) -> complex:
+        """c, of unit modulus."""
+        return _turn(self.published, self.names[0]) if self.of.turn is None else self.of.turn
+
+    @lazy
     def values(self) -> Array:
         """See `Equations.values`."""
-        return np.array([(self.of.turn.conjugate() * self.published.g).real / self.of.unit])
-
-    @staticmethod
-    def _slopes(border: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex]]:
-        """Derivatives of g by coefficients and names, kappa following omega."""
-        by_x, rates, by_kappa = border.gradient(tuple(dict.fromkeys(names)))
-        if "omega" in rates:
-            rates = {**rates, "omega": rates["omega"] + 0.5 * by_kappa / border.state.basis.nu}
-        return by_x, rates
+        return np.array([(self.turn.conjugate() * self.published.g).real / self.of.unit])
 
     @property
     def rows(self) -> Array:
         """See `Equations.rows`."""
-        by_x, rates = self._slopes(self.published, self.names)
+        by_x, rates = _slopes(self.published, self.names)
         whole = np.concatenate((by_x, [rates[name] for name in self.names]))
-        row: Array = (self.of.turn.conjugate() * whole).real / self.of.unit
+        row: Array = (self.turn.conjugate() * whole).real / self.of.unit
         return row[None, :]
 
     def renewed(self) -> PublishedDoubling:
         """See `Equations.renewed`."""
-        state, name = self.state, self.names[0]
-        waves = self.published.vectors
-        border = bordered(state, Kind.FREE, waves, 0.5 * state.rate)
-        by_x, rates = self._slopes(border, (name,))
-        along = np.linalg.solve(state.jacobian, -state.residual_by(name))
-        change = complex(by_x @ along) + rates[name]
-        if not abs(change) > 0.0:
-            raise ConvergenceError("the system does not tell where on the response curve to look")
-        turn = change / abs(change)
-        return replace(self.of, borders=self.bordered.vectors, unit=state.omega**2, waves=waves, turn=complex(turn))
+        state, waves = self.state, self.published.vectors
+        turn = _turn(bordered(state, Kind.FREE, waves, 0.5 * state.rate), self.names[0])
+        return replace(self.of, borders=self.bordered.vectors, unit=state.omega**2, waves=waves, turn=turn)
+
+
+def _slopes(border: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex]]:
+    """Derivatives of g of N by coefficients and names, kappa following omega."""
+    by_x, rates, by_kappa = border.gradient(tuple(dict.fromkeys(names)))
+    if "omega" in rates:
+        rates = {**rates, "omega": rates["omega"] + 0.5 * by_kappa / border.state.basis.nu}
+    return by_x, rates
+
+
+def _turn(border: Bordered, name: str) -> complex:
+    """The change of g along the response curve over a parameter, of unit modulus."""
+    state = border.state
+    by_x, rates = _slopes(border, (name,))
+    along = np.linalg.solve(state.jacobian, -state.residual_by(name))
+    change = complex(by_x @ along) + rates[name]
+    if not abs(change) > 0.0:
+        raise ConvergenceError("the system does not tell where on the response curve to look")
+    return complex(change / abs(change))

@@ -39,6 +39,21 @@ class SingularOperator(Augmentation):
         """With the null vectors at a motion."""
         return cls(kind, null_vectors(state, kind, kappa), state.omega**2)
 
+    @classmethod
+    def started(
+        cls,
+        state: BalanceState,
+        kind: Kind,
+        kappa: float = 0.0,
+        vectors: NullVectors | None = None,
+        names: tuple[str, ...] = ("omega",),
+    ) -> tuple[SingularOperator, Array]:
+        """The augmentation at a motion, with null vectors of its neighbourhood where they are known, and the start of
+        its unknowns; `names`: the free parameters.
+        """
+        borders = null_vectors(state, kind, kappa) if vectors is None else vectors
+        return cls(kind, borders, state.omega**2), np.array([kappa] if kind is Kind.FREE else [])
+
     @property
     def name(self) -> str:
         """Kind of bifurcation."""
