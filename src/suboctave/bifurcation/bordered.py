@@ -23,8 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.continuation import kernels
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import Factor, bordered as bordered_factor, length
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
@@ -102,7 +101,7 @@ def weighted_operator(state: BalanceState, kind: Kind, kappa: float) -> tuple[np
     """J_kappa with rows and columns weighted by 1/sqrt(mass), and these weights."""
     matrix = operator(state, kind, kappa)
     scale = state.balance.row_weights(matrix.shape[0])
-    return kernels.scaled_transposed(matrix, scale, scale, 0).T, scale
+    return matrix * scale[:, None] * scale, scale
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
@@ -163,8 +162,11 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
 def _factorised(state: BalanceState, kind: Kind, kappa: float, borders: NullVectors, scale: Array) -> Factor:
     """The bordered matrix with weights, borders in units of omega^2."""
     matrix = operator(state, kind, kappa)
-    left, right = borders.left, borders.right
-    return Factor.of(kernels.bordered_and_scaled(matrix, scale, left, right, state.omega**2).T, overwrite=True)
+    size, n = state.omega**2, len(matrix)
+    row = np.zeros(n + 1, dtype=matrix.dtype)
+    row[:n] = size * borders.right.conj()
+    left = (size * borders.left).astype(matrix.dtype)
+    return bordered_factor(matrix, scale, scale, left[:, None], row)
 
 
 def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from suboctave.continuation import kernels
+from suboctave.compiled import kernel
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,17 @@ def length(vector: Array) -> float:
     return math.sqrt(flat.dot(flat))
 
 
+def distance(u: Array, v: Array, weights: Array) -> float:
+    """`|weights (u - v)|`."""
+    return length(weights * (u - v))
+
+
+def cosine(a: Array, b: Array, weights: Array) -> float:
+    """Cosine of the angle between two vectors in scaled variables."""
+    a, b = weights * a, weights * b
+    return float(a.dot(b)) / math.sqrt(a.dot(a) * b.dot(b))
+
+
 @dataclass(eq=False, slots=True)
 class Factor:
     """LU factors of a square real or complex matrix (`lapack.?getrf`)."""
@@ -76,12 +87,13 @@ class Factor:
         """Sign of the determinant of a real matrix; 0 if singular."""
         if self.singular:
             return 0.0
-        return float(kernels.determinant_sign(self.lu, self.pivots))
+        return float(_determinant_sign(self.lu, self.pivots))
 
     @property
     def log_determinant(self) -> float:
         """Natural logarithm of the determinant's modulus."""
-        return float(kernels.log_modulus(self.lu))
+        with np.errstate(divide="ignore"):
+            return float(np.log(np.abs(self.lu.diagonal())).sum())
 
 
 class LeadingBlock:
@@ -116,3 +128,38 @@ class LeadingBlock:
         if self.corner is None:
             return whole
         return whole[: self.size] - self.columns[: self.size] @ self.corner.solve(whole[self.size :])
+
+
+def bordered(matrix: NDArray[Any], scale: Array, columns: Array, border: NDArray[Any], row: NDArray[Any]) -> Factor:
+    """LU factors of `[S A C, border; row]`, S and C the diagonal matrices of `scale` and `columns`; the border has as
+    many columns (m, k) as the matrix lacks.
+    """
+    return Factor.of(_bordered_transposed(matrix, scale, columns, border, row).T, overwrite=True)
+
+
+@kernel()
+def _bordered_transposed(matrix, scale, columns, border, row):
+    """The transpose, so that its own lies in memory as LAPACK wants it."""
+    m, n = matrix.shape
+    more = border.shape[1]
+    out = np.empty((n + more, m + 1), dtype=matrix.dtype)
+    for j in range(n):
+        for i in range(m):
+            out[j, i] = matrix[i, j] * (scale[i] * columns[j])
+    for j in range(more):
+        for i in range(m):
+            out[n + j, i] = border[i, j]
+    out[:, m] = row
+    return out
+
+
+@kernel()
+def _determinant_sign(lu, pivots):
+    """Sign of the determinant of a factorised matrix (`lapack.dgetrf`, pivots counted from 0)."""
+    sign = 1.0
+    for i in range(pivots.shape[0]):
+        if pivots[i] != i:
+            sign = -sign
+        if lu[i, i] < 0.0:
+            sign = -sign
+    return sign

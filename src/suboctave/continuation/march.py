@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.continuation import kernels
+from suboctave.compiled import kernel
 from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
 from suboctave.continuation.place import Place
 from suboctave.continuation.point import CurvePoint, make_point
@@ -177,9 +177,10 @@ class March:
         p, u, along = point, point.u, point.tangent
         if curve is not p.curve:
             u, along = curve.transfer(u, p.curve), curve.transfer(along, p.curve)
-        weights, t = curve.weights(u, largest), np.empty(len(u))
-        kernels.rescaled(along, weights, t)
-        return CurvePoint(curve, u, t, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
+        weights = curve.weights(u, largest)
+        return CurvePoint(
+            curve, u, along / length(weights * along), weights, p.evaluation, p.orientation, p.arclength, p.iterations
+        )
 
     def _advance(
         self, point: CurvePoint, step: float, behind: list[CurvePoint]
@@ -198,7 +199,7 @@ class March:
                 solved = self._solved(curve, guess, row, point.weights, step)
                 if bound is not None:
                     solved.u[curve.parameter] = bound
-                taken = kernels.distance(solved.u, point.u, point.weights)
+                taken = distance(solved.u, point.u, point.weights)
                 new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
                 turn = self._angle(point, new)
                 fine = turn < self.stepping.sharpest and solved.distance < 0.4 * step
@@ -239,7 +240,7 @@ class March:
     ) -> tuple[Array, Array, float | None]:
         """A prediction and the row to solve with: one step ahead, or on the bound (returned) that it would pass."""
         guess, index = np.empty(len(point.u)), point.curve.parameter
-        kernels.predict(points, tangents, point.weights, step, guess)
+        predict(points, tangents, point.weights, step, guess)
         low, high = self.bounds
         if low <= guess[index] <= high or not low < point.parameter < high:
             return guess, point.weights * point.tangent, None
@@ -247,7 +248,7 @@ class March:
         near, far = 0.0, step
         for _ in range(_HALVED):
             middle = 0.5 * (near + far)
-            kernels.predict(points, tangents, point.weights, middle, guess)
+            predict(points, tangents, point.weights, middle, guess)
             near, far = (near, middle) if (guess[index] - bound) * (point.parameter - bound) < 0.0 else (middle, far)
         guess[index] = bound
         row = np.zeros(len(guess))
@@ -294,7 +295,7 @@ class March:
 
     @staticmethod
     def _angle(a: CurvePoint, b: CurvePoint) -> float:
-        return math.acos(min(1.0, max(-1.0, kernels.cosine(a.tangent, b.tangent, b.weights))))
+        return math.acos(min(1.0, max(-1.0, cosine(a.tangent, b.tangent, b.weights))))
 
     def _next_step(self, new: CurvePoint, step: float, deviation: float, turn: float) -> float:
         options = self.stepping
@@ -312,3 +313,43 @@ class March:
 def _missing(solved: Solved) -> Array:
     """What is left of the equations at a solved point, and nothing of its row."""
     return np.append(solved.evaluation.residual, 0.0)
+
+
+@kernel()
+def predict(points, tangents, weights, step, out):
+    """The Hermite polynomial through points and tangents (m, n) taken `step` further in scaled arclength, into `out`.
+
+    The latest point comes first; one point gives a straight line, two a cubic, three a quintic.
+    """
+    m, n = points.shape
+    size = np.empty(m)
+    where = np.zeros(m)
+    for j in range(m):
+        total = 0.0
+        for i in range(n):
+            d = weights[i] * tangents[j, i]
+            total += d * d
+        size[j] = math.sqrt(total)
+        if j > 0:
+            chord = turn = 0.0
+            for i in range(n):
+                d = weights[i] * (points[j - 1, i] - points[j, i])
+                chord += d * d
+                d = weights[i] * (tangents[j - 1, i] / size[j - 1] - tangents[j, i] / size[j])
+                turn += d * d
+            # the arc is longer than its chord
+            where[j] = where[j - 1] - math.sqrt(chord) * (1.0 + turn / 24.0)
+    for i in range(n):
+        out[i] = 0.0
+    for j in range(m):
+        product, total = 1.0, 0.0
+        for k in range(m):
+            if k != j:
+                product *= (step - where[k]) / (where[j] - where[k])
+                total += 1.0 / (where[j] - where[k])
+        square = product * product
+        ahead = step - where[j]
+        value = square * (1.0 - 2.0 * ahead * total)
+        slope = square * ahead / size[j]
+        for i in range(n):
+            out[i] += value * points[j, i] + slope * tangents[j, i]

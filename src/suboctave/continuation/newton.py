@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.continuation import kernels
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import Factor, bordered, distance, length
 from suboctave.continuation.problem import Array, Evaluation, Problem
 from suboctave.errors import ConvergenceError, InputError, check_numbers
 from suboctave.interruption import check_time
@@ -90,11 +89,13 @@ def closely(options: NewtonOptions) -> NewtonOptions:
     return replace(options, tolerance=min(options.tolerance, max(_SHARE * options.tolerance, _LEAST)))
 
 
-def bordered(evaluation: Evaluation, row: Array | None, weights: Array) -> Factor:
+def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Factor:
     """Factorise `[F_u; row]`, or F_u alone, with columns scaled to arclength."""
+    jacobian = evaluation.jacobian
     if row is None:
-        return Factor.of(evaluation.jacobian / weights)
-    return Factor.of(kernels.bordered_transposed(evaluation.jacobian, row, weights).T, overwrite=True)
+        return Factor.of(jacobian / weights)
+    rows = len(jacobian)
+    return bordered(jacobian, np.ones(rows), 1.0 / weights, np.empty((rows, 0)), row)
 
 
 def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
@@ -148,28 +149,29 @@ def correct(
         settled = min(previous, left) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
-                factor = bordered(evaluation, row, weights)
-            return Solved(u, evaluation, weights, factor, iteration, kernels.distance(u, guess, weights), contraction)
+                factor = factorised(evaluation, row, weights)
+            return Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
         # ones are those of the point as well
         stale = previous > SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
         if factor is None or (iteration > 0 and stale):
-            factor = bordered(evaluation, row, weights)
+            factor = factorised(evaluation, row, weights)
             last, way = evaluation, 0.0
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         before = error
         rhs = evaluation.residual
-        step = factor.solve(rhs if row is None else kernels.right_hand_side(rhs, row, weights, u, guess))
+        if row is not None:
+            rhs = np.empty(len(u))
+            rhs[:-1], rhs[-1] = evaluation.residual, row.dot(weights * (u - guess))
+        step = factor.solve(rhs)
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
-            nearest = Solved(
-                u, evaluation, weights, factor, iteration, kernels.distance(u, guess, weights), contraction
-            )
+            nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
         share = _decrease(curve, u, step / weights, error) if options.damped else options.share(step)
-        u, size = kernels.moved(u, step, weights, share)
+        u, size = u - share * step / weights, length(step)
         way += share * size
         if iteration == 0:
             first = size
@@ -211,5 +213,5 @@ def tangent(solved: Solved) -> Array:
     rhs[-1] = 1.0
     if solved.factor.singular:
         raise ConvergenceError("the equations are singular (an undamped resonance, or a body free to move)")
-    result: Array = kernels.normalised(solved.factor.solve(rhs), solved.weights)
-    return result
+    direction: Array = solved.factor.solve(rhs)
+    return direction / (length(direction) * solved.weights)

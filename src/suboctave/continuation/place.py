@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from suboctave.continuation import kernels
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array, Curve
 
@@ -25,7 +24,7 @@ class Place:
     def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
         """It again, if the step from `point` to `new` passes it in the same direction."""
         w, own = new.weights, self.point
-        step = kernels.distance(new.u, point.u, w)
+        step = distance(new.u, point.u, w)
         here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
         if all(abs(here - value) > reach for value in self._values):
             return None
@@ -33,7 +32,7 @@ class Place:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
         for i, turned in enumerate(self._images[1]):
             image = new.curve.unwrapped(turned, point.u)
-            if max(kernels.distance(image, point.u, w), kernels.distance(new.u, image, w)) > 1.5 * step:
+            if max(distance(image, point.u, w), distance(new.u, image, w)) > 1.5 * step:
                 continue
             from_point, to_new = w * (image - point.u), w * (new.u - image)
             # a shift in time turns the vector and, where there are instants among the unknowns, moves it

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.continuation import kernels
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import Factor, cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
@@ -43,7 +42,7 @@ def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: flo
     sign = solved.factor.sign
     # sign of det [F_u; t]: changes at a branch point that the curve passes straight on. t spans the null space of
     # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
-    if along is not None and kernels.cosine(t, along, solved.weights) < 0.0:
+    if along is not None and cosine(t, along, solved.weights) < 0.0:
         t, sign = -t, -sign
     return CurvePoint(
         curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations, solved.factor
@@ -60,8 +59,11 @@ def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
     ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    result: Array = kernels.between(ua, ta, b.u, b.tangent, b.weights, fraction)
-    return result
+    chord = distance(b.u, ua, b.weights)
+    s, r = fraction, 1.0 - fraction
+    first = s * r * r * chord / length(b.weights * ta)
+    last = s * s * r * chord / length(b.weights * b.tangent)
+    return (1.0 + 2.0 * s) * r * r * ua + first * ta + s * s * (3.0 - 2.0 * s) * b.u - last * b.tangent
 
 
 def point_between(

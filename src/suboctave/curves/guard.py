@@ -28,8 +28,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from suboctave.compiled import kernel
-from suboctave.continuation import kernels
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array
@@ -40,6 +38,7 @@ from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, Sampl
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.nearing import CUT, GRAZES, contacts_between
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import ComplexArray
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
 FINEST = 1e-5
@@ -422,7 +421,9 @@ def _separating(samples: list[Sample]) -> list[Sample]:
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
     """Distance between the chord and the mean tangent of a step, in units of its length."""
     u, heading = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    return float(kernels.disagreement(u, heading, b.u, b.tangent, b.weights))
+    scaled = [b.weights * vector for vector in (b.u - u, heading, b.tangent)]
+    chord, first, last = (vector / (length(vector) or 1.0) for vector in scaled)
+    return length(chord - 0.5 * (first + last)) if chord.any() else 0.0
 
 
 def _explained(p: Sample, q: Sample) -> bool:
@@ -452,16 +453,8 @@ def _mixed(p: Sample, q: Sample) -> bool:
     return any(kind is not NEIMARK_SACKER for kind in changes(p, q))
 
 
-@kernel()
-def _movement(old, new):
+def _movement(old: ComplexArray, new: ComplexArray) -> float:
     """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    largest = 0.0
-    for i in range(new.shape[0]):
-        size = abs(new[i])
-        if size <= 0.5:
-            continue
-        nearest = np.inf
-        for j in range(old.shape[0]):
-            nearest = min(nearest, abs(new[i] - old[j]))
-        largest = max(largest, nearest / max(1.0, size))
-    return largest
+    size = np.abs(new)
+    nearest = np.abs(new[:, None] - old).min(axis=1) / np.maximum(1.0, size)
+    return float(nearest[size > 0.5].max(initial=0.0))

@@ -18,7 +18,6 @@ from functools import lru_cache
 import numpy as np
 
 from suboctave.bifurcation.gaps import rests_in_corner
-from suboctave.continuation.kernels import weighted_length
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.augmentation import Augmentation, Equations
@@ -254,7 +253,7 @@ class MotionProblem:
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
-        return float(weighted_length(self._weight, u))
+        return length(self._weight * u[: self.balance.dimension])
 
     def weights(self, u: Array, largest: float) -> Array:
         """See `Curve.weights`."""

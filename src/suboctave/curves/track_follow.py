@@ -9,9 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from suboctave.bifurcation.tracked import TrackedEvent
-from suboctave.continuation import CurvePoint, March, kernels
+from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
+from suboctave.continuation.linear import cosine, length
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
 from suboctave.continuation.problem import Curve
@@ -323,10 +324,10 @@ class _Tracker:
         those of the far side.
         """
         point, angle = b.point, self.settings.stepping.sharpest
-        if kernels.cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(angle):
+        if cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(angle):
             return b
-        chord = point.weights * (point.u - b.curve.transfer(a.point.u, a.curve))
-        return TrackedSample(replace(point, tangent=kernels.normalised(chord, point.weights)))
+        chord = point.u - b.curve.transfer(a.point.u, a.curve)
+        return TrackedSample(replace(point, tangent=chord / length(point.weights * chord)))
 
     def _inside(self, sample: TrackedSample) -> bool:
         """Whether a point lies in the ranges of the parameters but the last."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.continuation import kernels
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
@@ -126,7 +125,7 @@ def solve(guess: Guess, begin: BalanceState, augmentation: Augmentation, extra: 
         step = solved.factor.solve(further.residual)
         if not np.isfinite(step).all():
             break
-        u, _size = kernels.moved(u, step, solved.weights, 1.0)
+        u = u - step / solved.weights
         further = problem.evaluate(u)
         if further.error < evaluation.error:
             evaluation = further
