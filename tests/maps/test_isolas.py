@@ -76,27 +76,26 @@ def test_stable_parts_by_shooting(isolas):
     assert len(parts) == 2
     first, second = (b.omega for b in branch.bifurcations["PD"])
     assert (parts[0][1], parts[1][0]) == pytest.approx(sorted((first, second)))
-    for index in range(3, len(branch), 17):
+    for index in range(3, len(branch), 51):
         assert so.verify(branch.orbits[index]).agrees
 
 
-def test_the_answer_does_not_depend_on_how_one_looks(isolas):
-    (isola,) = so.find_isolas(reference(), (1.9, 4.2), "j", (0.0, 1.0), values=2)
-    assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
-
-
-@pytest.mark.parametrize("gap", [0.3, 0.5, 0.9])
-def test_the_answer_does_not_depend_on_where_one_stands(isolas, gap):
-    (isola,) = so.find_isolas(reference(j=gap), OMEGA[::-1], "j", (1.0, 0.0))
+@pytest.mark.parametrize("gap", [0.3, *(pytest.param(gap, marks=pytest.mark.slow) for gap in (0.5, 0.9))])
+def test_the_answer_depends_neither_on_where_one_stands_nor_on_how_one_looks(isolas, gap):
+    (isola,) = so.find_isolas(reference(j=gap), (4.2, 1.9), "j", (1.0, 0.0), values=2)
     assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
 
 
 @pytest.mark.parametrize(
     ("bounds", "born", "merges"),
-    [((0.0, 0.45), None, 0.176829), ((0.25, 1.0), 0.579889, None), ((0.3, 0.5), None, None)],
+    [
+        pytest.param((0.0, 0.45), None, 0.176829, marks=pytest.mark.slow),
+        pytest.param((0.25, 1.0), 0.579889, None, marks=pytest.mark.slow),
+        ((0.3, 0.5), None, None),
+    ],
 )
 def test_bounds_that_cut_its_range(bounds, born, merges):
-    (isola,) = so.find_isolas(reference(), OMEGA, "j", bounds, values=3)
+    (isola,) = so.find_isolas(reference(), OMEGA, "j", bounds, values=2)
     assert isola.range == pytest.approx((merges or bounds[0], born or bounds[1]), abs=2e-6)
     for end, expected in ((isola.born, born), (isola.merges, merges)):
         assert end is None if expected is None else end == pytest.approx(expected, abs=2e-6)
@@ -113,7 +112,7 @@ def test_the_tuned_absorber():
 
 
 def test_the_exact_law():
-    (isola,) = so.find_isolas(so.library.reference_oscillator(), OMEGA, "j", (0.0, 1.0))
+    (isola,) = so.find_isolas(so.library.reference_oscillator(), OMEGA, "j", (0.0, 1.0), values=2)
     assert (isola.born.omega, float(isola.born)) == pytest.approx((2.353543, 0.581107), abs=2e-6)
     assert isola.at(0.4).closed
 
@@ -127,7 +126,7 @@ def test_a_system_without_any():
         loads=[so.HarmonicLoad(dof=0, amplitude="F")],
         parameters={"F": 0.3},
     )
-    isolas = so.find_isolas(system, (0.6, 2.5), "F", (0.05, 0.5))
+    isolas = so.find_isolas(system, (0.6, 2.5), "F", (0.05, 0.5), 3, values=2)
     assert list(isolas) == []
     assert "No isola of T" in repr(isolas)
     assert isolas.limit_points
@@ -181,7 +180,7 @@ def test_an_isola_of_nonlinear_damping(damped, bounds):
 
 def test_two_isolas_that_join():
     """They are told apart, each closed branch belongs to one of them, and it says where they join."""
-    first, second = so.find_isolas(reference(p=1.7), (1.8, 4.5), "j", (0.3, 1.0))
+    first, second = so.find_isolas(reference(p=1.7), (1.8, 4.5), "j", (0.3, 1.0), values=2)
     assert (first.born, second.born) == pytest.approx((0.846206, 0.900471), abs=2e-6)
     joined = max(first.range[0], second.range[0])
     assert joined == pytest.approx(0.780048, abs=2e-6)
@@ -214,7 +213,7 @@ def test_a_third_of_the_frequency_is_searched_for():
 def test_ends_can_be_tracked_again(isolas):
     curve = so.track(isolas[0].born, "p", (0.5, 0.6))
     assert set(curve.isola) == {"isola_centre"}
-    (isola,) = so.find_isolas(reference(p=0.6), OMEGA, "j", (0.3, 0.9), values=3)
+    (isola,) = so.find_isolas(reference(p=0.6), OMEGA, "j", (0.1, 0.9), values=[0.1])
     end = int(np.argmax(curve.parameter("p")))
     assert isola.born == pytest.approx(curve.parameter("j")[end], abs=2e-6)
 
@@ -379,7 +378,7 @@ def test_a_true_isola_of_unsymmetric_motions_stays():
 def test_what_hangs_on_an_isola_is_part_of_it():
     """The symmetric 3T isola at F = 200 has four pitchforks; the loops between them turn back there, it does not."""
     system = so.library.duffing(c=0.1).with_parameters(F=200.0)
-    start = so.find_subharmonics(system, (3.0, 9.0), 3, seeds=so.Seeds(16, 6, 1))[0].orbits[5]
+    start = so.frequency_response(system, (3.0, 9.0), subharmonic=3).orbits[5]
     isola = so.continue_branch(start, "omega", (1.0, 5.0))
     assert isola.closed
     assert len(isola.bifurcations["BP"]) == 4
