@@ -35,11 +35,12 @@ from suboctave.maps.inputs import check_count
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
 from suboctave.model.system import System
+from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.results.tracked_branch import TrackedBranch
 
-__all__ = ["FAILURES", "Catalogue", "SearchRange", "branch_through", "carrier_of", "motion_near"]
+__all__ = ["FAILURES", "Catalogue", "SearchRange", "Work", "branch_through", "carrier_of", "motion_near"]
 
 #: share of the range of omega by which branches are followed beyond what they are to hold
 _MARGIN = 0.02
@@ -70,8 +71,48 @@ class SearchRange(NamedTuple):
         return SearchRange(max(low, 0.5 * min([self.low, *inside])), max([self.high, *(p + margin for p in inside)]))
 
 
+_KEPT = "what is here is what had been found by then"
+
+
+@dataclass(eq=False, kw_only=True)
+class Work:
+    """What is said of long work: what it could not settle, how far it has come, what stopped it before its end."""
+
+    notes: list[str] = field(default_factory=list)
+    report: Callable[[float, str], None] | None = None
+    interruption: Interruption | None = None
+
+    @contextmanager
+    def reporting(self, progress: Any, title: str, kept: str = _KEPT) -> Iterator[None]:
+        """Report the work within to `progress`; Ctrl-C and time limits end it, which is noted with what is `kept`."""
+        with reporting(progress, title) as self.report:
+            try:
+                yield
+            except KeyboardInterrupt as cause:
+                self.interruption = Interruption.of(cause)
+                self.note(f"{self.interruption}: {kept}")
+
+    def note(self, text: str) -> None:
+        """Something that could not be settled, listed once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    @contextmanager
+    def noting(self, what: str, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
+        """Note what could not be computed within, and why."""
+        try:
+            yield
+        except errors as failure:
+            self.note(f"{what}: {failure}")
+
+    def progress(self, share: float, where: str) -> None:
+        """Report how far the work has come."""
+        if self.report is not None:
+            self.report(share, where)
+
+
 @dataclass(eq=False)
-class Catalogue:
+class Catalogue(Work):
     """What is known of the bifurcations of a system over omega and a design parameter.
 
     system, name, bounds, omega
@@ -82,12 +123,6 @@ class Catalogue:
         Curves after which no more are followed.
     curves, pieces
         The curves of bifurcations over the parameter, and their monotone pieces.
-    notes
-        What could not be settled.
-    report
-        Where progress is reported to.
-    interruption
-        What stopped the work before its end.
     """
 
     system: System
@@ -99,9 +134,6 @@ class Catalogue:
     most: int
     curves: list[TrackedBranch] = field(default_factory=list)
     pieces: list[MonotonePiece] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    report: Callable[[float, str], None] | None = None
-    interruption: Interruption | None = None
     _lost: list[tuple[float, Bifurcation]] = field(default_factory=list)
 
     @classmethod
@@ -135,24 +167,6 @@ class Catalogue:
     def limit_points(self) -> list[MonotonePiece]:
         """The pieces of curves of limit points."""
         return [piece for piece in self.pieces if piece.kind == "LP"]
-
-    def note(self, text: str) -> None:
-        """Something that could not be settled, listed once."""
-        if text not in self.notes:
-            self.notes.append(text)
-
-    @contextmanager
-    def noting(self, what: str, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
-        """Note what could not be computed within, and why."""
-        try:
-            yield
-        except errors as failure:
-            self.note(f"{what}: {failure}")
-
-    def progress(self, share: float, where: str) -> None:
-        """Report how far the work has come."""
-        if self.report is not None:
-            self.report(share, where)
 
     def at(self, value: float) -> System:
         """The system at a value of the parameter."""

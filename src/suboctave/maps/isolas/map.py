@@ -9,7 +9,8 @@ where the map says.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,15 +20,15 @@ from suboctave.analysis.track import track
 from suboctave.bifurcation import Bifurcation
 from suboctave.curves.points import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number
-from suboctave.interruption import Interruption, pass_on
-from suboctave.maps.catalogue import SearchRange, branch_through, carrier_of
+from suboctave.interruption import pass_on
+from suboctave.maps.catalogue import FAILURES, SearchRange, Work, branch_through, carrier_of
 from suboctave.maps.inputs import is_count, listed
 from suboctave.maps.isolas.region import IsolaMap, IsolaRegion, Probe, spans_of
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter
+from suboctave.model.system import System
 from suboctave.model.timed import timed
-from suboctave.progress import reporting
 from suboctave.results.tracked_branch import TrackedBranch
 
 __all__ = ["isola_map"]
@@ -100,23 +101,13 @@ def isola_map(
         )
     _check_probes(probes, low, high)
     options = first.options if max_step is None else {**first.options, "max_step": max_step}
-    notes: list[str] = []
-    interruption: Interruption | None = None
-    regions: list[IsolaRegion] = []
-    cache: list[tuple[IsolaEnd, TrackedBranch]] = []
-    with reporting(progress, f"isolas over {name} and {parameter}") as report:
-        try:
-            for number, isola in enumerate(items):
-                if report is not None:
-                    report(number / len(items), f"isola {number + 1} of {len(items)}")
-                region = _region(isola, parameter, (low, high), options, cache, notes)
-                if region is not None:
-                    regions.append(_probed(region, isola, probes, options))
-        except KeyboardInterrupt as cause:
-            interruption = Interruption.of(cause)
-            notes.append(f"{interruption}: what is here is what had been found by then")
+    regions = _Regions(system, name, parameter, (low, high), options)
+    with regions.reporting(progress, f"isolas over {name} and {parameter}"):
+        for number, isola in enumerate(items):
+            regions.progress(number / len(items), f"isola {number + 1} of {len(items)}")
+            regions.follow(isola, probes)
     within = isolas.bounds if isinstance(isolas, Isolas) else None
-    return IsolaMap(regions, system, name, parameter, within, (low, high), notes, interruption)
+    return IsolaMap(regions.regions, system, name, parameter, within, (low, high), regions.notes, regions.interruption)
 
 
 def _checked(isolas: Any) -> list[Isola]:
@@ -135,125 +126,114 @@ def _check_probes(probes: Any, low: float, high: float) -> None:
         raise InputError(f"probes must be how many, or numbers within the bounds ({low:g}, {high:g}), not {probes!r}")
 
 
-def _region(
-    isola: Isola,
-    parameter: str,
-    bounds: tuple[float, float],
-    options: SearchOptions,
-    cache: list[tuple[IsolaEnd, TrackedBranch]],
-    notes: list[str],
-) -> IsolaRegion | None:
-    """The region of one isola, None where an end could not be followed at all."""
-    here = float(isola.system.parameters[parameter])
-    ends: list[MonotonePiece | float] = []
-    curves: list[TrackedBranch] = []
-    for end, value, reason in zip(isola.ends, isola.range, isola.reasons, strict=True):
-        if end is None:
-            ends.append(value)
-            notes.append(
-                f"one end of the isola is no extremum at {parameter} = {here:g} ({reason}): the map keeps "
-                f"{isola.parameter} = {value:.7g} there"
-            )
-            continue
-        try:
-            curve = _tracked(end, parameter, bounds, options, cache)
-        except ConvergenceError as failure:
-            notes.append(f"the {end.kind.replace('_', ' ')} could not be followed over {parameter}: {failure}")
-            return None
-        borders = [b for b in pieces_of(curve, parameter, isola.parameter) if b.contains(here)]
-        if not borders:
-            notes.append(f"the curve of {end!r} does not pass {parameter} = {here:g}")
-            return None
-        ends.append(min(borders, key=lambda b: abs(float(b.across(here)) - float(end))))
-        if curve not in curves:
-            curves.append(curve)
-    span = spans_of(here, (ends[0], ends[1]), bounds, parameter)
-    for reason, settled in zip(span.reasons, span.settled, strict=True):
-        if not settled:
-            notes.append(reason)
-    return IsolaRegion(isola, parameter, span, tuple(curves))
+@dataclass(eq=False)
+class _Regions(Work):
+    """The regions of isolas of one search over a second parameter, and the curves of their ends, each once."""
 
+    system: System
+    name: str
+    second: str
+    bounds: tuple[float, float]
+    options: SearchOptions
+    regions: list[IsolaRegion] = field(default_factory=list)
+    tracked: list[tuple[IsolaEnd, TrackedBranch]] = field(default_factory=list)
 
-def _tracked(
-    end: IsolaEnd,
-    parameter: str,
-    bounds: tuple[float, float],
-    options: SearchOptions,
-    cache: list[tuple[IsolaEnd, TrackedBranch]],
-) -> TrackedBranch:
-    """The curve of an extremum, once for all isolas that share it."""
-    for known, curve in cache:
-        if known.orbit is end.orbit:
-            return curve
-    here, beside = end.parameter(parameter), "omega" if "omega" in end.names else end.names[0]
-    for _, curve in cache:
-        for name, slack in ((end.parameter_name, _SAME), (beside, _BESIDE)):
-            near = slack * abs(end.parameter(name))
-            borders = [b for b in pieces_of(curve, parameter, name) if b.contains(here)]
-            if not any(abs(float(b.across(here)) - end.parameter(name)) <= near for b in borders):
-                break
-        else:
-            return curve
-    curve = track(end, parameter, bounds, **options)
-    pass_on(curve.interruption)
-    cache.append((end, curve))
-    return curve
+    def follow(self, isola: Isola, probes: Any) -> None:
+        """Follow the ends of an isola, and hold what they enclose against closed branches."""
+        region = self._region(isola)
+        if region is not None:
+            self.regions.append(replace(region, probes=tuple(self._probes(region, probes))))
 
+    def _region(self, isola: Isola) -> IsolaRegion | None:
+        """The region of one isola, None where an end could not be followed at all."""
+        name, second = self.name, self.second
+        here = float(self.system.parameters[second])
+        ends: list[MonotonePiece | float] = []
+        curves: list[TrackedBranch] = []
+        for end, value, reason in zip(isola.ends, isola.range, isola.reasons, strict=True):
+            if end is None:
+                ends.append(value)
+                self.notes.append(
+                    f"one end of the isola is no extremum at {second} = {here:g} ({reason}): the map keeps "
+                    f"{name} = {value:.7g} there"
+                )
+                continue
+            try:
+                curve = self._curve(end)
+            except ConvergenceError as failure:
+                self.notes.append(f"the {end.kind.replace('_', ' ')} could not be followed over {second}: {failure}")
+                return None
+            borders = [b for b in pieces_of(curve, second, name) if b.contains(here)]
+            if not borders:
+                self.notes.append(f"the curve of {end!r} does not pass {second} = {here:g}")
+                return None
+            ends.append(min(borders, key=lambda b: abs(float(b.across(here)) - float(end))))
+            if curve not in curves:
+                curves.append(curve)
+        span = spans_of(here, (ends[0], ends[1]), self.bounds, second)
+        self.notes += [reason for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
+        return IsolaRegion(isola, second, span, tuple(curves))
 
-# ------------------------------------------------------------------------------------------------- independent looks
-def _probed(region: IsolaRegion, isola: Isola, probes: Any, options: SearchOptions) -> IsolaRegion:
-    """The region with what closed branches at some values of the second parameter say."""
-    span = region.span
-    if isinstance(probes, int):
-        shares = _PROBED if probes == len(_PROBED) else (np.arange(probes) + 0.5) / max(probes, 1)
-        places = [span.low + float(share) * (span.high - span.low) for share in shares]
-    else:
-        places = [float(value) for value in probes if span.contains(float(value))]
-    probed = []
-    for place in places:
-        border = next((e for e in span.ends if isinstance(e, MonotonePiece)), None)
-        if border is None:
-            break
-        probed.append(_probe(region, border, border.node_beside(place), isola, options))
-    return IsolaRegion(isola, region.second, span, region.curves, tuple(probed))
-
-
-def _probe(
-    region: IsolaRegion, border: MonotonePiece, node: TrackedPoint, isola: Isola, options: SearchOptions
-) -> Probe:
-    """Follow the limit points at one value of the second parameter, and the branch in the middle of the range.
-
-    Nothing of the curves of extrema is used but one motion to begin with.
-    """
-    name, second = isola.parameter, region.second
-    place = float(node.orbit.values[second])
-    low, high = region.span.range(place)
-    middle = 0.5 * (low + high)
-    system = isola.system.with_parameters({second: place})
-    start = Bifurcation(
-        "LP", node.orbit, node.floquet, node.orbit.residual, 0.0, name, context={"system": system, **options}
-    )
-    width = high - low
-    try:
-        curve = track(start, name, (low - 0.5 * width, high + 0.5 * width), **options)
+    def _curve(self, end: IsolaEnd) -> TrackedBranch:
+        """The curve of an extremum, once for all isolas that share it."""
+        for known, curve in self.tracked:
+            if known.orbit is end.orbit or self._passes(curve, end):
+                return curve
+        curve = track(end, self.second, self.bounds, **self.options)
         pass_on(curve.interruption)
-        pieces = [piece for piece in pieces_of(curve, name) if piece.contains(middle)]
-        if not pieces:
-            return Probe(place, middle, (low, high), None, "no limit points there")
-        nearest = min(pieces, key=lambda piece: abs(float(piece.across(middle)) - node.orbit.omega))
-        branch = branch_through(nearest.solve_at(middle), SearchRange(*isola.omega), name, pieces, options)
-        pass_on(branch.interruption)
-        detached = carrier_of(branch, (), options) is not None
-    except (ConvergenceError, InputError) as failure:
-        return Probe(place, middle, (low, high), None, str(failure))
-    turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]
-    missed = [
-        float(end.across(place))
-        for end in region.span.ends
-        if isinstance(end, MonotonePiece)
-        and not any(abs(t - float(end.across(place))) <= _AGREES * width for t in turns)
-    ]
-    disagreement = "" if detached else "the branch there is not detached"
-    if missed and detached:
-        disagreement = f"its curve of limit points does not turn at {name} = {missed[0]:.7g}"
-    return Probe(place, middle, (low, high), detached, disagreement)
+        self.tracked.append((end, curve))
+        return curve
+
+    def _passes(self, curve: TrackedBranch, end: IsolaEnd) -> bool:
+        """Whether a curve of extrema passes another one."""
+        here, beside = end.parameter(self.second), "omega" if "omega" in end.names else end.names[0]
+        for name, slack in ((end.parameter_name, _SAME), (beside, _BESIDE)):
+            value = end.parameter(name)
+            borders = [b for b in pieces_of(curve, self.second, name) if b.contains(here)]
+            if not any(abs(float(b.across(here)) - value) <= slack * abs(value) for b in borders):
+                return False
+        return True
+
+    # --------------------------------------------------------------------------------------------- independent looks
+    def _probes(self, region: IsolaRegion, probes: Any) -> Iterator[Probe]:
+        """What closed branches at some values of the second parameter say."""
+        span = region.span
+        if isinstance(probes, int):
+            shares = _PROBED if probes == len(_PROBED) else (np.arange(probes) + 0.5) / max(probes, 1)
+            places = [span.low + float(share) * (span.high - span.low) for share in shares]
+        else:
+            places = [float(value) for value in probes if span.contains(float(value))]
+        border = next((e for e in span.ends if isinstance(e, MonotonePiece)), None)
+        if border is not None:
+            yield from (self._probe(region, border.node_beside(place)) for place in places)
+
+    def _probe(self, region: IsolaRegion, node: TrackedPoint) -> Probe:
+        """Follow the limit points at one value of the second parameter, and the branch in the middle of the range.
+
+        Nothing of the curves of extrema is used but one motion to begin with.
+        """
+        name, options, orbit = self.name, self.options, node.orbit
+        place = float(orbit.values[self.second])
+        low, high = region.span.range(place)
+        middle, width = 0.5 * (low + high), high - low
+        context = {"system": self.system.with_parameters({self.second: place}), **options}
+        start = Bifurcation("LP", orbit, node.floquet, orbit.residual, 0.0, name, context=context)
+        try:
+            curve = track(start, name, (low - 0.5 * width, high + 0.5 * width), **options)
+            pass_on(curve.interruption)
+            pieces = [piece for piece in pieces_of(curve, name) if piece.contains(middle)]
+            if not pieces:
+                return Probe(place, middle, (low, high), None, "no limit points there")
+            nearest = min(pieces, key=lambda piece: abs(float(piece.across(middle)) - orbit.omega))
+            branch = branch_through(nearest.solve_at(middle), SearchRange(*region.isola.omega), name, pieces, options)
+            pass_on(branch.interruption)
+            detached = carrier_of(branch, (), options) is not None
+        except FAILURES as failure:
+            return Probe(place, middle, (low, high), None, str(failure))
+        turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]
+        ends = [float(end.across(place)) for end in region.span.ends if isinstance(end, MonotonePiece)]
+        missed = [end for end in ends if not any(abs(turn - end) <= _AGREES * width for turn in turns)]
+        disagreement = "" if detached else "the branch there is not detached"
+        if missed and detached:
+            disagreement = f"its curve of limit points does not turn at {name} = {missed[0]:.7g}"
+        return Probe(place, middle, (low, high), detached, disagreement)

@@ -22,7 +22,6 @@ from suboctave.analysis.subharmonics import Seeds
 from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, is_number
-from suboctave.interruption import Interruption
 from suboctave.maps.catalogue import Catalogue
 from suboctave.maps.inputs import COARSE, check_count, check_seeds, checked_orders, checked_values, listed
 from suboctave.maps.isolas.result import Isola, Isolas
@@ -31,7 +30,6 @@ from suboctave.maps.isolas.strategies import from_load_levels, from_resonances, 
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
-from suboctave.progress import reporting
 
 __all__ = ["find_isolas"]
 
@@ -107,15 +105,10 @@ def find_isolas(
     other_levels, fine = _checked_levels(levels), check_seeds(seeds) or COARSE
     orders = None if search is None else checked_orders(search, 2)
     state = Search(catalogue, search_at)
-    with reporting(options.get("progress"), f"isolas over {parameter}") as report:
-        catalogue.report = report
-        try:
-            from_responses(state, depth)
-            from_load_levels(state, other_levels, depth)
-            from_resonances(state, orders, fine)
-        except KeyboardInterrupt as cause:
-            catalogue.interruption = Interruption.of(cause)
-            catalogue.note(f"{catalogue.interruption}: what is here is what had been found by then")
+    with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
+        from_responses(state, depth)
+        from_load_levels(state, other_levels, depth)
+        from_resonances(state, orders, fine)
     return _result(state)
 
 

@@ -84,10 +84,11 @@ def regime_map_from_datasets(
     with opened(groups, "regime map", allow_code, linear) as stored:
         record, branches, curves = stored.record, stored.parts, stored.named("curve_")
         pieces = _pieces(curves, record["parameter"])
-        catalogue = Catalogue(
-            stored.system, record["parameter"], record["bounds"], SearchRange(*record["omega"]), "adaptive",
-            record["options"], len(curves), curves, pieces, list(record["notes"]), interruption=record["interruption"],
-        )  # fmt: skip
+        name, bounds, omega = record["parameter"], record["bounds"], SearchRange(*record["omega"])
+        options = record["options"]
+        catalogue = Catalogue(stored.system, name, bounds, omega, "adaptive", options, len(curves), curves, pieces)
+        catalogue.notes += record["notes"]
+        catalogue.interruption = record["interruption"]
         slices = []
         for given in record["slices"]:
             met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]

@@ -30,7 +30,7 @@ from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.interruption import Interruption, pass_on, unlimited
+from suboctave.interruption import pass_on, unlimited
 from suboctave.maps.catalogue import Catalogue
 from suboctave.maps.inputs import COARSE, MOST_VALUES, check_count, check_seeds, checked_orders
 from suboctave.maps.isolas.result import Isolas
@@ -40,7 +40,6 @@ from suboctave.maps.regimes.strips import Strip
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
-from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch
 
@@ -121,19 +120,15 @@ def regime_map(
     orders, fine, given = checked_orders(search, 1), check_seeds(seeds) or COARSE, _checked_motions(motions, catalogue)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
     plan = _Survey(catalogue, 2**depth, resolution, max_slices)
-    with reporting(options.get("progress"), f"regimes over omega and {parameter}") as report:
-        catalogue.report = report
-        try:
-            for curve in followed:
-                catalogue.add(curve)
-            _follow_motions(given, catalogue)
-            for value, order in product(places, orders):
-                for branch in catalogue.resonant(value, order, fine, []):
-                    follow_curves_of(branch, value, catalogue)
-            plan.fill(places)
-        except KeyboardInterrupt as cause:
-            catalogue.interruption = Interruption.of(cause)
-            catalogue.note(f"{catalogue.interruption}: the map holds what had been found by then")
+    kept = "the map holds what had been found by then"
+    with catalogue.reporting(options.get("progress"), f"regimes over omega and {parameter}", kept):
+        for curve in followed:
+            catalogue.add(curve)
+        _follow_motions(given, catalogue)
+        for value, order in product(places, orders):
+            for branch in catalogue.resonant(value, order, fine, []):
+                follow_curves_of(branch, value, catalogue)
+        plan.fill(places)
     with unlimited():
         return RegimeMap(catalogue, plan.strips(), depth, resolution)
 
