@@ -43,8 +43,17 @@ what = "states"
 """
 
 
-def test_as_by_a_script(study_file):
-    done = run_study(read_study(study_file(STUDY))).finished
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """The study, and what running it gave."""
+    path = tmp_path_factory.mktemp("chaos") / "study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    study = read_study(path)
+    return study, run_study(study)
+
+
+def test_as_by_a_script(ran):
+    done = ran[1].finished
     found_by = dict(zip(("response", "rates", "shares", "states"), (one.result for one in done), strict=True))
     system = so.library.duffing(c=0.1, F=0.3)
     rates = so.lyapunov_exponents(system, omega=1.5, periods=200, trajectories=4)
@@ -57,9 +66,8 @@ def test_as_by_a_script(study_file):
     assert found_by["states"]["x_0"][:12].tolist() == found.x.tolist()
 
 
-def test_files_and_journals_hold_all_of_it(study_file, tmp_path):
-    study = read_study(study_file(STUDY))
-    outcome = run_study(study)
+def test_files_and_journals_hold_all_of_it(ran, tmp_path):
+    study, outcome = ran
     results = so.load(outcome.files[0])
     journal = Journal.create(tmp_path / "a.journal")
     for step in study.steps:
