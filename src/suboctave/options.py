@@ -63,12 +63,13 @@ def with_options(declared: Any) -> Callable[[Callable[Arguments, Result]], Calla
             return verb(*positional, **named)
 
         returns = inspect.signature(verb).return_annotation
-        checked.__signature__ = inspect.Signature([*own, *more], return_annotation=returns)  # type: ignore[attr-defined]
+        described: Any = checked
+        described.__signature__ = inspect.Signature([*own, *more], return_annotation=returns)
         if verb.__doc__ is not None:
             listed = "".join(f"{p.name}\n{_indented(types[p.name][1])}" for p in more)
             section = textwrap.indent(f"Other Parameters\n----------------\n{listed}", "    ")
-            checked.__doc__ = f"{verb.__doc__.rstrip()}\n\n{section}    "
-        return checked
+            described.__doc__ = f"{verb.__doc__.rstrip()}\n\n{section}    "
+        return described
 
     return decorated
 
