@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.transforms import Bbox
 
-__all__ = ["annotate", "fitting_legend", "place_legend"]
+__all__ = ["annotate", "arrange", "fitting_legend", "place_legend"]
 
 Box: TypeAlias = "tuple[float, float, float, float]"
 
@@ -41,21 +41,31 @@ def place_legend(
     if not entries:
         return
     drawing = _frame_of(look, tight=grow)
-    figure.draw_without_rendering()  # places the frames; a legend inside one of them moves nothing
+    arrange(figure)  # a legend inside one of the frames moves nothing
     for axes in frames:
         pixels = _pixels(axes)
+        legend = axes.legend(list(entries.values()), list(entries), **drawing)
+        legend.set_zorder(6)
         for place in _PLACES:
-            legend = axes.legend(list(entries.values()), list(entries), loc=place, **drawing)
-            legend.set_zorder(6)
+            legend.set_loc(place)
             if _is_free(figure, axes, legend, pixels):
                 return
-            legend.remove()
+        legend.remove()
     width, height = figure.get_size_inches()
     if grow:  # as high as it may become, so that the frames keep theirs while it is measured
         figure.set_size_inches(width, height + 2.0 * look.small / 72.0 * (len(entries) + 2))
     legend = fitting_legend(figure, entries, look, tight=grow, loc="outside upper center")
     if grow:
         figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
+
+
+def arrange(figure: Figure) -> None:
+    """Give everything on a figure its place, as drawing it would."""
+    engine = figure.get_layout_engine()
+    if engine is None:
+        figure.draw_without_rendering()
+    else:
+        engine.execute(figure)
 
 
 def fitting_legend(
@@ -65,7 +75,7 @@ def fitting_legend(
     for columns in range(max(1, min(len(entries), most)), 0, -1):
         options = _frame_of(look, tight) | where
         legend = figure.legend(list(entries.values()), list(entries), ncols=columns, **options)
-        figure.draw_without_rendering()
+        arrange(figure)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             break
         legend.remove()
@@ -93,7 +103,6 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
     """
     if not len(texts):
         return
-    figure.draw_without_rendering()
     points = axes.transData.transform(np.asarray(places, dtype=float))
     pixels = _pixels(axes)
     unit, window = figure.dpi / 72.0, axes.get_window_extent()

@@ -30,7 +30,7 @@ from suboctave.pictures.drawing import (
     Surface,
     extent,
 )
-from suboctave.pictures.labels import annotate, fitting_legend, place_legend
+from suboctave.pictures.labels import annotate, arrange, fitting_legend, place_legend
 from suboctave.pictures.strokes import bent
 from suboctave.store.files import replace_file
 
@@ -69,7 +69,10 @@ def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = No
     else:
         _in_plane(figure, drawing, sheet)
     if path is not None:
+        arranged = figure.get_layout_engine()
+        figure.set_layout_engine("none")  # it is arranged already
         save_figure(figure, path)
+        figure.set_layout_engine(arranged)
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
     setattr(figure, "_repr_png_", partial(_png_bytes, figure))  # noqa: B010
     return figure
@@ -94,7 +97,7 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
     if drawing.title:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK)
     _place(figure, frames, drawing, sheet)
-    figure.draw_without_rendering()  # the frames have their places: what is spaced on paper comes now
+    arrange(figure)  # the frames have their places: what is spaced on paper comes now
     for axes, frame in zip(frames, drawing.frames, strict=True):
         _add_spaced(axes, frame, look)
         known = [label for label in frame.labels if np.isfinite(label.at).all()]
