@@ -11,9 +11,10 @@ import suboctave as so
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import make_point
+from suboctave.curves.nearest import nearest_point, same_discretisation, zero_along
+from suboctave.curves.sample import Sample
 from suboctave.curves.track_start import curve_through
 from suboctave.curves.tracked_events import events_between
-from suboctave.curves.tracked_sample import TrackedSample, nearest_point, same_discretisation, zero_along
 from suboctave.curves.tracked_tests import Extremum, GeneralisedDoubling
 from suboctave.harmonic.basis import HarmonicBasis
 
@@ -46,7 +47,7 @@ def beside(point, way, heading, place):
     along = point.tangent * math.copysign(1.0, heading * point.tangent[-2])
     row = point.weights * along
     solved = correct(point.curve, point.u + way * along, row / length(row), point.weights, OPTIONS)
-    return TrackedSample(make_point(solved, point.curve, along, place))
+    return Sample(make_point(solved, point.curve, along, place))
 
 
 @pytest.mark.parametrize("heading", [1.0, -1.0], ids=["up", "down"])

@@ -24,6 +24,8 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.nearest import nearest_point
+from suboctave.curves.sample import Sample
 from suboctave.curves.track_start import (
     curve_through,
     discretisation,
@@ -33,7 +35,6 @@ from suboctave.curves.track_start import (
 )
 from suboctave.curves.tracked_events import Found
 from suboctave.curves.tracked_located import as_event
-from suboctave.curves.tracked_sample import TrackedSample, nearest_point
 from suboctave.curves.tracked_tests import Extremum
 from suboctave.errors import InputError, shortened
 from suboctave.harmonic.evaluation import HarmonicBalance
@@ -168,5 +169,5 @@ class _Published:
         return _PublishedEvaluation(np.concatenate((here.residual, turned, [psi @ psi - 1.0])), jacobian, error)
 
 
-def _sample(curve: MotionProblem, u: Array, newton: NewtonOptions) -> TrackedSample:
-    return TrackedSample(nearest_point(curve, u, curve.weights(u, 0.0), newton))
+def _sample(curve: MotionProblem, u: Array, newton: NewtonOptions) -> Sample:
+    return Sample(nearest_point(curve, u, curve.weights(u, 0.0), newton))

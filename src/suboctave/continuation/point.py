@@ -11,7 +11,7 @@ from suboctave.continuation.newton import NewtonOptions, Solved, closely, correc
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 
-__all__ = ["CurvePoint", "between", "make_point", "point_between", "solve_at"]
+__all__ = ["CurvePoint", "between", "make_point", "point_between", "solve_at", "solved_again"]
 
 
 @dataclass(eq=False, slots=True)
@@ -90,3 +90,14 @@ def point_between(
             raise
         solved = correct(b.curve, guess, row, b.weights, newton)
     return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
+
+
+def solved_again(
+    point: CurvePoint, curve: Curve, weights: Array, newton: NewtonOptions, spare: float = 0.0
+) -> CurvePoint:
+    """A point solved for in another discretisation of its curve, orthogonally to its tangent; raises ConvergenceError
+    where there is none. `spare` as in `newton.correct`.
+    """
+    u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
+    row = weights * along
+    return make_point(correct(curve, u, row / length(row), weights, newton, spare=spare), curve, along, point.arclength)

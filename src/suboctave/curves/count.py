@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.curves.events.monitors import Sample
+from suboctave.curves.sample import Sample
 
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
 _NEAR_CIRCLE = 0.02

@@ -14,7 +14,8 @@ import numpy as np
 
 from suboctave.curves.events.alcorta import log_determinant
 from suboctave.curves.events.finder import Located
-from suboctave.curves.events.monitors import PERIOD_DOUBLING, BifurcationKind, Sample
+from suboctave.curves.events.monitors import PERIOD_DOUBLING, BifurcationKind
+from suboctave.curves.sample import Sample
 
 _MISSED = (
     "a period doubling lies there (a multiplier passes -1), which the test function {test!r} of the formulation "

@@ -12,23 +12,22 @@ from suboctave.bifurcation.measures import fold
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending
 from suboctave.continuation.events import locate_zero
-from suboctave.continuation.linear import length
 from suboctave.continuation.march import Arrival
-from suboctave.continuation.newton import correct
-from suboctave.continuation.point import make_point, point_between
+from suboctave.continuation.point import point_between, solved_again
 from suboctave.curves.count import CountCheck
 from suboctave.curves.doublings import DoublingWatch
 from suboctave.curves.events.finder import Located, locate, locate_near
 from suboctave.curves.events.grazings import locate_grazings, touches
 from suboctave.curves.events.layer import behind_their_grazings
-from suboctave.curves.events.monitors import BRANCH_POINT, PERIOD_DOUBLING, BifurcationKind, Sample, changes, solved_by
+from suboctave.curves.events.monitors import BRANCH_POINT, PERIOD_DOUBLING, BifurcationKind, changes, solved_by
 from suboctave.curves.guard import Crossing, Passage, StepGuard
 from suboctave.curves.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
-from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.motion import MotionProblem
 from suboctave.curves.points import BranchPoint
-from suboctave.curves.refine import bifurcation_at, guess_at, orbit_of, solved_bifurcation, turns_at
+from suboctave.curves.refine import bifurcation_at, solved_bifurcation, turns_at
+from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Doubt, Settings, Trace
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import Interruption
@@ -92,10 +91,10 @@ class _Follower:
         except KeyboardInterrupt as cause:
             if self.previous is None:
                 self.previous = start = self._sample(self.march.start)
-                trace.points.append(BranchPoint(orbit_of(start), start.floquet, 0.0, start.point.iterations))
+                trace.points.append(BranchPoint(start.orbit, start.floquet, 0.0, start.point.iterations))
             # of the step that was under way nothing counts
             trace.cut(trace.points[-1].arclength)
-            where = self.previous.point.curve.where(self.previous.point.u)
+            where = self.previous.where
             trace.ends(Ending.stopped(Interruption.of(cause), where))
         self._say_missed(everything=True)
         trace.audit = self._guard.audit
@@ -110,8 +109,7 @@ class _Follower:
         candidate = self._candidate
         if candidate is not None and candidate.point is point:
             return candidate
-        assert isinstance(point.evaluation, MotionEvaluation)
-        return Sample(point, point.evaluation.state, self.settings.stability)
+        return Sample(point, self.settings.stability)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
@@ -146,18 +144,13 @@ class _Follower:
         """A sample in the discretisation of the step that leaves it: where harmonics change, the motion moves a little
         and test functions with it.
         """
-        point, curve = sample.point, next_one.point.curve
-        assert isinstance(curve, MotionProblem)
-        if point.curve is curve:
+        curve = next_one.curve
+        if sample.curve is curve:
             return sample
         known = self._again
         if known is None or known[0] is not sample or known[1] is not curve:
-            weights = next_one.point.weights
-            along = curve.transfer(point.tangent, point.curve)
-            row = weights * along / length(weights * along)
             try:
-                solved = correct(curve, curve.transfer(point.u, point.curve), row, weights, self.settings.newton)
-                again = self._sample(make_point(solved, curve, along, point.arclength))
+                again = sample.at(solved_again(sample.point, curve, next_one.point.weights, self.settings.newton))
             except ConvergenceError:
                 again = sample
             self._again = known = (sample, curve, again)
@@ -200,7 +193,7 @@ class _Follower:
             if self.previous is not None:
                 self._search(self.previous, new)
             where = new.point
-            self.trace.points.append(BranchPoint(orbit_of(new), new.verdict, where.arclength, where.iterations))
+            self.trace.points.append(BranchPoint(new.orbit, new.verdict, where.arclength, where.iterations))
             self.previous = new
         self._crossings = []
         if passage is not None:
@@ -228,7 +221,7 @@ class _Follower:
     def _look_behind(self, passage: Passage) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
         for stretch in self._hidden.passed(passage.inside):
-            found = [] if self._watch else pair_in(stretch, self.settings.newton, self._sample)
+            found = [] if self._watch else pair_in(stretch, self.settings.newton)
             items = [item for entry in found if (item := self._bifurcation(*entry)) is not None]
             for item in items:
                 if self._insert(item):
@@ -236,7 +229,7 @@ class _Follower:
             if len(items) < 2:
                 self._guard.doubt(stretch.before, stretch.behind, REASON)
         self.trace.open += [
-            BranchPoint(orbit_of(s), s.floquet, s.point.arclength, s.point.iterations)
+            BranchPoint(s.orbit, s.floquet, s.point.arclength, s.point.iterations)
             for s in passage.inside[1:-1]
             if not s.floquet.decided
         ]
@@ -254,7 +247,7 @@ class _Follower:
         for kind in kinds:
             if kind.name == "LP" and turned:
                 continue
-            located = locate_near(kind, again, reach, guess_at)
+            located = locate_near(kind, again, reach)
             item = None if located is None else self._bifurcation(located, again, again)
             if located is not None and item is not None:
                 turned = turned or (kind is BRANCH_POINT and turns_at(located, again, again))
@@ -294,7 +287,7 @@ class _Follower:
         unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
         complaint = self._count.complaint(b, [item.kind for _, item in found] + missing + unseen)
         if not resting and self._guard.grazes(a, b):
-            for touched in locate_grazings(a, b, self.settings.newton, self._sample, guess_at):
+            for touched in locate_grazings(a, b, self.settings.newton):
                 item = self._bifurcation(touched, a, b)
                 if item is not None:
                     found.append((touched.fraction, item))
@@ -347,18 +340,18 @@ class _Follower:
             return known[3]
         must_solve = kind is BRANCH_POINT
         begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
-        found = locate(kind, a, b, self.settings.newton, self._sample, guess_at, 9 if must_solve else 34, begins)
+        found = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
         if must_solve and found is not None and found.solution is None:
             found = None
         self._last_located = (kind, a, b, found)
         return found
 
     def _event_value(self, event: Event, sample: Sample) -> float:
-        orbit = orbit_of(sample)
+        orbit = sample.orbit
         try:
             value = event.function(orbit)
         except Exception as failure:
-            where = sample.point.curve.where(sample.point.u)
+            where = sample.where
             failure.add_note(f"raised by the function of the event {event.name!r} at {where}")
             raise
         try:
@@ -366,7 +359,7 @@ class _Follower:
         except (TypeError, ValueError, OverflowError):
             number = float("nan")
         if not np.isfinite(number):
-            where = sample.point.curve.where(sample.point.u)
+            where = sample.where
             raise InputError(f"event {event.name!r} returned {value!r} at {where}; it must return a finite number")
         return number
 
@@ -387,7 +380,7 @@ class _Follower:
             self.trace.warnings.append(f"event {event.name!r}: {failure}")
             return None
         sample = self._sample(point)
-        orbit = orbit_of(sample)
+        orbit = sample.orbit
         curve = point.curve
         assert isinstance(curve, MotionProblem)
         return Bifurcation(

@@ -34,9 +34,9 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.audit import Audit, Unsettled, joined
 from suboctave.curves.crossings import first_doubtful
 from suboctave.curves.events.finder import Located
-from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, Sample, changes
-from suboctave.curves.motion import MotionProblem
+from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, changes
 from suboctave.curves.nearing import CUT, GRAZES, contacts_between
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 
@@ -393,8 +393,7 @@ def _open(p: Sample, q: Sample) -> bool:
 
 def _unsettled(p: Sample, q: Sample, reason: str) -> Unsettled:
     a, b = p.point, q.point
-    assert isinstance(a.curve, MotionProblem)
-    return Unsettled(a.curve.name, a.parameter, b.parameter, (a.arclength, b.arclength), reason)
+    return Unsettled(p.curve.name, a.parameter, b.parameter, (a.arclength, b.arclength), reason)
 
 
 def _separating(samples: list[Sample]) -> list[Sample]:

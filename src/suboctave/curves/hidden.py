@@ -9,19 +9,16 @@ leave to the multipliers hides a pair. It is solved for with more harmonics, as 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation import NewtonOptions
 from suboctave.curves.events.finder import Located, locate
-from suboctave.curves.events.monitors import ALL_KINDS, Sample
-from suboctave.curves.motion import MotionProblem
-from suboctave.curves.refine import guess_at, solved_in
+from suboctave.curves.events.monitors import PERIOD_DOUBLING
+from suboctave.curves.refine import solved_in
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.truncation import AdaptiveHarmonics, choose_harmonics, next_harmonics
-
-_DOUBLING = next(kind for kind in ALL_KINDS if kind.name == "PD")
 
 REASON = "a multiplier passes -1 and comes back, which the harmonics solved for do not show"
 
@@ -64,15 +61,12 @@ def _agree(sample: Sample) -> bool:
     return (sample.half_sign > 0.0) == (sample.measures[0, 2] > 0.0)
 
 
-def pair_in(
-    stretch: Stretch, newton: NewtonOptions, make_sample: Callable[[CurvePoint], Sample]
-) -> list[tuple[Located, Sample, Sample]]:
+def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Sample, Sample]]:
     """The hidden period doublings, each with the two motions of more harmonics that it lies between; none if they are
     not there, or not found.
     """
     samples = (stretch.before, stretch.inside, stretch.behind)
-    curve = stretch.inside.point.curve
-    assert isinstance(curve, MotionProblem)
+    curve = stretch.inside.curve
     found: list[tuple[Located, Sample, Sample]] = []
     while curve.adaptive is not None:
         present = samples[1].state
@@ -83,19 +77,17 @@ def pair_in(
         balance = curve.with_basis(basis).balance.settle(x, present.omega, present.values)
         curve = curve.with_balance(balance)
         try:
-            first, middle, last = (solved_in(curve, s, newton, make_sample) for s in samples)
+            first, middle, last = (solved_in(curve, s, newton) for s in samples)
         except ConvergenceError:
             break
         samples = (first, middle, last)
-        if not (_DOUBLING.changed(first, middle) and _DOUBLING.changed(middle, last)):
+        if not (PERIOD_DOUBLING.changed(first, middle) and PERIOD_DOUBLING.changed(middle, last)):
             if all(map(_agree, samples)):
                 # with more harmonics nobody sees them
                 return []
             continue
         # each between motions of its own: left to itself with still more harmonics, one may run to the other
-        pairs = [
-            (a, b, locate(_DOUBLING, a, b, newton, make_sample, guess_at)) for a, b in ((first, middle), (middle, last))
-        ]
+        pairs = [(a, b, locate(PERIOD_DOUBLING, a, b, newton)) for a, b in ((first, middle), (middle, last))]
         found = [(item, a, b) for a, b, item in pairs if item is not None]
     return found
 

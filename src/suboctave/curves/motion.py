@@ -59,6 +59,11 @@ class MotionEvaluation:
         return floquet_multipliers(self.state)
 
     @property
+    def known_floquet(self) -> FloquetResult | None:
+        """The multipliers, where they have been computed."""
+        return self.__dict__.get("floquet")
+
+    @property
     def critical(self) -> complex | None:
         """The multiplier that lies on the unit circle at a solution, None if none need."""
         return self.curve.augmentation.multiplier(self.state.rate, self.extra)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from suboctave.compiled import kernel
-from suboctave.curves.events.monitors import Sample
+from suboctave.curves.sample import Sample
 from suboctave.harmonic.trigonometric import pass_by
 
 #: excursions across a gap, in units of the largest relative displacement, that may end soon

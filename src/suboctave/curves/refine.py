@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.branching import branching_equation
-from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import length
-from suboctave.continuation.newton import correct
-from suboctave.continuation.point import make_point
-from suboctave.continuation.problem import Array
+from suboctave.continuation.point import solved_again
 from suboctave.curves.events.finder import Located, locate, position
 from suboctave.curves.events.layer import (
     behind_grazing,
@@ -23,8 +20,9 @@ from suboctave.curves.events.layer import (
     unresolved,
 )
 from suboctave.curves.events.locate import Guess, Singular
-from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Sample
-from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -48,11 +46,10 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     has no chance, that is enough: it is noted in `warnings`, as is what was not found again.
     """
     arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
-    curve = b.point.curve
-    assert isinstance(curve, MotionProblem)
+    curve = b.curve
     solution = located.solution
     if solution is None:
-        guess = guess_at(located.sample.point.u, located.sample.point, _kappa(located))
+        guess = Guess.at(located.sample.point.u, located.sample.point, _kappa(located))
         behind = behind_grazing(located.kind, guess)
         own = behind is not None and _lies_between(behind, curve, a, b)
         # harmonics may move it beyond the ends of a short step, where it may also be another one
@@ -62,7 +59,7 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         # the bracket of a grazing shows the excursion itself; across a branch point other tests change, too
         if located.bracket is not None and (beside is None or BRANCH_POINT.changed(*located.bracket)):
             return None
-        orbit = orbit_of(located.sample)
+        orbit = located.sample.orbit
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
         width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
         warnings.append(
@@ -87,9 +84,8 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
 
 def _tangent(a: Sample, b: Sample, share: float, found: Bifurcation) -> tuple[float, ...]:
     """The direction of the branch at a bifurcation between two samples, in the harmonics of its motion."""
-    curve = b.point.curve
-    assert isinstance(curve, MotionProblem)
-    t = (1.0 - share) * curve.transfer(a.point.tangent, a.point.curve) + share * b.point.tangent
+    curve = b.curve
+    t = (1.0 - share) * curve.transfer(a.point.tangent, a.curve) + share * b.point.tangent
     return tuple(curve.with_balance(found.orbit.balance).transfer(t, curve).tolist())
 
 
@@ -130,8 +126,7 @@ def turns_at(located: Located, a: Sample, b: Sample) -> bool:
     """Whether the curve stands still in its parameter at a branch point between two samples, as the bifurcating branch
     of a pitchfork does.
     """
-    curve, solution = b.point.curve, located.solution
-    assert isinstance(curve, MotionProblem)
+    curve, solution = b.curve, located.solution
     if solution is None:
         return False
     try:
@@ -139,7 +134,7 @@ def turns_at(located: Located, a: Sample, b: Sample) -> bool:
     except ConvergenceError:
         return False
     here, weights = curve.with_balance(solution.state.balance), b.point.weights
-    chord = weights * (b.point.tangent if a is b else b.point.u - curve.transfer(a.point.u, a.point.curve))
+    chord = weights * (b.point.tangent if a is b else b.point.u - curve.transfer(a.point.u, a.curve))
     ways = [weights * curve.transfer(direction, here) for direction in equation.directions]
     along = max((way / length(way) for way in ways), key=lambda way: abs(float(way @ chord)))
     return abs(float(along[-1])) < _STILL
@@ -149,8 +144,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     """A bracketed bifurcation solved with more harmonics: ripples of the truncated motion on a contact may be in
     the way with fewer.
     """
-    curve, state = located.sample.point.curve, located.sample.state
-    assert isinstance(curve, MotionProblem)
+    curve, state = located.sample.curve, located.sample.state
     beyond: Singular | None = None
     while curve.adaptive is not None:
         basis = next_harmonics(state, curve.adaptive)
@@ -178,8 +172,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
 
 def _distance(found: Singular, sample: Sample) -> float:
     """Scaled distance of a solution from a sample, in the harmonics of the sample."""
-    curve = sample.point.curve
-    assert isinstance(curve, MotionProblem)
+    curve = sample.curve
     wide = curve.with_balance(found.state.balance)
     there = wide.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
     return length(sample.point.weights * (curve.transfer(there, wide) - sample.point.u))
@@ -248,7 +241,7 @@ def _of_its_own(kind: BifurcationKind, found: Singular, curve: MotionProblem, a:
 def _lies_between(found: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
     """Whether a solution, one of the motions of `curve`, lies between two samples, but for what harmonics move."""
     there = curve.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
-    share = position(a.point, b.point, b.point.curve.transfer(there, curve))
+    share = position(a.point, b.point, b.curve.transfer(there, curve))
     if share is None or not -_MOVED <= share <= 1.0 + _MOVED:
         # of a short step, only its ends with the same harmonics tell
         ends = _ends(curve, a, b)
@@ -263,65 +256,29 @@ def _between(kind: BifurcationKind, curve: MotionProblem, a: Sample, b: Sample) 
     ends = _ends(curve, a, b)
     if ends is None or not kind.changed(*ends):
         return None
-    located = locate(kind, *ends, _NEWTON, _sampled(b), guess_at, _HALVED)
+    located = locate(kind, *ends, _NEWTON, _HALVED)
     return None if located is None else located.solution
 
 
 def _ends(curve: MotionProblem, a: Sample, b: Sample) -> tuple[Sample, Sample] | None:
     """Two samples with other harmonics; None if they cannot be solved for."""
     try:
-        first, last = (solved_in(curve, sample, _NEWTON, _sampled(b)) for sample in (a, b))
+        first, last = (solved_in(curve, sample, _NEWTON) for sample in (a, b))
     except ConvergenceError:
         return None
     return first, last
 
 
-def _sampled(like: Sample) -> Callable[[CurvePoint], Sample]:
-    """What turns a point into a sample with another one's stability method."""
-
-    def sample(point: CurvePoint) -> Sample:
-        assert isinstance(point.evaluation, MotionEvaluation)
-        return Sample(point, point.evaluation.state, like.method)
-
-    return sample
-
-
-def solved_in(
-    curve: MotionProblem, sample: Sample, newton: NewtonOptions, make_sample: Callable[[CurvePoint], Sample]
-) -> Sample:
+def solved_in(curve: MotionProblem, sample: Sample, newton: NewtonOptions) -> Sample:
     """The same motion with other harmonics."""
-    point = sample.point
-    u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
-    weights = curve.weights(u, 0.0)
-    row = weights * along / length(weights * along)
-    return make_sample(make_point(correct(curve, u, row, weights, newton), curve, along, point.arclength))
-
-
-def _residual(state: BalanceState) -> float:
-    return state.residual_size() / max(state.force_scale(), float(np.finfo(float).tiny))
-
-
-def orbit_of(sample: Sample) -> PeriodicOrbit:
-    """A point of a response curve as a periodic motion."""
-    evaluation = sample.point.evaluation
-    assert isinstance(evaluation, MotionEvaluation)
-    curve = sample.point.curve
-    assert isinstance(curve, MotionProblem)
-    return as_orbit(sample.state, evaluation.error, evaluation.truncation, curve)
+    u = curve.transfer(sample.point.u, sample.curve)
+    return sample.at(solved_again(sample.point, curve, curve.weights(u, 0.0), newton))
 
 
 def as_orbit(state: BalanceState, residual: float, neglected: float, curve: MotionProblem) -> PeriodicOrbit:
     """A solved state as a periodic motion."""
     values = dict(state.values)
     return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, residual, neglected, curve.adaptive)
-
-
-def guess_at(u: Array, point: CurvePoint, kappa: float) -> Guess:
-    """Where the system of a bifurcation begins: a point of a response curve."""
-    curve = point.curve
-    assert isinstance(curve, MotionProblem)
-    x, omega, values = curve.split(u)
-    return Guess(curve.balance, x, omega, values, curve.name, curve.span, kappa, size=curve.unit(point.weights))
 
 
 def _guess_from(solution: Singular, curve: MotionProblem, size: float = 0.0) -> Guess:

@@ -10,16 +10,16 @@ from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
 from suboctave.continuation.problem import Array
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.sample import Sample
 from suboctave.curves.subharmonic_part import doubled_size
 from suboctave.curves.track_ends import End, resonant_between
-from suboctave.curves.tracked_sample import TrackedSample
 from suboctave.errors import ConvergenceError
 
 #: points on the way to an end at which a parameter may turn before it, and a way for differences
 _APPROACHES, _LITTLE = 6, 1e-6
 
 
-def points_before(end: End, a: TrackedSample, newton: NewtonOptions) -> list[TrackedSample]:
+def points_before(end: End, a: Sample, newton: NewtonOptions) -> list[Sample]:
     """Points between one and the end behind it, as many as a parameter asks for that is to turn there.
 
     The parameters p run like p_end + c z^2 + d z^4 towards it, z the size of the doubled part of limit points, or the
@@ -27,7 +27,7 @@ def points_before(end: End, a: TrackedSample, newton: NewtonOptions) -> list[Tra
     """
     if end.event is None or a.curve.augmentation.turning:
         return []
-    found: list[TrackedSample] = []
+    found: list[Sample] = []
     last = end.event.sample.point.u[-2:]
     for _ in range(_APPROACHES):
         point, curve = a.point, a.curve
@@ -42,7 +42,7 @@ def points_before(end: End, a: TrackedSample, newton: NewtonOptions) -> list[Tra
         row = point.weights * point.tangent
         try:
             solved = correct(curve, point.u + way * point.tangent, row / length(row), point.weights, newton)
-            b = TrackedSample(make_point(solved, curve, point.tangent, point.arclength + way))
+            b = Sample(make_point(solved, curve, point.tangent, point.arclength + way))
         except ConvergenceError:
             break
         if not abs(_remaining(curve, b.point.u)) < abs(here) or resonant_between(a, b) is not None:

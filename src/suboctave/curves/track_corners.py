@@ -20,7 +20,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
 from suboctave.continuation.problem import Array
-from suboctave.curves.tracked_sample import TrackedSample
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
 
@@ -34,7 +34,7 @@ _HEIGHTS, _NEAR = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 5e-3
 
 
 def beyond_corner(
-    last: TrackedSample, before: Iterable[PeriodicOrbit], newton: NewtonOptions
+    last: Sample, before: Iterable[PeriodicOrbit], newton: NewtonOptions
 ) -> tuple[CurvePoint | None, str] | None:
     """A point behind a corner and what to say of it; no point where none is found, None where no contact grazes.
 
@@ -67,12 +67,12 @@ def beyond_corner(
     return None, f"{label} grazes at {where}: the equations are not smooth there"
 
 
-def _size(sample: TrackedSample) -> float:
+def _size(sample: Sample) -> float:
     """The size of a motion that heights are compared with."""
     return float(np.abs(sample.state.x).max())
 
 
-def _grazing(sample: TrackedSample) -> tuple[GapExtrema, int, float] | None:
+def _grazing(sample: Sample) -> tuple[GapExtrema, int, float] | None:
     """The extremum nearest to a grazing: its gap, its index there, its height over the gap; None if all are far."""
     found = []
     for gap in gap_extrema(sample.state):
@@ -96,7 +96,7 @@ def _height(orbit: PeriodicOrbit, gap: GapExtrema, at: int) -> float:
     return 0.0
 
 
-def _gradient(sample: TrackedSample, gap: GapExtrema, at: int) -> Array:
+def _gradient(sample: Sample, gap: GapExtrema, at: int) -> Array:
     """Gradient of the extremum's height over the gap by u."""
     state, curve = sample.state, sample.curve
     value = basis_rows(state.basis.harmonics, float(gap.tau[at]))[0]

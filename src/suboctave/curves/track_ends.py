@@ -28,9 +28,10 @@ from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.nearest import nearest_point, zero_along
+from suboctave.curves.sample import Sample
 from suboctave.curves.subharmonic_part import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.curves.tracked_events import Found
-from suboctave.curves.tracked_sample import TrackedSample, nearest_point, zero_along
 from suboctave.curves.tracked_tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import BalanceState
@@ -74,12 +75,12 @@ class End:
     event: Found | None = None
     last: bool = False
 
-    def way(self, a: TrackedSample) -> float:
+    def way(self, a: Sample) -> float:
         """Distance in the plane of the parameters from a point to the event, in scaled arclength."""
         return 0.0 if self.event is None else _apart(self.event.sample.point, a.point)
 
 
-def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions, lopsided: bool = True) -> End | None:
+def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = True) -> End | None:
     """The end of a curve between two neighbours, None if it goes on; lopsided: whether its motions had no half-wave
     symmetry where it began.
     """
@@ -88,8 +89,8 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions, lopsi
         beta = float(b.evaluation.extra[0])
         if abs(beta) > _UNFOLDING:
             return End(
-                f"the branch points end after {a.curve.where(a.point.u)}: their unfolding is {beta:.1e} at "
-                f"{b.curve.where(b.point.u)}, the symmetry that forces them is broken there"
+                f"the branch points end after {a.where}: their unfolding is {beta:.1e} at "
+                f"{b.where}, the symmetry that forces them is broken there"
             )
     target = resonant_between(a, b)
     if target is not None:
@@ -106,18 +107,18 @@ def end_between(a: TrackedSample, b: TrackedSample, newton: NewtonOptions, lopsi
         if parent is not None:
             return _in_the_parent(parent) if _apart(parent.sample.point, b.point) <= 10.0 * _REACHED else None
         return End(
-            f"the curve ends on the period doublings of the parent motion beside {b.curve.where(b.point.u)}: the "
+            f"the curve ends on the period doublings of the parent motion beside {b.where}: the "
             "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
         )
     if share <= NOTHING_LEFT:
         return End(
-            f"the sub-harmonic part of the motion vanishes at {b.curve.where(b.point.u)}: what follows are period "
+            f"the sub-harmonic part of the motion vanishes at {b.where}: what follows are period "
             "doublings of the parent motion, which solve the same equations"
         )
     return None
 
 
-def resonant_between(a: TrackedSample, b: TrackedSample) -> float | None:
+def resonant_between(a: Sample, b: Sample) -> float | None:
     """kappa in units of the base frequency at which an NS curve ends between two neighbours; None if it goes on, or if
     the curve is another one.
     """
@@ -134,7 +135,7 @@ def resonant_between(a: TrackedSample, b: TrackedSample) -> float | None:
     return target if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)) else None
 
 
-def comes_close(a: TrackedSample, b: TrackedSample) -> bool:
+def comes_close(a: Sample, b: Sample) -> bool:
     """False if an NS curve ends between two neighbours and the first is not close to its end: there may be several
     resonances about, on the curves through them.
     """
@@ -142,7 +143,7 @@ def comes_close(a: TrackedSample, b: TrackedSample) -> bool:
     return target is None or abs(a.kappa / a.state.rate - target) < _CLOSE
 
 
-def end_ahead(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End | None:
+def end_ahead(a: Sample, b: Sample, newton: NewtonOptions) -> End | None:
     """The GPD in which limit points of doubled motions end within a step or two behind the second of two neighbours.
 
     Towards it the parameters run like the square of the doubled part y, which vanishes evenly: p = p_end + c y^2. Where
@@ -163,7 +164,7 @@ def end_ahead(a: TrackedSample, b: TrackedSample, newton: NewtonOptions) -> End 
     return _in_the_parent(parent) if miss <= _LEADS * float(np.linalg.norm(units * lead)) + _REACHED else None
 
 
-def _lead(a: TrackedSample, b: TrackedSample) -> Array | None:
+def _lead(a: Sample, b: Sample) -> Array | None:
     """What the parameters still change by until the doubled part of limit points vanishes, if two neighbours lead
     there; None if they do not, or are others.
     """
@@ -177,12 +178,12 @@ def _lead(a: TrackedSample, b: TrackedSample) -> Array | None:
 
 
 def _in_the_parent(parent: Found) -> End:
-    where = parent.sample.curve.where(parent.sample.point.u)
+    where = parent.sample.where
     reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
     return End(reason, parent, last=True)
 
 
-def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
+def _symmetry_gained(a: Sample, b: Sample) -> End | None:
     """The end of a curve of limit points whose motions become symmetric, x(t + T / 2) = -x(t)."""
     if b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
         return None
@@ -204,12 +205,12 @@ def _symmetry_gained(a: TrackedSample, b: TrackedSample) -> End | None:
             if np.abs(_even(aside.residual.reshape(x.shape))).max() > _NO_PARITY * aside.force_scale():
                 return None
     return End(
-        f"the motions become symmetric at {b.curve.where(b.point.u)}, x(t + T/2) = -x(t): what follows are branch "
+        f"the motions become symmetric at {b.where}, x(t + T/2) = -x(t): what follows are branch "
         "points of symmetric motions, which solve the same equations"
     )
 
 
-def is_lopsided(sample: TrackedSample) -> bool:
+def is_lopsided(sample: Sample) -> bool:
     """Whether a motion lacks the half-wave symmetry by more than rounding."""
     return _unsymmetric_share(sample.state) > _NO_PARITY
 
@@ -230,7 +231,7 @@ def _apart(one: CurvePoint, other: CurvePoint) -> float:
     return float(np.linalg.norm(other.weights[-2:] * (one.u[-2:] - other.u[-2:])))
 
 
-def _standing(a: TrackedSample, b: TrackedSample) -> bool:
+def _standing(a: Sample, b: Sample) -> bool:
     """Whether the doubled part of limit points goes on to vanish while the parameters have come to their end."""
     units, lead = b.point.weights[-2:], _lead(a, b)
     speed = float(np.linalg.norm(units * b.point.tangent[-2:]))
@@ -241,14 +242,14 @@ def _standing(a: TrackedSample, b: TrackedSample) -> bool:
     return 0.5 * speed * size * (b.point.arclength - a.point.arclength) <= _REACHED * (before - size)
 
 
-def _symmetric(b: TrackedSample) -> bool:
+def _symmetric(b: Sample) -> bool:
     """Whether a perturbation has frequencies kappa + k w0 for even k alone, or for odd k alone."""
     waves = b.equations.bordered.right.reshape(-1, b.curve.balance.size)
     first, last = (float(np.linalg.norm(waves[i::2])) for i in (0, 1))
     return min(first, last) < _NO_PARITY * max(first, last)
 
 
-def _split(b: TrackedSample) -> bool:
+def _split(b: Sample) -> bool:
     """Whether the two multipliers nearest to the critical one are real: a neutral saddle."""
     critical = b.evaluation.critical
     if critical is None:
@@ -258,12 +259,12 @@ def _split(b: TrackedSample) -> bool:
     return bool(np.all(nearest.imag == 0.0))
 
 
-def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
+def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP, BP or PD curve through it."""
     order = 2 if double else 1
     words = f"1:{order}"
     if a.curve.augmentation.turning:
-        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)}")
+        return End(f"the curve ends in a {words} resonance beyond {a.where}")
     balance, name = a.curve.balance, a.curve.names[0]
     state = balance.at(a.state.x, a.state.omega, a.state.values)
     # limit points of motions with a symmetry may be branch points, where the equations of limit points are singular
@@ -281,12 +282,12 @@ def _resonance(a: TrackedSample, double: bool, newton: NewtonOptions) -> End:
         except ConvergenceError as failure:
             failures.append(str(failure))
     else:
-        return End(f"the curve ends in a {words} resonance beyond {a.curve.where(a.point.u)} ({failures[0]})")
-    where = found.sample.curve.where(found.sample.point.u)
+        return End(f"the curve ends in a {words} resonance beyond {a.where} ({failures[0]})")
+    where = found.sample.where
     return End(f"the curve ends in a {words} resonance at {where}", found, last=True)
 
 
-def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
+def _on_the_parent(a: Sample, newton: NewtonOptions) -> Found | None:
     """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
     basis = a.curve.balance.basis
     if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
@@ -302,7 +303,7 @@ def _on_the_parent(a: TrackedSample, newton: NewtonOptions) -> Found | None:
 
 
 def _zero_beside(
-    a: TrackedSample, curve: MotionProblem, x: Array, test: CurveTest, newton: NewtonOptions, reach: float
+    a: Sample, curve: MotionProblem, x: Array, test: CurveTest, newton: NewtonOptions, reach: float
 ) -> Found:
     """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
     u = curve.join(x, a.point.u[-len(curve.names) :], np.zeros(curve.augmentation.extras))
@@ -314,7 +315,7 @@ def _zero_beside(
     return Found(test, zero_along(start, test.value, newton, last * reach))
 
 
-def rebased(orbit: PeriodicOrbit, a: TrackedSample) -> PeriodicOrbit:
+def rebased(orbit: PeriodicOrbit, a: Sample) -> PeriodicOrbit:
     """A motion in a curve's basis, where that is of another period: one of the parent of doubled motions."""
     balance = a.curve.balance
     if orbit.basis.nu == balance.basis.nu:

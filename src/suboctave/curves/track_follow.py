@@ -13,11 +13,11 @@ from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
 from suboctave.continuation.linear import cosine, length
-from suboctave.continuation.newton import correct
-from suboctave.continuation.point import make_point
+from suboctave.continuation.point import solved_again
 from suboctave.continuation.problem import Curve
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
 from suboctave.curves.points import TrackedPoint
+from suboctave.curves.sample import Sample
 from suboctave.curves.subharmonic_part import keeps_subharmonics
 from suboctave.curves.trace import Settings
 from suboctave.curves.track_approach import points_before
@@ -28,7 +28,6 @@ from suboctave.curves.tracked_events import Found, events_between, extreme_of, r
 from suboctave.curves.tracked_hidden import HiddenPairs
 from suboctave.curves.tracked_located import as_event
 from suboctave.curves.tracked_pairs import PairWatch
-from suboctave.curves.tracked_sample import TrackedSample
 from suboctave.curves.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import Interruption
@@ -87,13 +86,13 @@ class _Tracker:
         self.settings = settings
         self.box = box
         self.others = _other_bounds(start.curve, box)
-        self.lopsided = is_lopsided(TrackedSample(start))
+        self.lopsided = is_lopsided(Sample(start))
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
         self.trace = TrackedTrace()
         tests = tests_of(start.curve)
         self.tests: tuple[CurveTest, ...] = tuple(t for t in tests if not isinstance(t, PairCrossing))
-        self.previous: TrackedSample | None = None
+        self.previous: Sample | None = None
         self.hidden = HiddenPairs(self.tests, settings.newton)
         pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
         self.pairs = PairWatch(pairs, settings.newton)
@@ -127,7 +126,7 @@ class _Tracker:
             self._say_doubts()
             self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
         except KeyboardInterrupt as cause:
-            where = self.previous.curve.where(self.previous.point.u) if self.previous else "the start"
+            where = self.previous.where if self.previous else "the start"
             trace.ends(Ending.stopped(Interruption.of(cause), where))
         trace.events.sort(key=lambda event: event.arclength)
         if trace.closed:
@@ -155,12 +154,12 @@ class _Tracker:
         point, note = found
         if note not in self.trace.warnings:
             self.trace.warnings.append(note)
-        if point is None or not self._inside(TrackedSample(point)):
+        if point is None or not self._inside(Sample(point)):
             return None
         self._turn_at_corner(last, point)
         return point
 
-    def _turn_at_corner(self, last: TrackedSample, beyond: CurvePoint) -> None:
+    def _turn_at_corner(self, last: Sample, beyond: CurvePoint) -> None:
         """Parameters that run the other way behind a corner have an extremum in it, known as well as the corner is.
 
         It stands for whatever turns on the last steps into it, where nothing tells one turn from another.
@@ -184,20 +183,20 @@ class _Tracker:
         way = b.arclength - a.arclength
         if b.orientation != a.orientation and way > _JUMP:
             return False
-        if way > _NEAR_END and not comes_close(TrackedSample(a), TrackedSample(b)):
+        if way > _NEAR_END and not comes_close(Sample(a), Sample(b)):
             return False
         return keeps_subharmonics(a, b)
 
     def _accept(self, point: CurvePoint) -> Ending | None:
         """Take a point in; why the curve ends there or before it, if it does."""
-        settings, new = self.settings, TrackedSample(point)
+        settings, new = self.settings, Sample(point)
         self.home = self.home or point
         if self.previous is not None:
             # by now the choice of harmonics has asked for what it needs
             self._note_doubt(self.previous)
             if self.untold >= _UNTOLD:
                 largest = np.abs(self.previous.evaluation.floquet.multipliers).max()
-                where = self.previous.curve.where(self.previous.point.u)
+                where = self.previous.where
                 detail = (
                     f"multipliers of up to {largest:.0e} at {where} leave the critical one untold: the motions are so "
                     "unstable there that their bifurcations have no meaning"
@@ -221,7 +220,7 @@ class _Tracker:
         try:
             left = self._left(a, new)
         except ConvergenceError:
-            return Ending(EndReason.LEFT_RANGE, a.curve.where(a.point.u))
+            return Ending(EndReason.LEFT_RANGE, a.where)
         new = self._smooth(a, left or new)
         warnings = self.trace.warnings
         found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
@@ -233,7 +232,7 @@ class _Tracker:
             numbers = len(trace.points), len(trace.events), basis.harmonics // basis.nu
             settings.report.at(point.parameter, where, *numbers)
         if left is not None:
-            return Ending(EndReason.RANGE_END, new.curve.where(new.point.u))
+            return Ending(EndReason.RANGE_END, new.where)
         ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
         if ahead is None:
             return None
@@ -245,7 +244,7 @@ class _Tracker:
         for item in found:
             better = refined(item, settings.newton, warnings)
             if not better.test.confirmed(better.sample):
-                where = better.sample.curve.where(better.sample.point.u)
+                where = better.sample.where
                 warnings.append(
                     f"{better.test.kind} at {where} is left out: with the harmonics kept a pair of multipliers lies on "
                     "the unit circle there, by the monodromy matrix none does"
@@ -253,7 +252,7 @@ class _Tracker:
                 continue
             self.trace.events.append(as_event(better, settings.stability, settings.observe))
 
-    def _add(self, sample: TrackedSample) -> None:
+    def _add(self, sample: Sample) -> None:
         point = sample.point
         self.trace.points.append(
             TrackedPoint(
@@ -269,15 +268,15 @@ class _Tracker:
             )
         )
 
-    def _note_doubt(self, sample: TrackedSample) -> None:
+    def _note_doubt(self, sample: Sample) -> None:
         """Whether the critical multiplier is one of the monodromy matrix, where that is known and now and then."""
         evaluation = sample.evaluation
-        known = "floquet" in evaluation.__dict__ or sample.curve.steps % CRITICAL_EVERY == 0
+        known = evaluation.known_floquet is not None or sample.curve.steps % CRITICAL_EVERY == 0
         if known and evaluation.critical is not None:
             self.looked += 1
             doubtful = evaluation.doubt > _DOUBTFUL
             if doubtful:
-                self.doubtful.append(sample.curve.where(sample.point.u))
+                self.doubtful.append(sample.where)
             violent = np.abs(evaluation.floquet.multipliers).max() > _VIOLENT
             self.untold = self.untold + 1 if doubtful and violent else 0
 
@@ -289,7 +288,7 @@ class _Tracker:
                 "the motion is so unstable that its multipliers cannot be told"
             )
 
-    def _take_end(self, a: TrackedSample, end: End) -> None:
+    def _take_end(self, a: Sample, end: End) -> None:
         settings = self.settings
         for b in points_before(end, a, settings.newton):
             self._take(events_between(a, b, self.tests, settings.newton, self.trace.warnings))
@@ -306,34 +305,31 @@ class _Tracker:
                 kappa = 0.5 * orbit.omega / orbit.basis.nu if found.test.kind == "R2" else 0.0
                 self.trace.points.append(TrackedPoint(orbit, arclength, 0, settings.stability, kappa))
 
-    def _closing(self, a: TrackedSample, back: TrackedSample) -> TrackedSample:
+    def _closing(self, a: Sample, back: Sample) -> Sample:
         """The first point again, with the bordering vectors of the last."""
-        weights = back.point.weights
         curve = a.curve.adapted(a.point.u, a.evaluation).with_basis(back.curve.balance.basis)
         try:
-            solved = correct(curve, back.point.u, weights * back.point.tangent, weights, self.settings.newton)
+            return Sample(solved_again(back.point, curve, back.point.weights, self.settings.newton))
         except ConvergenceError:
             return back
-        along = curve.transfer(a.point.tangent, a.curve)
-        return TrackedSample(make_point(solved, curve, along, back.point.arclength))
 
-    def _smooth(self, a: TrackedSample, b: TrackedSample) -> TrackedSample:
+    def _smooth(self, a: Sample, b: Sample) -> Sample:
         """The second of two neighbours with the direction in which the curve comes to it.
 
         On the end of a range a coefficient may have a corner (a gap that is just closed): derivatives there may be
         those of the far side.
         """
         point, angle = b.point, self.settings.stepping.sharpest
-        if cosine(a.curve_tangent(b.curve), point.tangent, point.weights) > math.cos(angle):
+        if cosine(b.curve.transfer(a.point.tangent, a.curve), point.tangent, point.weights) > math.cos(angle):
             return b
         chord = point.u - b.curve.transfer(a.point.u, a.curve)
-        return TrackedSample(replace(point, tangent=chord / length(point.weights * chord)))
+        return Sample(replace(point, tangent=chord / length(point.weights * chord)))
 
-    def _inside(self, sample: TrackedSample) -> bool:
+    def _inside(self, sample: Sample) -> bool:
         """Whether a point lies in the ranges of the parameters but the last."""
         return all(bounds.low <= bounds.value(sample.point) <= bounds.high for bounds in self.others)
 
-    def _left(self, a: TrackedSample, b: TrackedSample) -> TrackedSample | None:
+    def _left(self, a: Sample, b: Sample) -> Sample | None:
         """The first point between two neighbours at which the curve leaves the range of a parameter but the last, None
         if it stays in them; raises ConvergenceError where it leaves one but no solution is found on its bound.
         """
@@ -348,11 +344,9 @@ class _Tracker:
             else:
                 landed = bounds.land(a.point, end.point, bound, newton)
                 if landed is None:
-                    raise ConvergenceError(
-                        f"left the range after {a.curve.where(a.point.u)}; no solution was found exactly on its end"
-                    )
+                    raise ConvergenceError(f"left the range after {a.where}; no solution was found exactly on its end")
             if landed is not None:
-                found = end if landed is end.point else TrackedSample(landed)
+                found = end if landed is end.point else Sample(landed)
         return found
 
 

@@ -18,7 +18,8 @@ from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point, point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.tracked_sample import BEGINNING, TrackedSample, nearest_point, same_discretisation, zero_along
+from suboctave.curves.nearest import BEGINNING, nearest_point, same_discretisation, zero_along
+from suboctave.curves.sample import Sample
 from suboctave.curves.tracked_tests import CurveTest, Cusp, Extremum
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
@@ -51,7 +52,7 @@ class Found:
     """
 
     test: CurveTest
-    sample: TrackedSample
+    sample: Sample
     extreme: str = ""
     rough: _Stretch | None = None
     slope: float = 0.0
@@ -59,7 +60,7 @@ class Found:
 
 
 def events_between(
-    a: TrackedSample, b: TrackedSample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
+    a: Sample, b: Sample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
 ) -> list[Found]:
     """Every event between two neighbours, in the order met.
 
@@ -72,13 +73,13 @@ def events_between(
             both = [located(test, low, high, newton) for low, high in brackets(test, a, b, newton)]
             found += [item for item in both if item is not None]
         except ConvergenceError as failure:
-            warnings.append(f"{test.kind} near {b.curve.where(b.point.u)}: {failure}")
+            warnings.append(f"{test.kind} near {b.where}: {failure}")
     if b.curve.augmentation.turning:
         found = _without_consequences(found, b.curve, SAME * (b.point.arclength - a.point.arclength))
     return sorted(found, key=lambda item: item.sample.point.arclength)
 
 
-def located(test: CurveTest, low: TrackedSample, high: TrackedSample, newton: NewtonOptions) -> Found | None:
+def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -> Found | None:
     """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
     own = test.within(low, high)
     same = same_discretisation(low, high, newton)
@@ -120,9 +121,7 @@ def _without_consequences(found: list[Found], curve: MotionProblem, near: float)
     return [item for item in found if not any(item is d for d in dropped)]
 
 
-def brackets(
-    test: CurveTest, a: TrackedSample, b: TrackedSample, newton: NewtonOptions
-) -> list[tuple[TrackedSample, TrackedSample]]:
+def brackets(test: CurveTest, a: Sample, b: Sample, newton: NewtonOptions) -> list[tuple[Sample, Sample]]:
     """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
     changed = test.changed(a, b)
     share = None if changed or not isinstance(test, Extremum) else _turn_inside(test.name, a, b)
@@ -132,11 +131,11 @@ def brackets(
         return []
     if share is None:
         return [(a, b)]
-    middle = TrackedSample(point_between(a.point, b.point, share, newton))
+    middle = Sample(point_between(a.point, b.point, share, newton))
     return [(a, middle), (middle, b)] if test.changed(a, middle) else []
 
 
-def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
+def _turn_inside(name: str, a: Sample, b: Sample) -> float | None:
     """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
     share, slope = slowest_between(name, a, b)
     start = abs(a.slopes[name])
@@ -144,7 +143,7 @@ def _turn_inside(name: str, a: TrackedSample, b: TrackedSample) -> float | None:
     return share if 0.0 < share < 1.0 and slope < 0.05 * start else None
 
 
-def slowest_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float]:
+def slowest_between(name: str, a: Sample, b: Sample) -> tuple[float, float]:
     """Where between two neighbours (0 and 1: at one of them) a parameter runs slowest by its cubic interpolation, and
     its slope there in the direction of the first.
     """
@@ -157,7 +156,7 @@ def slowest_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[floa
     return (0.0, sign * start) if sign * start < last else (1.0, last)
 
 
-def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float, float, float]:
+def _slope_between(name: str, a: Sample, b: Sample) -> tuple[float, float, float]:
     """The derivative of a parameter by arclength, `start + 2 half s + curve s^2` at the share s of the way between two
     neighbours, by its cubic interpolation; nothing of it without a way.
     """
@@ -172,7 +171,7 @@ def _slope_between(name: str, a: TrackedSample, b: TrackedSample) -> tuple[float
 class _Stretch:
     """A test between two neighbours, by the share of the way along the chord."""
 
-    def __init__(self, a: TrackedSample, b: TrackedSample, test: CurveTest, newton: NewtonOptions) -> None:
+    def __init__(self, a: Sample, b: Sample, test: CurveTest, newton: NewtonOptions) -> None:
         self.a, self.b = a, b
         self.test = test
         self.newton = newton
@@ -189,7 +188,7 @@ class _Stretch:
     def value(self, share: float) -> float:
         """The test's function."""
         if share not in self.values:
-            sample = self.samples[share] = TrackedSample(self._point(share))
+            sample = self.samples[share] = Sample(self._point(share))
             self.values[share] = self.test.value(sample)
         return self.values[share]
 
@@ -225,7 +224,7 @@ class _Stretch:
             solved = correct(curve, between_them, row, weights, replace(self.newton, iterations=30, damped=True))
         return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
 
-    def about(self, resolved: float) -> tuple[TrackedSample, float]:
+    def about(self, resolved: float) -> tuple[Sample, float]:
         """A point beside the zero, closer than a share of the way or (0) where little is left of the test's values at
         the ends, and about the test's derivative by arclength there.
         """
@@ -248,7 +247,7 @@ class _Stretch:
             slope = (value - first) / share + (last - value) / (1.0 - share) - slope
         return self.samples[share], slope / way if way > 0.0 else 0.0
 
-    def jumps_at(self, sample: TrackedSample) -> bool:
+    def jumps_at(self, sample: Sample) -> bool:
         """Whether the test changes sign without vanishing, as c3 does in a corner; a parameter may turn in one."""
         ends = abs(self.values[0.0]), abs(self.values[1.0])
         return not isinstance(self.test, Extremum) and abs(self.test.value(sample)) > _JUMP * min(ends)
@@ -265,7 +264,7 @@ class _Stretch:
             return share if 0.0 < share < 1.0 else 0.0
         return 0.0
 
-    def zero_from(self, sample: TrackedSample, slope: float) -> TrackedSample:
+    def zero_from(self, sample: Sample, slope: float) -> Sample:
         """Where the test vanishes, from a point beside, by secants; by Brent's method where these leave the way."""
         low, high = self.a.point.arclength, self.b.point.arclength
         try:
@@ -278,7 +277,7 @@ class _Stretch:
             return found
         return self.zero(_RESOLVED)
 
-    def zero(self, resolved: float) -> TrackedSample:
+    def zero(self, resolved: float) -> Sample:
         """Where the test vanishes, to a share of the way."""
         self.spare = 0.0
         for known in (self.samples, self.values):
@@ -304,7 +303,7 @@ class _Stretch:
             return float(scipy.optimize.brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
         raise ConvergenceError("the test does not change sign")
 
-    def samples_at(self, share: float) -> TrackedSample:
+    def samples_at(self, share: float) -> Sample:
         """The point at a share."""
         self.value(share)
         return self.samples[share]
@@ -320,7 +319,7 @@ def _even(first: float, last: float) -> Callable[[float], float]:
     return lambda value: math.asinh(value / least)
 
 
-def _finer(sample: TrackedSample) -> HarmonicBasis | None:
+def _finer(sample: Sample) -> HarmonicBasis | None:
     """The basis that an event asks for, None where the present one will do."""
     curve = sample.curve
     if curve.adaptive is None:
@@ -329,7 +328,7 @@ def _finer(sample: TrackedSample) -> HarmonicBasis | None:
     return basis if basis.harmonics > curve.balance.basis.harmonics else None
 
 
-def extreme_of(test: CurveTest, before: float, at: TrackedSample) -> str:
+def extreme_of(test: CurveTest, before: float, at: Sample) -> str:
     """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before it."""
     return test.extreme(before, at) if isinstance(test, Extremum) else ""
 
@@ -353,7 +352,7 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             weights = finer.weights(u, curve.size(sample.point.u))
             start = nearest_point(finer, u, weights, newton, along, BEGINNING)
             start = replace(start, arclength=sample.point.arclength)
-            near = TrackedSample(start)
+            near = Sample(start)
             test = found.test.within(near, near)
             sample = zero_along(start, test.value, newton, _BESIDE, found.slope, factor=start.factor)
         except ConvergenceError as failure:

@@ -20,8 +20,9 @@ from suboctave.compiled import kernel
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
+from suboctave.curves.nearest import same_discretisation
+from suboctave.curves.sample import Sample
 from suboctave.curves.tracked_events import SAME, Found, brackets, located, slowest_between
-from suboctave.curves.tracked_sample import TrackedSample, same_discretisation
 from suboctave.curves.tracked_tests import CurveTest, Extremum
 from suboctave.errors import ConvergenceError
 
@@ -44,9 +45,9 @@ class HiddenPairs:
         self.tests = list(tests)
         self.newton = newton
         #: the last points, with sign and logarithm of every test's function
-        self._known: list[tuple[TrackedSample, list[tuple[float, float]]]] = []
+        self._known: list[tuple[Sample, list[tuple[float, float]]]] = []
 
-    def passed(self, sample: TrackedSample, warnings: list[str]) -> list[Found]:
+    def passed(self, sample: Sample, warnings: list[str]) -> list[Found]:
         """Take in the next point; the pairs found in the step before the last."""
         if not self.tests:
             return []
@@ -83,7 +84,7 @@ class HiddenPairs:
                 warnings.append(f"whether two {test.kind} lie after {where} could not be told: {failure}")
         return found
 
-    def _told(self, test: CurveTest, samples: list[TrackedSample], at: int) -> bool:
+    def _told(self, test: CurveTest, samples: list[Sample], at: int) -> bool:
         """Whether a parameter does not turn twice in a step for all that is known, or was seen to do so already."""
         if not isinstance(test, Extremum):
             return False
@@ -93,7 +94,7 @@ class HiddenPairs:
         return not slower or test.level(*samples) or len(brackets(test, a, b, self.newton)) > 1
 
     def _pair(
-        self, test: CurveTest, samples: list[TrackedSample], functions: list[tuple[float, float]], at: int
+        self, test: CurveTest, samples: list[Sample], functions: list[tuple[float, float]], at: int
     ) -> list[Found]:
         """The two events of one test in a step that may hide them."""
         a, b = same_discretisation(samples[at], samples[at + 1], self.newton), samples[at + 1]
@@ -113,7 +114,7 @@ class HiddenPairs:
                 break
             i, share = found
             place = places[i] + share * (places[i + 1] - places[i])
-            middle = TrackedSample(point_between(a.point, b.point, (place - start) / way, self.newton))
+            middle = Sample(point_between(a.point, b.point, (place - start) / way, self.newton))
             before, after = inside[i - low], inside[i - low + 1]
             if test.changed(before, middle) and test.changed(middle, after):
                 both = [located(test, before, middle, self.newton), located(test, middle, after, self.newton)]

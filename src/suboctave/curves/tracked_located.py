@@ -8,8 +8,8 @@ from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.sample import Sample
 from suboctave.curves.tracked_events import Found
-from suboctave.curves.tracked_sample import TrackedSample
 from suboctave.curves.tracked_tests import Extremum
 from suboctave.floquet import StabilityMethod
 
@@ -40,7 +40,7 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
     )
 
 
-def _contact(sample: TrackedSample) -> GrazingContact | None:
+def _contact(sample: Sample) -> GrazingContact | None:
     """What grazes along a curve of grazings."""
     equations = sample.evaluation.equations.own
     if not isinstance(equations, GrazingEquations):

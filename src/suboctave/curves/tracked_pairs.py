@@ -13,9 +13,9 @@ import itertools
 import numpy as np
 
 from suboctave.continuation import NewtonOptions
+from suboctave.curves.sample import Sample
 from suboctave.curves.tracked_events import Found, located
 from suboctave.curves.tracked_hidden import HiddenPairs
-from suboctave.curves.tracked_sample import TrackedSample
 from suboctave.curves.tracked_tests import PairCrossing
 from suboctave.errors import ConvergenceError
 
@@ -34,10 +34,10 @@ class PairWatch:
         self.test = test
         self.newton = newton
         self._hidden = HiddenPairs([] if test is None else [test], newton)
-        self._waiting: list[TrackedSample] = []
+        self._waiting: list[Sample] = []
         self._stride = 1
 
-    def passed(self, sample: TrackedSample, warnings: list[str]) -> list[Found]:
+    def passed(self, sample: Sample, warnings: list[str]) -> list[Found]:
         """Take in the next point; pairs found before it."""
         if self.test is None:
             return []
@@ -69,7 +69,7 @@ class PairWatch:
                 try:
                     item = located(self.test, a, b, self.newton)
                 except ConvergenceError as failure:
-                    warnings.append(f"{self.test.kind} near {b.curve.where(b.point.u)}: {failure}")
+                    warnings.append(f"{self.test.kind} near {b.where}: {failure}")
                     continue
                 found += [] if item is None else [item]
         self._stride = min(_STRIDE, 2 * steps) if slow else 1
@@ -77,7 +77,7 @@ class PairWatch:
         return found
 
 
-def _margin(sample: TrackedSample) -> float:
+def _margin(sample: Sample) -> float:
     """The least |1 - mu_i mu_j|, in units of 1 + |mu_i mu_j|."""
     mu = sample.others
     products = np.outer(mu, mu)[np.triu_indices(len(mu), 1)]

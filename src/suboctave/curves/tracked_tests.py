@@ -27,7 +27,7 @@ from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.tracked_sample import TrackedSample
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
@@ -56,28 +56,28 @@ class CurveTest(ABC):
         """What the events are called."""
 
     @abstractmethod
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """The test function; 0 where it says nothing."""
 
-    def changed(self, a: TrackedSample, b: TrackedSample) -> bool:
+    def changed(self, a: Sample, b: Sample) -> bool:
         """Whether it changes sign between two neighbours."""
         first, last = self.value(a), self.value(b)
         return first * last < 0.0 or (last == 0.0 and first != 0.0)
 
-    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+    def within(self, a: Sample, b: Sample) -> CurveTest:
         """The test with a function that is smooth between two neighbours."""
         return self
 
-    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+    def smooth(self, sample: Sample) -> tuple[float, float]:
         """Sign and logarithm of the modulus of a function that vanishes with it, smooth along the whole curve."""
         value = self.value(sample)
         return (1.0 if value > 0.0 else -1.0), _logarithm(value)
 
-    def genuine(self, sample: TrackedSample) -> bool:
+    def genuine(self, sample: Sample) -> bool:
         """Whether what was located is an event."""
         return True
 
-    def confirmed(self, sample: TrackedSample) -> bool:
+    def confirmed(self, sample: Sample) -> bool:
         """Whether multipliers, which depend little on the harmonics kept, agree with an event as it is reported."""
         return True
 
@@ -89,27 +89,27 @@ class Extremum(CurveTest):
     name: str
     kind = "extremum"
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`."""
         slope = sample.slopes[self.name]
         return slope / sample.bend if self._beside_cusps(sample) else slope
 
     @staticmethod
-    def _beside_cusps(sample: TrackedSample) -> bool:
+    def _beside_cusps(sample: Sample) -> bool:
         """Whether both parameters turn where the cusp's function vanishes, which it does not do here."""
         return sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning and sample.bend != 0.0
 
-    def extreme(self, before: float, at: TrackedSample) -> str:
+    def extreme(self, before: float, at: Sample) -> str:
         """Whether the parameter has a maximum or a minimum at a zero; before: sign of the function before it."""
         rising = before * at.bend if self._beside_cusps(at) else before
         return "maximum" if rising > 0.0 else "minimum"
 
-    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+    def smooth(self, sample: Sample) -> tuple[float, float]:
         """See `CurveTest.smooth`: at a cusp it vanishes as well."""
         slope = sample.slopes[self.name]
         return (1.0 if slope > 0.0 else -1.0), _logarithm(slope)
 
-    def level(self, *samples: TrackedSample) -> bool:
+    def level(self, *samples: Sample) -> bool:
         """Whether the parameter stays as it is but for rounding."""
         return all(
             abs(s.slopes[self.name] * float(s.point.weights[s.curve.index(self.name)])) < _LEVEL for s in samples
@@ -122,7 +122,7 @@ class Cusp(CurveTest):
 
     kind = "CP"
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`."""
         return sample.bend
 
@@ -133,12 +133,12 @@ class GeneralisedDoubling(CurveTest):
 
     kind = "GPD"
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`."""
         # at a fold-flip c3 passes through infinity, and det J_0 through zero
         return sample.cubic * sample.sign(Kind.INTEGER)
 
-    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+    def smooth(self, sample: Sample) -> tuple[float, float]:
         """See `CurveTest.smooth`."""
         sign, size = super().smooth(sample)
         return sign, size + sample.determinant(Kind.INTEGER)[1]
@@ -155,11 +155,11 @@ class DoubleMultiplier(CurveTest):
         """R1 or R2."""
         return f"R{self.order}"
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`."""
         return sample.twist
 
-    def genuine(self, sample: TrackedSample) -> bool:
+    def genuine(self, sample: Sample) -> bool:
         """See `CurveTest.genuine`; raises ConvergenceError where the multipliers contradict."""
         critical = 1.0 if self.order == 1 else -1.0
         apart = np.sort(np.abs(sample.evaluation.floquet.multipliers - critical))
@@ -182,7 +182,7 @@ class Resonance(CurveTest):
         """R3 or R4."""
         return f"R{self.order}"
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`."""
         share = sample.kappa / sample.state.rate
         # beyond w0/2 the other one of the pair has the smaller kappa
@@ -204,21 +204,21 @@ class RealCrossing(CurveTest):
         """LPPD, LPNS, PDNS or NSNS."""
         return self.label
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`."""
         if self.borders is None:
             return sample.sign(self.operator)
         return float(bordered(sample.state, self.operator, self.borders).g.real)
 
-    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+    def within(self, a: Sample, b: Sample) -> CurveTest:
         """See `CurveTest.within`."""
         return replace(self, borders=null_vectors(b.state, self.operator))
 
-    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+    def smooth(self, sample: Sample) -> tuple[float, float]:
         """See `CurveTest.smooth`."""
         return sample.determinant(self.operator)
 
-    def genuine(self, sample: TrackedSample) -> bool:
+    def genuine(self, sample: Sample) -> bool:
         """See `CurveTest.genuine`: close to R1 and R2 the pair that an NS curve follows is critical itself."""
         if self.kind == "LPPD":
             return True
@@ -248,18 +248,18 @@ class PairCrossing(CurveTest):
         """LPPD, LPNS, PDNS or NSNS."""
         return self.label
 
-    def changed(self, a: TrackedSample, b: TrackedSample) -> bool:
+    def changed(self, a: Sample, b: Sample) -> bool:
         """See `CurveTest.changed`."""
         return _passing(a.others, b.others) is not None
 
-    def within(self, a: TrackedSample, b: TrackedSample) -> CurveTest:
+    def within(self, a: Sample, b: Sample) -> CurveTest:
         """See `CurveTest.within`; the target stays where none passes."""
         pair = _passing(a.others, b.others)
         target = self.target if pair is None else (pair[0] + pair[1]) / abs(pair[0] + pair[1])
         assert target is not None
         return replace(self, target=target, borders=null_vectors(b.state, Kind.FREE, _frequency(b, target)))
 
-    def value(self, sample: TrackedSample) -> float:
+    def value(self, sample: Sample) -> float:
         """See `CurveTest.value`: logarithm of the pair's modulus."""
         assert self.target is not None
         assert self.borders is not None
@@ -278,7 +278,7 @@ class PairCrossing(CurveTest):
         # other multipliers, the critical one among them, have zeros of g as well
         return found if abs(found - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
 
-    def confirmed(self, sample: TrackedSample) -> bool:
+    def confirmed(self, sample: Sample) -> bool:
         """See `CurveTest.confirmed`."""
         assert self.target is not None
         found, error = sample.evaluation.floquet, 0.0
@@ -287,7 +287,7 @@ class PairCrossing(CurveTest):
         pairs = sample.others[sample.others.imag > 0.0]
         return bool(pairs.size) and math.log(abs(_nearest_pair(sample, self.target))) ** 2 < (_ON_IT + error) ** 2
 
-    def smooth(self, sample: TrackedSample) -> tuple[float, float]:
+    def smooth(self, sample: Sample) -> tuple[float, float]:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
         sign, size = measures.torus(sample.others).tolist()
         return sign, size
@@ -298,7 +298,7 @@ def _logarithm(value: float) -> float:
     return math.log(abs(value)) if value != 0.0 else -math.inf
 
 
-def _nearest_pair(sample: TrackedSample, target: complex) -> complex:
+def _nearest_pair(sample: Sample, target: complex) -> complex:
     """The complex multiplier of the upper half plane that is nearest to a target."""
     pairs = sample.others[sample.others.imag > 0.0]
     if not pairs.size:
@@ -306,7 +306,7 @@ def _nearest_pair(sample: TrackedSample, target: complex) -> complex:
     return complex(pairs[np.argmin(np.abs(pairs - target))])
 
 
-def _frequency(sample: TrackedSample, target: complex) -> float:
+def _frequency(sample: Sample, target: complex) -> float:
     """kappa of that multiplier."""
     return float(np.angle(_nearest_pair(sample, target))) * sample.state.rate / (2.0 * np.pi)
 

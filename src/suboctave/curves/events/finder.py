@@ -9,7 +9,6 @@ say.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,8 @@ from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import CurvePoint, between, point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.locate import Guess, Singular
-from suboctave.curves.events.monitors import BifurcationKind, Sample
+from suboctave.curves.events.monitors import BifurcationKind
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 
 #: fractions of a step by which rounding may carry a solution beyond its ends
@@ -49,8 +49,6 @@ def locate(
     a: Sample,
     b: Sample,
     newton: NewtonOptions,
-    make_sample: Callable[[CurvePoint], Sample],
-    make_guess: Callable[[Array, CurvePoint, float], Guess],
     bisections: int = 34,
     begins: bool = False,
 ) -> Located | None:
@@ -58,10 +56,6 @@ def locate(
 
     Parameters
     ----------
-    make_sample
-        Turns a solved curve point into a sample.
-    make_guess
-        Turns a vector u in the discretisation of a curve point, and kappa, into a start of the bordered system.
     bisections
         Halvings after which the bracket is taken for the answer.
     begins
@@ -78,7 +72,7 @@ def locate(
         nearer = at_low if share < 0.5 else at_high
         if depth % 3 == 0:
             # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
-            found = _try(kind, at_low, at_high, share, nearer, make_guess)
+            found = _try(kind, at_low, at_high, share, nearer)
             # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
             # here
             if found is not None:
@@ -89,7 +83,7 @@ def locate(
         for part in (0.5, 0.4, 0.65):
             try:
                 at = low + part * (high - low)
-                middle = make_sample(point_between(a.point, b.point, at, newton, exactly=True))
+                middle = b.at(point_between(a.point, b.point, at, newton, exactly=True))
                 break
             except ConvergenceError:
                 continue
@@ -111,11 +105,10 @@ def _try(
     high: Sample,
     share: float,
     nearer: Sample,
-    make_guess: Callable[[Array, CurvePoint, float], Guess],
 ) -> tuple[Singular, float] | None:
     """A solution between two samples and where, from a start at a share of the way; None if there is none."""
     try:
-        guess = make_guess(between(low.point, high.point, share), high.point, kind.kappa(nearer))
+        guess = Guess.at(between(low.point, high.point, share), high.point, kind.kappa(nearer))
         found = kind.solve(guess)
     except ConvergenceError:
         return None
@@ -131,14 +124,13 @@ def locate_near(
     kind: BifurcationKind,
     sample: Sample,
     reach: float,
-    make_guess: Callable[[Array, CurvePoint, float], Guess],
 ) -> Located | None:
     """A bifurcation within `reach` (scaled arclength) of a sample, on its curve: for tests that change in one place
     because the discretisation does.
     """
     point = sample.point
     try:
-        guess = make_guess(point.u, point, kind.kappa(sample))
+        guess = Guess.at(point.u, point, kind.kappa(sample))
         found = kind.solve(guess)
     except ConvergenceError:
         return None

@@ -19,7 +19,6 @@ the law is sharp: nothing diverges there, but a contact begins all the same.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -29,11 +28,12 @@ from suboctave.bifurcation.contact import GrazingContact
 from suboctave.bifurcation.gaps import contact_side, gap_extrema, level_rate, levels
 from suboctave.bifurcation.grazing import basis_rows, read_direction
 from suboctave.continuation.newton import NewtonOptions
-from suboctave.continuation.point import CurvePoint, between, point_between
+from suboctave.continuation.point import between, point_between
 from suboctave.curves.events.finder import Located, position
 from suboctave.curves.events.locate import Guess, Singular, solve
-from suboctave.curves.events.monitors import BifurcationKind, Sample
+from suboctave.curves.events.monitors import BifurcationKind
 from suboctave.curves.kinds.grazing import GrazingContactEquations
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
@@ -161,16 +161,14 @@ def locate_grazings(
     a: Sample,
     b: Sample,
     options: NewtonOptions,
-    make_sample: Callable[[CurvePoint], Sample],
-    make_guess: Callable[[Array, CurvePoint, float], Guess],
 ) -> list[Located]:
-    """All grazings between two neighbours, in the order met; arguments as in `finder.locate`.
+    """All grazings between two neighbours, in the order met.
 
     What cannot be solved for from the ends of the step is separated by halving it, and bracketed at last.
     """
     if not a.gaps:
         return []
-    return sorted(_search(a, b, 0.0, 1.0, 0, options, make_sample, make_guess), key=lambda found: found.fraction)
+    return sorted(_search(a, b, 0.0, 1.0, 0, options), key=lambda found: found.fraction)
 
 
 def _search(
@@ -180,13 +178,11 @@ def _search(
     high: float,
     depth: int,
     options: NewtonOptions,
-    make_sample: Callable[[CurvePoint], Sample],
-    make_guess: Callable[[Array, CurvePoint, float], Guess],
 ) -> list[Located]:
     passing, clear = touches(a, b)
     if not passing and (clear or depth >= _UNCLEAR):
         return []
-    solved = [_solved(touch, a, b, make_guess) for touch in passing]
+    solved = [_solved(touch, a, b) for touch in passing]
     found = [
         Located(touch, low + s[1] * (high - low), a if s[1] < 0.5 else b, s[0], 0.0)
         for touch, s in zip(passing, solved, strict=True)
@@ -197,7 +193,7 @@ def _search(
     middle = None
     if depth < _BISECTIONS:
         with suppress(ConvergenceError):
-            middle = make_sample(point_between(a.point, b.point, 0.5, options))
+            middle = b.at(point_between(a.point, b.point, 0.5, options))
     if middle is None:
         width = 0.5 * abs(b.point.parameter - a.point.parameter)
         return found + [
@@ -207,15 +203,13 @@ def _search(
         ]
     half = 0.5 * (low + high)
     parts = ((a, middle, low, half), (middle, b, half, high))
-    return [item for part in parts for item in _search(*part, depth + 1, options, make_sample, make_guess)]
+    return [item for part in parts for item in _search(*part, depth + 1, options)]
 
 
-def _solved(
-    touch: Touch, a: Sample, b: Sample, make_guess: Callable[[Array, CurvePoint, float], Guess]
-) -> tuple[Grazing, float] | None:
+def _solved(touch: Touch, a: Sample, b: Sample) -> tuple[Grazing, float] | None:
     """The grazing and where between the two neighbours it lies; None if it was not found there."""
     try:
-        guess = make_guess(between(a.point, b.point, touch.share), b.point, 0.0)
+        guess = Guess.at(between(a.point, b.point, touch.share), b.point, 0.0)
         found = touch.solve(guess)
     except ConvergenceError:
         return None

@@ -13,6 +13,7 @@ import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
 from suboctave.curves.kinds.response import PLAIN
@@ -51,6 +52,14 @@ class Guess:
     kappa: float = 0.0
     vectors: NullVectors | None = None
     size: float = 0.0
+
+    @classmethod
+    def at(cls, u: Array, point: CurvePoint, kappa: float = 0.0) -> Guess:
+        """From u, a vector in the discretisation of a point."""
+        curve = point.curve
+        assert isinstance(curve, MotionProblem)
+        x, omega, values = curve.split(u)
+        return cls(curve.balance, x, omega, values, curve.name, curve.span, kappa, size=curve.unit(point.weights))
 
     def state(self) -> BalanceState:
         """The equations at the guess."""

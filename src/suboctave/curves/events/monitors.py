@@ -21,85 +21,15 @@ import numpy as np
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.bifurcation.contact import GrazingContact
-from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
-from suboctave.continuation.point import CurvePoint
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.events.locate import Guess, Singular, locate_branch_point
+from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
-from suboctave.floquet import FloquetResult, Monodromy, StabilityMethod
-from suboctave.harmonic.basis import Array
-from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
-from suboctave.lazy import lazy
 
-_MONODROMY = Monodromy()
 #: transversality of a limit point, at least. Newton's method leaves one located on a branch point by mistake within
 #: 1e-9 of it, where it is as much; at a peak it is the damping ratio
 _TRANSVERSAL = 1e-7
-
-
-class Sample:
-    """A point of a response curve with what the tests ask of it; `place` is its arclength."""
-
-    def __init__(self, point: CurvePoint, state: BalanceState, method: StabilityMethod = _MONODROMY) -> None:
-        self.point = point
-        self.state = state
-        self.method = method
-        self.place = point.arclength
-
-    @lazy
-    def floquet(self) -> FloquetResult:
-        """Multipliers and their errors."""
-        return self.method.along(self.state)
-
-    @lazy
-    def verdict(self) -> FloquetResult:
-        """Multipliers whose errors cover what det J_0 and det J_half say of them."""
-        if self.at_rest:
-            return self.floquet
-        return measures.in_doubt(self.floquet, self.point.orientation * self.slope, self.half_sign)
-
-    @lazy
-    def at_rest(self) -> bool:
-        """Whether the motion counts as rest, where its curve can tell."""
-        return bool(getattr(self.point.evaluation, "at_rest", False))
-
-    @lazy
-    def unstable(self) -> int:
-        """Number of multipliers outside the unit circle, real ones on the side on which det J_0 and det J_half have
-        them: the count and the tests of LP, BP and PD then change together.
-        """
-        count = self.floquet.unstable
-        if not self.at_rest:
-            for which, _ in measures.contradicted(self.floquet, self.point.orientation * self.slope, self.half_sign):
-                count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
-        return count
-
-    @lazy
-    def signs(self) -> tuple[bool, bool, bool]:
-        """What the tests of BP, LP and PD look at."""
-        return self.point.orientation > 0.0, self.slope > 0.0, self.half_sign > 0.0
-
-    @lazy
-    def half_sign(self) -> float:
-        """Sign of det J_half."""
-        return measures.half_sign(self.state)
-
-    @lazy
-    def gaps(self) -> tuple[GapExtrema, ...]:
-        """The elements' gaps with the extrema of the motion there."""
-        return gap_extrema(self.state)
-
-    @lazy
-    def slope(self) -> float:
-        """Component of the tangent along the free parameter."""
-        return float(self.point.tangent[self.point.curve.parameter])
-
-    @lazy
-    def measures(self) -> Array:
-        """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
-        point = self.point
-        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet.multipliers)
 
 
 class BifurcationKind(ABC):
@@ -271,16 +201,15 @@ def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     if a.signs == b.signs and abs(a.unstable - b.unstable) < 2:
         return ()
     # several ask this of the same two
-    known = b.__dict__.get("_changes")
-    if known is not None and known[0]() is a:
-        return known[1]
+    if b.compared is not None and b.compared[0]() is a:
+        return b.compared[1]
     found: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
     # one multiplier passes +1 at a limit point or a branch point, or at both in one
     accounted = len(found) - (len(found) > 1 and found[1] is LIMIT_POINT)
     if NEIMARK_SACKER.beyond(a, b, accounted):
         found.append(NEIMARK_SACKER)
-    result = b.__dict__["_changes"] = (weakref.ref(a), tuple(found))
-    return result[1]
+    b.compared = weakref.ref(a), tuple(found)
+    return b.compared[1]
 
 
 def _zero(a: float, b: float) -> float:

@@ -1,0 +1,271 @@
+"""A point of a curve with what is looked for along it.
+
+Along responses: multipliers, signs of determinants, gaps, test functions. Along curves of bifurcations: null vectors,
+normal-form coefficients, other determinants.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from suboctave.bifurcation import measures
+from suboctave.bifurcation.bordered import NullVectors
+from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
+from suboctave.bifurcation.normal_form.cubic import cubic_coefficient
+from suboctave.continuation.linear import Factor, LeadingBlock, length
+from suboctave.continuation.point import CurvePoint
+from suboctave.curves.kinds.branch_point import BranchPointEquations
+from suboctave.curves.kinds.extremum import ExtremalEquations
+from suboctave.curves.kinds.grazing import GrazingEquations
+from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.floquet import FloquetResult, Monodromy, StabilityMethod
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+from suboctave.lazy import lazy
+
+__all__ = ["Sample"]
+
+_MONODROMY = Monodromy()
+#: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
+_NOTHING = 1e-9
+
+
+class Sample:
+    """A solved point; `place` is its arclength, `method` gives its multipliers."""
+
+    #: another sample, and the kinds whose tests have changed between the two (`monitors.changes`)
+    compared: tuple[weakref.ref[Sample], tuple[Any, ...]] | None = None
+
+    def __init__(self, point: CurvePoint, method: StabilityMethod = _MONODROMY) -> None:
+        assert isinstance(point.curve, MotionProblem)
+        assert isinstance(point.evaluation, MotionEvaluation)
+        self.point = point
+        self.method = method
+        self.place = point.arclength
+        self.curve = point.curve
+        self.evaluation = point.evaluation
+        self.state: BalanceState = point.evaluation.state
+
+    def at(self, point: CurvePoint) -> Sample:
+        """Another point, with multipliers by the same method."""
+        return Sample(point, self.method)
+
+    @property
+    def where(self) -> str:
+        """The place on the curve in words."""
+        return self.curve.where(self.point.u)
+
+    @lazy
+    def orbit(self) -> PeriodicOrbit:
+        """The motion."""
+        state, evaluation = self.state, self.evaluation
+        known = dict(state.values), evaluation.error, evaluation.truncation, self.curve.adaptive
+        return PeriodicOrbit(state.balance, state.x.copy(), state.omega, *known)
+
+    # ------------------------------------------------------------------------------------------ along responses
+    @lazy
+    def floquet(self) -> FloquetResult:
+        """Multipliers and their errors."""
+        return self.method.along(self.state)
+
+    @lazy
+    def verdict(self) -> FloquetResult:
+        """Multipliers whose errors cover what det J_0 and det J_half say of them."""
+        if self.at_rest:
+            return self.floquet
+        return measures.in_doubt(self.floquet, self.point.orientation * self.slope, self.half_sign)
+
+    @lazy
+    def at_rest(self) -> bool:
+        """Whether the motion counts as rest, where its curve can tell."""
+        return self.evaluation.at_rest
+
+    @lazy
+    def unstable(self) -> int:
+        """Number of multipliers outside the unit circle, real ones on the side on which det J_0 and det J_half have
+        them: the count and the tests of LP, BP and PD then change together.
+        """
+        count = self.floquet.unstable
+        if not self.at_rest:
+            for which, _ in measures.contradicted(self.floquet, self.point.orientation * self.slope, self.half_sign):
+                count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
+        return count
+
+    @lazy
+    def signs(self) -> tuple[bool, bool, bool]:
+        """What the tests of BP, LP and PD look at."""
+        return self.point.orientation > 0.0, self.slope > 0.0, self.half_sign > 0.0
+
+    @lazy
+    def half_sign(self) -> float:
+        """Sign of det J_half."""
+        return measures.half_sign(self.state)
+
+    @lazy
+    def gaps(self) -> tuple[GapExtrema, ...]:
+        """The elements' gaps with the extrema of the motion there."""
+        return gap_extrema(self.state)
+
+    @lazy
+    def slope(self) -> float:
+        """Component of the tangent along the free parameter."""
+        return float(self.point.tangent[self.point.curve.parameter])
+
+    @lazy
+    def measures(self) -> Array:
+        """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
+        point = self.point
+        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet.multipliers)
+
+    # ---------------------------------------------------------------------------------- along curves of bifurcations
+    @property
+    def equations(self) -> SingularEquations | BranchPointEquations:
+        """The scalar equations, where they are those of a singular operator."""
+        equations = self.evaluation.equations.own
+        assert isinstance(equations, SingularEquations | BranchPointEquations)
+        return equations
+
+    @lazy
+    def slopes(self) -> dict[str, float]:
+        """Components of the tangent along the free parameters, by name."""
+        names = self.curve.names
+        return dict(zip(names, self.point.tangent[-len(names) :].tolist(), strict=True))
+
+    @property
+    def kappa(self) -> float:
+        """Frequency of the critical perturbation at an NS, else 0."""
+        equations = self.evaluation.equations.own
+        return equations.kappa if isinstance(equations, SingularEquations) else 0.0
+
+    @property
+    def instant_or_frequency(self) -> float:
+        """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, else 0."""
+        equations = self.evaluation.equations.own
+        if isinstance(equations, GrazingEquations):
+            return equations.tau % (2.0 * math.pi)
+        return self.kappa
+
+    @property
+    def vectors(self) -> NullVectors | None:
+        """Null vectors of the singular operator, None where there is none."""
+        found = getattr(self.evaluation.equations.own, "bordered", None)
+        return None if found is None else found.vectors
+
+    @lazy
+    def bend(self) -> float:
+        """psi . R''[phi, phi] of an LP."""
+        equations = self.equations
+        return float((equations.gradient[0] @ equations.bordered.right).real)
+
+    @lazy
+    def twist(self) -> float:
+        """psi . (dJ_kappa/dkappa) phi of an LP, BP or PD; 0 where it is rounding."""
+        equations = self.equations
+        b = equations.bordered
+        size = length(b.left / b.scale) * length(b.right / b.scale) * self.state.omega
+        value = float(equations.gradient[2].imag)
+        return 0.0 if abs(value) <= _NOTHING * size else value
+
+    @lazy
+    def cubic(self) -> float:
+        """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
+        b, by_x = self.equations.bordered, self.equations.gradient[0].real
+        by_motion = -by_x.reshape(self.state.x.shape)
+        weights = self.point.weights[: self.state.x.size]
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._plain, weights)
+
+    @lazy
+    def coefficient(self) -> float:
+        """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
+        augmentation = self.curve.augmentation.own
+        kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
+        if kind is Kind.FREE:
+            return float("nan")
+        # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign
+        turn = 1.0 if self.twist > 0.0 else -1.0
+        return turn * (-0.5 * self.bend if kind is Kind.INTEGER else self.cubic)
+
+    @lazy
+    def extreme(self) -> str:
+        """On a curve of extrema whether it is a "minimum" or a "maximum", else empty."""
+        equations = self.evaluation.equations
+        if not isinstance(equations, ExtremalEquations):
+            return ""
+        return "minimum" if equations.curvature > 0.0 else "maximum"
+
+    @lazy
+    def isola(self) -> str:
+        """On a curve of extrema of limit points the type of `bifurcation.extremum`, else empty."""
+        equations = self.evaluation.equations
+        return equations.isola if isinstance(equations, ExtremalEquations) else ""
+
+    def sign(self, operator: Kind) -> float:
+        """Sign of det J_0 (Kind.INTEGER) or det J_half (Kind.HALF)."""
+        return self._plain.sign if operator is Kind.INTEGER else self._half.sign
+
+    def determinant(self, operator: Kind) -> tuple[float, float]:
+        """Sign and logarithm of that determinant; rows of harmonic f in units of mass times `w0^2 (1 + f^2)`."""
+        state, size = self.state, self.state.balance.size
+        if operator is Kind.INTEGER:
+            n = state.balance.dimension
+            # its columns are in scaled arclength: the weights are those of the DOFs over the size of the motion
+            sign, found = self._plain.sign, self._plain.log_determinant
+            found += n * math.log(float(self.point.weights[0]) / float(state.balance.scales()[0][0]))
+            masses = state.balance.logarithm_of_masses(n)
+        else:
+            n = len(self._half.lu)
+            sign, found = self._half.sign, self._half.log_determinant
+            masses = 2.0 * state.balance.logarithm_of_masses(n)
+        units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) + masses
+        return sign, found - units
+
+    @lazy
+    def _half(self) -> Factor:
+        return Factor.of(self.state.half_jacobian)
+
+    @lazy
+    def _plain(self) -> LeadingBlock:
+        """J_0, its columns in scaled arclength: the leading block of what the point was solved with."""
+        point, size = self.point, self.state.balance.dimension
+        whole = point.factor
+        if whole is None or whole.singular or len(point.u) > size + 4:
+            whole = Factor.of(self.state.jacobian / point.weights[:size])
+        return LeadingBlock(whole, size)
+
+    def multipliers_by(self, method: StabilityMethod) -> FloquetResult | None:
+        """Multipliers and errors as a method would give them along a curve, None if that is still to be computed."""
+        return self.evaluation.known_floquet if method.follows_monodromy else None
+
+    @lazy
+    def others(self) -> ComplexArray:
+        """Multipliers but the one, or the pair, that is critical all along the curve."""
+        mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
+        if critical is None:
+            return mu
+        distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        nearest = np.argsort(distance, kind="stable")
+        result: ComplexArray
+        if self.curve.augmentation.name != "NS" and mu[nearest[0]].imag != 0.0:
+            # two that are nearly the same came out as a pair, whose sum is known better than either
+            pair = np.abs(mu - np.conj(mu[nearest[0]])).argmin()
+            beside = 2.0 * mu[nearest[0]].real - critical
+            result = np.append(np.delete(mu, [nearest[0], pair]), beside)
+        else:
+            result = np.delete(mu, nearest[: 2 if self.curve.augmentation.name == "NS" else 1])
+        return result
+
+
+@lru_cache(maxsize=64)
+def _frequencies(rows: int, size: int, mean: bool) -> float:
+    """Sum of `log (1 + f^2)` over the rows of an operator, f the harmonic of each, whole (mean) or half-odd."""
+    k = np.arange(rows) // size
+    f = (k + 1) // 2 if mean else k // 2 + 0.5
+    return float(np.log(1.0 + f**2).sum())
