@@ -22,8 +22,9 @@ from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import Harmonics, harmonics_of, own_linear_part
+from suboctave.curves.driver import same_event
 from suboctave.curves.events.locate import Singular
-from suboctave.curves.follow import follow, same_event
+from suboctave.curves.follow import follow
 from suboctave.curves.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.trace import Settings, Trace

@@ -17,8 +17,8 @@ from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_li
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.subharmonic_part import repeats_earlier
-from suboctave.curves.trace import Settings
-from suboctave.curves.track_follow import TrackedTrace, follow_tracked
+from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.track_follow import follow_tracked
 from suboctave.curves.track_start import Box, discretisation, is_extremum, kind_of, solved_start
 from suboctave.errors import InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
@@ -142,7 +142,7 @@ def _branch(
     item: Bifurcation,
     names: tuple[str, ...],
     turning: str,
-    trace: TrackedTrace,
+    trace: Trace,
     settings: Settings,
     options: dict[str, Any],
 ) -> TrackedBranch:
@@ -155,7 +155,7 @@ def _branch(
         system,
         names[-1],
         trace.points,
-        [replace(event, context=context) for event in trace.events],
+        [replace(event, context=context) for event in trace.bifurcations],
         [],
         trace.closed,
         trace.endings,
@@ -265,7 +265,7 @@ def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | 
     return wanted, adaptive, basis
 
 
-def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> TrackedTrace:
+def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> Trace:
     """Follow a curve from a start to both sides; from a bound inwards only."""
     if start.tangent[-1] * ahead < 0.0:
         start = replace(start, tangent=-start.tangent, orientation=-start.orientation)

@@ -10,19 +10,18 @@ import numpy as np
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.measures import fold
 from suboctave.continuation import CurvePoint, Event, March
-from suboctave.continuation.ending import Ending
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.point import point_between, solved_again
 from suboctave.curves.count import CountCheck
 from suboctave.curves.doublings import DoublingWatch
+from suboctave.curves.driver import Driver, same_event
 from suboctave.curves.events.finder import Located, locate, locate_near
 from suboctave.curves.events.grazings import locate_grazings, touches
 from suboctave.curves.events.layer import behind_their_grazings
 from suboctave.curves.events.monitors import BRANCH_POINT, PERIOD_DOUBLING, BifurcationKind, changes, solved_by
 from suboctave.curves.guard import Crossing, Passage, StepGuard
 from suboctave.curves.hidden import REASON, HiddenDoublings, pair_in
-from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.points import BranchPoint
@@ -30,10 +29,7 @@ from suboctave.curves.refine import bifurcation_at, solved_bifurcation, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Doubt, Settings, Trace
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.interruption import Interruption
 
-#: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
-_NOTHING = 1e-12
 _NOT_FOUND = {
     "BP": "the curve may have jumped to another branch: its orientation changes without a branch point",
     "LP": "the branch turns back, but its limit point could not be located",
@@ -47,12 +43,10 @@ def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], set
     return _Follower(start, direction, bounds, settings).run()
 
 
-class _Follower:
+class _Follower(Driver):
     def __init__(self, start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> None:
-        self.settings = settings
+        super().__init__(settings)
         self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear, self._arrived)
-        self.trace = Trace()
-        self.previous: Sample | None = None
         self._candidate: Sample | None = None
         self._guard = StepGuard(self._between, self._crossing)
         self._crossings: list[Crossing] = []
@@ -74,36 +68,30 @@ class _Follower:
         if settings.report is not None:
             self._found = getattr(settings.report.report, "found", None)
 
-    def run(self) -> Trace:
+    def _walk(self) -> None:
+        # in a fresh installation the first verdict on stability waits for its kernels to be compiled
+        self._report(self.march.start)
+        for point in self.march:
+            self._accept(point)
+            if self._turned is not None and self.settings.half:
+                break
+        self.trace.closed = self.march.closed
+        self.trace.ends(self.march.ending)
+        self.trace.arrives = self._arrival()
+
+    def _interrupted(self) -> None:
         trace = self.trace
-        try:
-            if self.settings.report is not None:
-                self.settings.report.begins()
-            # in a fresh installation the first verdict on stability waits for its kernels to be compiled
-            self._report(self.march.start)
-            for point in self.march:
-                self._accept(point)
-                if self._turned is not None and self.settings.half:
-                    break
-            trace.closed = self.march.closed
-            trace.ends(self.march.ending)
-            trace.arrives = self._arrival()
-        except KeyboardInterrupt as cause:
-            if self.previous is None:
-                self.previous = start = self._sample(self.march.start)
-                trace.points.append(BranchPoint(start.orbit, start.floquet, 0.0, start.point.iterations))
-            # of the step that was under way nothing counts
-            trace.cut(trace.points[-1].arclength)
-            where = self.previous.where
-            trace.ends(Ending.stopped(Interruption.of(cause), where))
+        if self.previous is None:
+            self.previous = start = self._sample(self.march.start)
+            trace.points.append(BranchPoint(start.orbit, start.floquet, 0.0, start.point.iterations))
+        # of the step that was under way nothing counts
+        trace.cut(trace.points[-1].arclength)
+
+    def _finish(self) -> None:
         self._say_missed(everything=True)
-        trace.audit = self._guard.audit
+        self.trace.audit = self._guard.audit
         if self._turned is not None and self.settings.half:
-            trace.end_at(self._turned)
-        if trace.closed:
-            _drop_seam(trace.bifurcations)
-            _drop_seam(trace.events)
-        return trace
+            self.trace.end_at(self._turned)
 
     def _sample(self, point: CurvePoint) -> Sample:
         candidate = self._candidate
@@ -201,15 +189,6 @@ class _Follower:
         self._report(point)
         if self._found is not None:
             self._found(self.trace)
-
-    def _report(self, point: CurvePoint) -> None:
-        if self.settings.report is None:
-            return
-        curve, trace = point.curve, self.trace
-        assert isinstance(curve, MotionProblem)
-        basis, located = curve.balance.basis, sum(b.kind not in CONTACT_KINDS for b in trace.bifurcations)
-        where = curve.where(point.u)
-        self.settings.report.at(point.parameter, where, len(trace.points), located, basis.harmonics // basis.nu)
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation | None:
         sentences: list[str] = []
@@ -394,27 +373,4 @@ class _Follower:
         )
 
 
-def same_event(a: Bifurcation, b: Bifurcation) -> bool:
-    """Whether two located bifurcations are one, met twice."""
-    name = a.parameter_name
-    if a.kind != b.kind or (a.kind == "grazing" and _element(a) != _element(b)):
-        return False
-    same_place = np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9)
-    if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
-        return False
-    # the mirror image of a motion has its amplitude; at rest there is nothing to compare
-    return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
-
-
-def _element(item: Bifurcation) -> int | None:
-    return None if item.contact is None else item.contact.element
-
-
-def _drop_seam(items: list[Bifurcation]) -> None:
-    """What lies on the seam of a closed curve is met at both ends: keep the first."""
-    # several contacts may graze at once
-    while len(items) > 1 and any(same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
-        items.pop()
-
-
-__all__ = ["follow", "same_event"]
+__all__ = ["follow"]

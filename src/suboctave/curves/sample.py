@@ -240,10 +240,6 @@ class Sample:
             whole = Factor.of(self.state.jacobian / point.weights[:size])
         return LeadingBlock(whole, size)
 
-    def multipliers_by(self, method: StabilityMethod) -> FloquetResult | None:
-        """Multipliers and errors as a method would give them along a curve, None if that is still to be computed."""
-        return self.evaluation.known_floquet if method.follows_monodromy else None
-
     @lazy
     def others(self) -> ComplexArray:
         """Multipliers but the one, or the pair, that is critical all along the curve."""

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.bounds import Bounds
-from suboctave.continuation.ending import Ending, EndReason, interruption_of
+from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, length
 from suboctave.continuation.point import solved_again
 from suboctave.continuation.problem import Curve
+from suboctave.curves.driver import Driver
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
 from suboctave.curves.points import TrackedPoint
 from suboctave.curves.sample import Sample
 from suboctave.curves.subharmonic_part import keeps_subharmonics
-from suboctave.curves.trace import Settings
+from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.track_approach import points_before
 from suboctave.curves.track_corners import beyond_corner
 from suboctave.curves.track_ends import End, comes_close, end_ahead, end_between, is_lopsided, rebased
@@ -30,7 +30,6 @@ from suboctave.curves.tracked_located import as_event
 from suboctave.curves.tracked_pairs import PairWatch
 from suboctave.curves.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.errors import ConvergenceError
-from suboctave.interruption import Interruption
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 2e-6
@@ -45,54 +44,22 @@ _CORNER = 1e-5
 _DOUBTFUL, _UNTOLD, _VIOLENT = 0.05, 3, 1e4
 
 
-@dataclass
-class TrackedTrace:
-    """What following a curve in one direction gave."""
-
-    points: list[TrackedPoint] = field(default_factory=list)
-    events: list[TrackedEvent] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    closed: bool = False
-    endings: tuple[Ending, Ending] = (Ending(EndReason.START), Ending(EndReason.NOT_STARTED))
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped in one of its directions before it came to an end."""
-        return interruption_of(self.endings) is not None
-
-    def ends(self, ending: Ending) -> None:
-        """Why it ends at its last point."""
-        self.endings = (self.endings[0], ending)
-
-    def reversed_before(self, other: TrackedTrace) -> TrackedTrace:
-        """This trace walked backwards, then `other`, which started from the same point."""
-        whole = self.points[-1].arclength
-        points = [p.at(whole - p.arclength) for p in reversed(self.points)]
-        points += [p.at(whole + p.arclength) for p in other.points[1:]]
-        events = [replace(e, arclength=whole - e.arclength) for e in reversed(self.events)]
-        events += [replace(e, arclength=whole + e.arclength) for e in other.events]
-        endings = (self.endings[1], other.endings[1])
-        return TrackedTrace(points, events, self.warnings + other.warnings, False, endings)
-
-
-def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> TrackedTrace:
+def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> Trace:
     """Follow a curve from a solved start along the start's own tangent; KeyboardInterrupt ends it politely."""
     return _Tracker(start, box, settings).run()
 
 
-class _Tracker:
+class _Tracker(Driver):
     def __init__(self, start: CurvePoint, box: Box, settings: Settings) -> None:
         assert isinstance(start.curve, MotionProblem)
-        self.settings = settings
+        super().__init__(settings)
         self.box = box
         self.others = _other_bounds(start.curve, box)
         self.lopsided = is_lopsided(Sample(start))
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
-        self.trace = TrackedTrace()
         tests = tests_of(start.curve)
         self.tests: tuple[CurveTest, ...] = tuple(t for t in tests if not isinstance(t, PairCrossing))
-        self.previous: Sample | None = None
         self.hidden = HiddenPairs(self.tests, settings.newton)
         pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
         self.pairs = PairWatch(pairs, settings.newton)
@@ -105,33 +72,23 @@ class _Tracker:
         #: the first point, headed as the curve leaves it
         self.home: CurvePoint | None = None
 
-    def run(self) -> TrackedTrace:
-        trace = self.trace
-        if self.settings.report is not None:
-            self.settings.report.begins()
-        try:
-            while True:
-                ending = self._march()
-                trace.ends(ending)
-                beyond = self._beyond_corner() if ending.reason is EndReason.STEP_TOO_SMALL else None
-                if beyond is None:
-                    break
-                stepping = self.settings.stepping
-                heading = math.copysign(1.0, beyond.tangent[-1])
-                home = self.home
-                self.march = March(
-                    beyond, heading, self.box.second, self.settings.newton, stepping, self._clear, home=home
-                )
-            trace.closed = self.march.closed
-            self._say_doubts()
-            self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
-        except KeyboardInterrupt as cause:
-            where = self.previous.where if self.previous else "the start"
-            trace.ends(Ending.stopped(Interruption.of(cause), where))
-        trace.events.sort(key=lambda event: event.arclength)
-        if trace.closed:
-            _drop_seam(trace.events)
-        return trace
+    def _walk(self) -> None:
+        trace, settings = self.trace, self.settings
+        while True:
+            ending = self._march()
+            trace.ends(ending)
+            beyond = self._beyond_corner() if ending.reason is EndReason.STEP_TOO_SMALL else None
+            if beyond is None:
+                break
+            heading = math.copysign(1.0, beyond.tangent[-1])
+            stepping = settings.stepping
+            self.march = March(beyond, heading, self.box.second, settings.newton, stepping, self._clear, home=self.home)
+        trace.closed = self.march.closed
+        self._say_doubts()
+        self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
+
+    def _finish(self) -> None:
+        self.trace.bifurcations.sort(key=lambda event: event.arclength)
 
     def _march(self) -> Ending:
         """Take in points until the curve ends; why it does."""
@@ -165,7 +122,7 @@ class _Tracker:
         It stands for whatever turns on the last steps into it, where nothing tells one turn from another.
         """
         middle = 0.5 * (last.point.arclength + beyond.arclength)
-        events = self.trace.events
+        events = self.trace.bifurcations
         events[:] = [e for e in events if e.kind not in ("extremum", "CP") or middle - e.arclength > _CORNER]
         for test in self.tests:
             if not isinstance(test, Extremum):
@@ -227,10 +184,7 @@ class _Tracker:
         self._take(found + events_between(a, new, self.tests, settings.newton, warnings))
         self._add(new)
         self.previous = new
-        if settings.report is not None:
-            basis, where, trace = new.curve.balance.basis, point.curve.where(point.u), self.trace
-            numbers = len(trace.points), len(trace.events), basis.harmonics // basis.nu
-            settings.report.at(point.parameter, where, *numbers)
+        self._report(point)
         if left is not None:
             return Ending(EndReason.RANGE_END, new.where)
         ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
@@ -250,23 +204,13 @@ class _Tracker:
                     "the unit circle there, by the monodromy matrix none does"
                 )
                 continue
-            self.trace.events.append(as_event(better, settings.stability, settings.observe))
+            self.trace.bifurcations.append(as_event(better, settings.stability, settings.observe))
 
     def _add(self, sample: Sample) -> None:
-        point = sample.point
-        self.trace.points.append(
-            TrackedPoint(
-                sample.orbit,
-                point.arclength,
-                point.iterations,
-                self.settings.stability,
-                sample.instant_or_frequency,
-                sample.coefficient,
-                sample.multipliers_by(self.settings.stability),
-                extreme=sample.extreme,
-                isola=sample.isola,
-            )
-        )
+        method, point = self.settings.stability, sample.point
+        known = sample.evaluation.known_floquet if method.follows_monodromy else None
+        extra = sample.instant_or_frequency, sample.coefficient, sample.extreme, sample.isola
+        self.trace.points.append(TrackedPoint(sample.orbit, known, point.arclength, point.iterations, method, *extra))
 
     def _note_doubt(self, sample: Sample) -> None:
         """Whether the critical multiplier is one of the monodromy matrix, where that is known and now and then."""
@@ -299,11 +243,11 @@ class _Tracker:
             found = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(found, settings.stability, settings.observe)
             curve = a.curve.augmentation.name
-            self.trace.events.append(replace(item, arclength=arclength, curve=curve))
+            self.trace.bifurcations.append(replace(item, arclength=arclength, curve=curve))
             if end.last:
                 orbit = rebased(item.orbit, a)
                 kappa = 0.5 * orbit.omega / orbit.basis.nu if found.test.kind == "R2" else 0.0
-                self.trace.points.append(TrackedPoint(orbit, arclength, 0, settings.stability, kappa))
+                self.trace.points.append(TrackedPoint(orbit, None, arclength, 0, settings.stability, kappa))
 
     def _closing(self, a: Sample, back: Sample) -> Sample:
         """The first point again, with the bordering vectors of the last."""
@@ -364,14 +308,4 @@ def _other_bounds(curve: MotionProblem, box: Box) -> list[Bounds]:
     return [Bounds(index_of(name), *ranges[name]) for name in curve.names[:-1] if name in ranges]
 
 
-def _drop_seam(events: list[TrackedEvent]) -> None:
-    """What lies on the seam of a closed curve is met at both ends: keep the first."""
-    if len(events) > 1:
-        first, last = events[0], events[-1]
-        names = first.names
-        same = all(math.isclose(first.parameter(n), last.parameter(n), rel_tol=1e-8, abs_tol=1e-12) for n in names)
-        if first.kind == last.kind and first.parameter_name == last.parameter_name and same:
-            events.pop()
-
-
-__all__ = ["TrackedTrace", "follow_tracked"]
+__all__ = ["follow_tracked"]

@@ -112,7 +112,7 @@ def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -
         elif number not in beside and in_vain < _PATIENCE:
             found = asking.settled(point.orbit.state(), found)
             in_vain = 0 if found.decided else in_vain + 1
-        told.append(point if found is point.floquet else replace(point, floquet=found))
+        told.append(point if found is point.floquet else replace(point, known=found))
     return told
 
 

@@ -134,7 +134,8 @@ class MonotonePiece:
         """The bifurcation at a value of `along`, located, as a point of the curve."""
         index, share = self._around(value)
         step = self._places[index + 1] - self._places[index]
-        return as_point(self.solve_at(value)).at(self.nodes[index].arclength + share * float(step))
+        place = self.nodes[index].arclength + share * float(step)
+        return replace(as_point(self.solve_at(value)), arclength=place)
 
     def _around(self, value: float) -> tuple[int, float]:
         """The node before a value (in the order of the nodes) and the share of the way, in arclength, to the next."""
@@ -259,7 +260,7 @@ def pieces_of(curve: TrackedBranch, along: str, name: str = "omega") -> list[Mon
 
 def as_point(item: Bifurcation) -> TrackedPoint:
     """A located bifurcation as a point of a tracked curve."""
-    return TrackedPoint(item.orbit, item.arclength, 0, None, known=item.floquet)
+    return TrackedPoint(item.orbit, item.floquet, item.arclength, 0)
 
 
 def _turns(event: TrackedEvent, along: str, of_extrema: bool) -> bool:

@@ -133,7 +133,7 @@ def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> 
     """Points that were read, as those of a tracked curve."""
     natures = record.get("nature") or [("", "")] * len(points)
     return [
-        TrackedPoint(p.orbit, p.arclength, p.iterations, None, extra, coefficient, p.floquet, *nature)
+        TrackedPoint(p.orbit, p.floquet, p.arclength, p.iterations, None, extra, coefficient, *nature)
         for p, extra, coefficient, nature in zip(points, record["extra"], record["coefficient"], natures, strict=True)
     ]
 
