@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.study.commands import examples
+from suboctave.study.cli import examples
 
 
 @pytest.mark.parametrize("name", sorted(examples()))

@@ -10,7 +10,7 @@ import pytest
 import scipy.linalg
 
 import suboctave as so
-from suboctave.study.commands import examples
+from suboctave.study.cli import examples
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")

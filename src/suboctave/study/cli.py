@@ -8,13 +8,15 @@ Everything heavy is imported when a command runs, so that `--help` and a mistype
 import json
 import sys
 import warnings
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError
+from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError, suggest
+from suboctave.interruption import Interruption
 from suboctave.version import __version__
 
 __all__ = ["main"]
@@ -58,9 +60,29 @@ def new(
     json_wanted: Annotated[bool, _AS_JSON] = False,
 ) -> None:
     """Write a commented study file to start from."""
-    from suboctave.study import commands
+    from suboctave.atomic import free_place, replace_file
+    from suboctave.study.screen import console, print_texts
 
-    commands.new(path, example, names, overwrite, json_wanted)
+    known = {name: text.splitlines()[0].removeprefix("# ") for name, text in examples().items()}
+    if names:
+        if json_wanted:
+            _answer(json_wanted, {"examples": known})
+        else:
+            print_texts(console(), ("example", "what it is"), list(known.items()), left=("example", "what it is"))
+        return
+    if example not in known:
+        raise InputError(f"there is no example {example!r}{suggest(example, known)}")
+    target = free_place(path, overwrite, (".toml",))
+    text = examples()[example].replace("THIS_FILE", str(path))
+    replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
+    answer = {"file": target, "example": example}
+    _answer(json_wanted, answer, f"{target} is written; run it: suboctave run {target}")
+
+
+def examples() -> dict[str, str]:
+    """The study files that `new` writes, by name."""
+    templates = (Path(__file__).parent / "templates").glob("*.toml")
+    return {path.stem: path.read_text(encoding="utf-8") for path in sorted(templates)}
 
 
 @application.command()
@@ -70,9 +92,13 @@ def check(
     json_wanted: Annotated[bool, _AS_JSON] = False,
 ) -> None:
     """Say everything that is wrong in a study file; nothing is run."""
-    from suboctave.study import commands
+    from suboctave.study.file import read_study
 
-    commands.check(study, allow_code, json_wanted)
+    checked = read_study(study, allow_code)
+    names = [step.name for step in checked.steps]
+    count = "1 analysis" if len(names) == 1 else f"{len(names)} analyses"
+    answer = {"analyses": names, "mistakes": []}
+    _answer(json_wanted, answer, f"{study} is in order: {count}, outputs in {checked.folder}")
 
 
 @application.command()
@@ -88,11 +114,69 @@ def run(
     json_wanted: Annotated[bool, _AS_JSON] = False,
 ) -> None:
     """Run a study: analyses in order, then results, tables and figures."""
-    from suboctave.study import commands
+    from suboctave.progress import bar
+    from suboctave.study.file import read_study
+    from suboctave.study.runner import Finished, run_study
+    from suboctave.study.screen import console
+    from suboctave.study.shown import print_result
 
-    status = commands.run(study, out, overwrite, resume, allow_code, json_wanted, seconds)
+    read = read_study(study, allow_code)
+    screen = console(quiet=json_wanted)
+    titles = [read.title] if read.title else []
+
+    def report(item: Finished) -> None:
+        while titles:  # above the first result: what is refused before any work has no title
+            screen.print(titles.pop(), style="bold", markup=False)
+        if item.result is not None:
+            note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
+            print_result(screen, item.step.name, item.result, note)
+        else:
+            screen.print(f"\n{item.step.name}", style="bold", markup=False, end="")
+            screen.print(f": failed. {item.failure}", markup=False)
+
+    outcome = run_study(read, out, overwrite, resume, lambda step: bar(step.name), report, seconds)
+    if outcome.complete is not None:
+        screen.print(f"nothing to compute: {outcome.complete} is complete", markup=False, soft_wrap=True)
+    elif outcome.files:
+        screen.print()
+    for file in outcome.files:
+        screen.print(f"written: {file}", markup=False, soft_wrap=True)
+    if others := [file.name for file in outcome.left if file != outcome.complete]:
+        text = f"left as they are: {', '.join(others)} (--resume --overwrite writes them again)"
+        screen.print(text, markup=False, soft_wrap=True)
+    status = _status(outcome)
+    if outcome.interruption is not None:
+        how = "Go on" if outcome.interruption == Interruption() else "Give more seconds, and go on"
+        why = f"{outcome.interruption}; what was computed is kept"
+        screen.print(f"{why}. {how}: suboctave run {study} --resume", markup=False)
+    elif status:
+        failed = ", ".join(item.step.name for item in outcome.failed)
+        screen.print(f"failed: {failed}. Change the study, and go on with --resume", markup=False)
+    if json_wanted:
+        _answer(json_wanted, _summary(outcome, status))
     if status:
         raise typer.Exit(status)
+
+
+def _status(outcome: Any) -> int:
+    if outcome.interrupted:
+        return INTERRUPTED if outcome.interruption == Interruption() else FAILED
+    if any(item.wrong_input for item in outcome.failed):
+        return WRONG
+    return FAILED if outcome.failed else 0
+
+
+def _summary(outcome: Any, status: int) -> dict[str, Any]:
+    from suboctave.study.shown import as_plain
+
+    analyses = [
+        {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
+        | {"reused": item.reused, "failure": item.failure}
+        | ({} if item.result is None else as_plain(item.result))
+        for item in outcome.finished
+    ]
+    state = {"ok": status == 0, "status": status, "interrupted": outcome.interrupted}
+    return state | {"analyses": analyses, "files": outcome.files, "left": outcome.left}
 
 
 @application.command()
@@ -104,9 +188,109 @@ def show(
     json_wanted: Annotated[bool, _AS_JSON] = False,
 ) -> None:
     """Print what a results file holds, or what a study file would run."""
-    from suboctave.study import commands
+    from suboctave.study.runner import JOURNAL
 
-    commands.show(path, csv, overwrite, allow_code, json_wanted)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name the results file in it, or the study file")
+    is_study, is_journal = path.suffix.lower() == ".toml", path.suffix == Path(JOURNAL).suffix
+    if csv is not None and (is_study or is_journal):
+        raise InputError("--csv writes the tables of a results file; this is none")
+    if is_study:
+        _show_study(path, allow_code, json_wanted)
+    elif is_journal:
+        _show_journal(path, json_wanted)
+    else:
+        _show_results(path, csv, overwrite, allow_code, json_wanted)
+
+
+def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, json_wanted: bool) -> None:
+    from suboctave.study.outputs import write_tables
+    from suboctave.study.results import Result, Results, load
+    from suboctave.study.screen import console
+    from suboctave.study.shown import as_plain, print_result
+
+    loaded = load(path, allow_code=allow_code)
+    results = loaded
+    if not isinstance(results, Results):
+        results = Results({path.stem: results if isinstance(results, Result) else results.to_table()})
+    written = write_tables(results, csv, overwrite) if csv is not None else []
+    if json_wanted:
+        listed = {name: as_plain(item) for name, item in results.items()}
+        _answer(json_wanted, {"attributes": results.attributes, "analyses": listed, "files": written})
+        return
+    screen = console()
+    if results.attributes.get("title"):
+        screen.print(str(results.attributes["title"]), style="bold", markup=False)
+    if "written" in results.attributes:
+        origin = results.attributes
+        screen.print(f"suboctave {origin.get('suboctave')}, {origin['written']}", markup=False)
+    for name, item in results.items():
+        seconds = results.details.get(name, {}).get("seconds")
+        print_result(screen, name, item, f" in {seconds:.2f} s" if seconds is not None else "")
+    for file in written:
+        screen.print(f"written: {file}", markup=False, soft_wrap=True)
+
+
+def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
+    from suboctave.study.file import read_study
+    from suboctave.study.screen import console
+
+    study = read_study(path, allow_code)
+    given = {step.name: step.model_dump(mode="json", exclude_unset=True) for step in study.steps}
+    if json_wanted:
+        system = {"title": study.title, "system": repr(study.system)}
+        steps = [{"name": step.name, "type": step.kind, "arguments": given[step.name]} for step in study.steps]
+        _answer(json_wanted, {**system, "analyses": steps, "out": study.folder})
+        return
+    screen = console()
+    screen.print(study.title or study.source.name, style="bold", markup=False)
+    screen.print(repr(study.system), markup=False)
+    screen.print("\nanalyses", style="bold")
+    for step in study.steps:
+        arguments = {k: v for k, v in given[step.name].items() if k not in ("name", "type")}
+        listed = ", ".join(f"{name} = {_written(value)}" for name, value in arguments.items())
+        screen.print(f"  {step.name}: {step.kind}({listed})", markup=False)
+    screen.print(f"\noutputs in {study.folder}", markup=False, soft_wrap=True)
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k} = {_written(v)}" for k, v in value.items() if v not in (None, 0)) + "}"
+    return json.dumps(value)
+
+
+def _show_journal(path: Path, json_wanted: bool) -> None:
+    from suboctave.study.runner import recovered
+    from suboctave.study.screen import console, print_texts, significant
+
+    analyses = recovered(path)
+    if json_wanted:
+        _answer(json_wanted, {"analyses": [asdict(item) for item in analyses]})
+        return
+    screen = console()
+    screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
+    rows = [
+        [item.name, item.state, str(item.points), str(item.bifurcations), str(item.branches or "")] for item in analyses
+    ]
+    names = ("analysis", "state", "points", "bifurcations", "branches")
+    print_texts(screen, names, rows, left=("analysis", "state"))
+    for item in analyses:
+        if item.events:
+            screen.print(f"{item.name}, so far", style="bold", markup=False)
+            lines = [[kind, significant(omega, 9), significant(amplitude, 7)] for kind, omega, amplitude in item.events]
+            print_texts(screen, ("kind", "omega", "max |x|"), lines, left=("kind",))
+
+
+def _answer(json_wanted: bool, content: dict[str, Any], text: str = "") -> None:
+    """What a command has to say: one JSON object, or a line."""
+    if json_wanted:
+        from suboctave.study.shown import to_json
+
+        print(to_json({"ok": True} | content))
+    else:
+        from suboctave.study.screen import console
+
+        console().print(text, markup=False, soft_wrap=True)
 
 
 @application.command()

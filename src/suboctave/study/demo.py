@@ -10,36 +10,25 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from suboctave.analysis.diagram import bifurcation_diagram
+from suboctave.analysis.frequency_response import continue_branch, frequency_response
+from suboctave.analysis.track import track
+from suboctave.model import System, library
 from suboctave.pictures import plot_boundaries, plot_panels, plot_response
 from suboctave.progress import bar
+from suboctave.results.branch import Branch
 from suboctave.study.screen import console, event_lines, print_events
 
 if TYPE_CHECKING:
     import xarray
-    from rich.console import Console
-
-    from suboctave.results.branch import Branch
-    from suboctave.results.diagram import BifurcationDiagram
-
-__all__ = [
-    "CASES",
-    "OMEGA",
-    "REGULARIZATION",
-    "Case",
-    "Curve",
-    "compute",
-    "draw",
-    "run_demo",
-    "sequel",
-]
 
 OMEGA = (4.5, 1.25)
 REGULARIZATION = 3000.0
-MAX_STEP = 0.04  # finer than the default, for smooth figures
 
 Progress = Callable[[float, str], None]
 
@@ -52,16 +41,27 @@ class Case:
     p: float
     j: float
 
+    @property
+    def system(self) -> System:
+        """The oscillator."""
+        return library.reference_oscillator(p=self.p, j=self.j, regularization=REGULARIZATION)
+
+    def __str__(self) -> str:
+        return f"p = {self.p:g}, j = {self.j:g}"
+
 
 @dataclass(frozen=True)
 class Curve:
-    """A case with its computed curve, laid out as a dataset, and the seconds that it took."""
+    """A case with its computed curve, and the seconds that it took."""
 
     case: Case
-    dataset: xarray.Dataset
+    branch: Branch
     seconds: float
-    #: whether the user stopped it; what had been computed is there
-    interrupted: bool = False
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The curve as pictures and tables take it."""
+        return self.branch.to_xarray()
 
 
 CASES = (
@@ -73,77 +73,61 @@ CASES = (
 
 def compute(case: Case, progress: Progress | None = None) -> Curve:
     """The response curve of one case, with stability and located bifurcations; `progress(fraction, text)` is called."""
-    from suboctave.analysis.frequency_response import frequency_response
-    from suboctave.model import library
-
     begin = perf_counter()
-    system = library.reference_oscillator(p=case.p, j=case.j, regularization=REGULARIZATION)
-    branch = frequency_response(system, omega=OMEGA, max_step=MAX_STEP, progress=progress)
-    return Curve(case, branch.to_xarray(), perf_counter() - begin, branch.interrupted)
+    branch = frequency_response(case.system, omega=OMEGA, progress=progress)
+    return Curve(case, branch, perf_counter() - begin)
 
 
 def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:
     """Two figures in `folder`, PNG: weak forcing with its two cases side by side, and strong forcing."""
     weak = [curve for curve in curves if curve.case.p < 1.0]
-    strong = [curve for curve in curves if curve.case.p >= 1.0]
-    files: list[Path] = []
-    if weak:
-        titles = [f"({letter}) p = {c.case.p:g}, j = {c.case.j:g}" for letter, c in zip("abcdef", weak, strict=False)]
-        files.append(folder / "weak_forcing.png")
-        plot_panels([curve.dataset for curve in weak], files[-1], titles=titles)
-    if strong:
-        title = ", ".join(f"p = {c.case.p:g}, j = {c.case.j:g}" for c in strong)
+    files = [folder / "weak_forcing.png"]
+    titles = [f"({letter}) {curve.case}" for letter, curve in zip("ab", weak, strict=False)]
+    plot_panels([curve.dataset for curve in weak], files[0], titles=titles)
+    for strong in curves[len(weak) :]:
         files.append(folder / "strong_forcing.png")
-        plot_response([curve.dataset for curve in strong], files[-1], title=title)
+        plot_response(strong.dataset, files[-1], title=str(strong.case))
     return files
 
 
-def sequel(folder: Path, progress: Progress | None = None) -> list[tuple[str, Path]]:
+def sequel(weak: Branch, strong: System, folder: Path, progress: Progress | None = None) -> list[tuple[str, Path]]:
     """What hides beside the response curves: sentences, each with its figure in `folder`.
 
-    The branches that leave the strongly forced response at its period doublings; the border of the first ones over the
-    frequency and the gap, with the curve of limit points that begins on it; and, off that border, a resonance of twice
-    the period that no sweep meets.
+    The branches that leave the response of the `strong`ly forced system at its period doublings; the border of the
+    first ones of the `weak` response over the frequency and the gap, with the curve of limit points that begins on it;
+    and, off that border, a resonance of twice the period that no sweep meets.
     """
-    from suboctave.analysis.diagram import bifurcation_diagram
-    from suboctave.analysis.frequency_response import continue_branch, frequency_response
-    from suboctave.analysis.track import track
-    from suboctave.model import library
+
+    def whole(result: Any) -> Any:
+        """Ctrl-C, which the verbs end politely at, ends the demonstration too."""
+        if result.interrupted:
+            raise KeyboardInterrupt
+        return result
 
     beside: list[tuple[str, Path]] = []
-    strong = library.reference_oscillator(p=1.7, j=0.0, regularization=REGULARIZATION)
     diagram = bifurcation_diagram(strong, omega=OMEGA, depth=2, progress=progress)
     count = len(diagram) - 1
     beside.append((f"p = 1.7, j = 0: {count} branches leave the response", folder / "cascade.png"))
     diagram.plot(beside[-1][1])
-    _go_on(diagram)
+    whole(diagram)
 
-    weak = library.reference_oscillator(p=0.55, j=0.0, regularization=REGULARIZATION)
-    doubling = frequency_response(weak, omega=OMEGA).bifurcations["PD"][0]
-    border = track(doubling, parameter="j", bounds=(0.0, 1.0), progress=progress)
-    _go_on(border)
-    limits = track(border.bifurcations["GPD"][-1], parameter="j", bounds=(0.0, 1.0), progress=progress)
-    _go_on(limits)
+    gaps: dict[str, Any] = {"parameter": "j", "bounds": (0.0, 1.0), "progress": progress}
+    border = whole(track(weak.bifurcations["PD"][0], **gaps))
+    limits = whole(track(border.bifurcations["GPD"][-1], **gaps))
     highest = max(e.parameter("j") for e in border.extrema)
     text = f"p = 0.55: the response doubles its period for gaps up to j = {highest:.5f}"
     beside.append((text, folder / "boundary.png"))
     plot_boundaries([border.to_xarray(), limits.to_xarray()], beside[-1][1])
 
     fold = min(limits.orbits, key=lambda orbit: abs(orbit.values["j"] - 0.5))
-    isola = continue_branch(fold, "omega", OMEGA, progress=progress)
     gap = fold.values["j"]
-    response = frequency_response(weak.with_parameters({"j": gap}), omega=OMEGA, progress=progress)
+    isola = continue_branch(fold, "omega", OMEGA, progress=progress)
+    response = frequency_response(weak.system.with_parameters({"j": gap}), omega=OMEGA, progress=progress)
     born = max(e.parameter("j") for e in limits.extrema)
     text = f"up to j = {born:.5f} an isolated resonance of twice the period hides beside it: at j = {gap:.3f}"
     beside.append((text, folder / "isola.png"))
     plot_response([response.to_xarray(), isola.to_xarray()], beside[-1][1], title=f"p = 0.55, j = {gap:.3f}")
     return beside
-
-
-def _go_on(result: Branch | BifurcationDiagram) -> None:
-    """Ctrl-C, which the verbs end politely at, ends the demonstration too."""
-    if result.interrupted:
-        raise KeyboardInterrupt
 
 
 def run_demo(out: Path, json_wanted: bool = False) -> None:
@@ -159,19 +143,22 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
     )
     curves: list[Curve] = []
     for case in CASES:
-        with bar(f"p = {case.p:g}, j = {case.j:g}") as report:
+        with bar(str(case)) as report:
             curve = compute(case, report)
         curves.append(curve)
-        _print_curve(screen, curve)
-        if curve.interrupted:
+        screen.print(f"\n{case}: {case.title}", style="bold", markup=False)
+        print_events(screen, event_lines(curve.dataset))
+        screen.print(f"{len(curve.branch)} points in {curve.seconds:.2f} s; {curve.branch.ended}.", markup=False)
+        if curve.branch.interrupted:
             break
+    interrupted = curves[-1].branch.interrupted
     screen.print()
     figures = list(draw(curves, out))
     for path in figures:
         screen.print(f"figure: {path}", markup=False, soft_wrap=True)
-    if not curves[-1].interrupted:
+    if not interrupted:
         with bar("what hides beside them") as report:
-            hidden = sequel(out, report)
+            hidden = sequel(curves[1].branch, CASES[2].system, out, report)
         for text, path in hidden:
             screen.print(f"\n{text}\nfigure: {path}", markup=False, soft_wrap=True)
             figures.append(path)
@@ -180,9 +167,9 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
             {
                 "p": c.case.p,
                 "j": c.case.j,
-                "points": int(c.dataset.sizes["point"]),
+                "points": len(c.branch),
                 "seconds": c.seconds,
-                "ended": c.dataset.attrs["ended"],
+                "ended": c.branch.ended,
                 "events": [
                     {"kind": str(kind), "omega": float(omega)}
                     for kind, omega in zip(c.dataset["event_kind"].values, c.dataset["event_omega"].values, strict=True)
@@ -190,13 +177,6 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
             }
             for c in curves
         ]
-        print(json.dumps({"ok": not curves[-1].interrupted, "curves": listed, "files": [str(f) for f in figures]}))
-    if curves[-1].interrupted:
+        print(json.dumps({"ok": not interrupted, "curves": listed, "files": [str(f) for f in figures]}))
+    if interrupted:
         raise KeyboardInterrupt
-
-
-def _print_curve(screen: Console, curve: Curve) -> None:
-    case, dataset = curve.case, curve.dataset
-    screen.print(f"\np = {case.p:g}, j = {case.j:g}: {case.title}", style="bold", markup=False)
-    print_events(screen, event_lines(dataset))
-    screen.print(f"{dataset.sizes['point']} points in {curve.seconds:.2f} s; {dataset.attrs['ended']}.", markup=False)

@@ -167,3 +167,15 @@ def tables_of(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Cal
         yield folder / f"{name}_points.csv", partial(item.to_csv, what="points")
     if isinstance(item, Branch | BifurcationDiagram | Isolas):
         yield folder / f"{name}_bifurcations.csv", partial(item.to_csv, what="bifurcations")
+
+
+def write_tables(results: Results, folder: Path, overwrite: bool) -> list[Path]:
+    """All tables of some results, into a folder that is made; InputError where one exists and is not to be replaced."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    jobs = [job for name, item in results.items() for job in tables_of(name, item, folder)]
+    for path, _ in jobs:
+        files.free_place(path, overwrite)
+    return [write(path, overwrite=overwrite) for path, write in jobs]
