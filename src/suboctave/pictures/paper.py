@@ -70,7 +70,7 @@ def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = No
         _in_plane(figure, drawing, sheet)
     if path is not None:
         arranged = figure.get_layout_engine()
-        figure.set_layout_engine("none")  # it is arranged already
+        figure.set_layout_engine(None)  # it is arranged already
         save_figure(figure, path)
         figure.set_layout_engine(arranged)
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
