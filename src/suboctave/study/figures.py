@@ -127,7 +127,6 @@ class CurveFigure(Figure):
         return self.analyses or list(planes)
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
-        """See `Figure.check`."""
         planes, system = study.planes, study.system
         for i, name in enumerate(self.analyses):
             if name not in planes:
@@ -162,7 +161,6 @@ class CurveFigure(Figure):
             yield ("quantity",), "no force at harmonic 1 is applied, so that there is no transmissibility"
 
     def draw(self, results: Mapping[str, Result], path: Path) -> bool:
-        """See `Figure.draw`."""
         planes = {name: getattr(item, "plane", None) for name, item in results.items() if isinstance(item, _CURVES)}
         every = self.drawn(planes)
         there = [name for name in every if name in results and drawable(results[name])]
@@ -246,11 +244,9 @@ class ResponseFigure(CurveFigure):
         return self.analyses or [name for name, plane in planes.items() if plane is None] or list(planes)
 
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
-        """See `CurveFigure.of_isolas`."""
         return _closed(datasets, self.at)
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
-        """See `Figure.check`."""
         yield from super().check(study)
         for i, name in enumerate(self.analyses):
             tracked = study.planes.get(name) is not None and not study.steps[name].gives_isolas
@@ -258,7 +254,6 @@ class ResponseFigure(CurveFigure):
                 yield ("analyses", i), f'{name!r} is a curve of bifurcations: kind = "boundary" draws it, or give x'
 
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        """See `CurveFigure.drawing`."""
         plot_response(datasets, path, x=self.x, labels=labels, title=self.title, size=self.size, view=view)
 
 
@@ -282,7 +277,6 @@ class BoundaryFigure(CurveFigure):
         return self.analyses or [name for name, plane in planes.items() if plane is not None]
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
-        """See `Figure.check`."""
         yield from super().check(study)
         curves = study.planes
         tracked = [name for name, plane in curves.items() if plane is not None]
@@ -304,11 +298,9 @@ class BoundaryFigure(CurveFigure):
                 yield (key,), f"is not free on these curves{suggest(str(given), plane)}; else give x and y"
 
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
-        """See `CurveFigure.of_isolas`."""
         return [dataset for dataset in datasets.values() if "isola" not in dataset.attrs]
 
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        """See `CurveFigure.drawing`."""
         axes: dict[str, Any] = {"x": self.x, "y": self.y, "projected": self.projected}
         plot_boundaries(datasets, path, **axes, labels=labels, title=self.title, size=self.size, view=view)
 
@@ -328,11 +320,9 @@ class SpaceFigure(CurveFigure):
     at: list[float] | None = None
 
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
-        """See `CurveFigure.of_isolas`."""
         return [d for d in datasets.values() if "isola" not in d.attrs] + _closed(datasets, self.at)
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
-        """See `Figure.check`."""
         yield from super().check(study)
         curves = study.planes
         planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
@@ -345,7 +335,6 @@ class SpaceFigure(CurveFigure):
             yield ("y",), "is missing: the parameter into the depth, which no tracked curve tells here"
 
     def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        """See `CurveFigure.drawing`."""
         own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
         units: dict[str, Any] = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
         plot_space(datasets, path, **own, **units)
@@ -392,7 +381,6 @@ class MotionFigure(Figure):
         return [Motion(analysis=given) if isinstance(given, str) else given for given in self.motions]
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
-        """See `Figure.check`."""
         curves = list(study.planes)
         kinds = {name: type(step) for name, step in study.steps.items()}
         around = None if study.system is None else CheckContext(study.system, kinds)

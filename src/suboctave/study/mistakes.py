@@ -6,6 +6,9 @@ every key, every element of an array and every table, arrays of tables included.
 
 from __future__ import annotations
 
+import re
+import tomllib
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -160,7 +163,24 @@ def _in_words(item: Any, known: list[str]) -> str:
 
 
 # -------------------------------------------------------------------------------------------------------------- lines
-_BLANK = " \t\r\n"
+#: blanks and comments; texts of one and of several lines; marks; everything else that stands together
+_TOKEN = re.compile(
+    r"""(?P<blank>[ \t\r]+|\#[^\n]*)
+    |\"{3}(?:\\.|[^\\])*?\"{3,5}|'{3}.*?'{3,5}
+    |\"(?:\\.|[^"\\])*\"|'[^']*'
+    |[\[\]{},=.\n]
+    |[^\s\[\]{},=."'#]+""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+def _tokens(text: str) -> Iterator[tuple[str, int]]:
+    """What a TOML text consists of, each part with its line."""
+    line = 1
+    for match in _TOKEN.finditer(text):
+        if match.lastgroup != "blank":
+            yield match[0], line
+        line += match[0].count("\n")
 
 
 class Lines:
@@ -168,8 +188,9 @@ class Lines:
 
     def __init__(self, text: str) -> None:
         self._places: dict[Key, int] = {(): 1}
+        self._tokens = deque(_tokens(text))
         with suppress(IndexError, RecursionError):  # what stands before it is still right
-            _Walker(text, self._places).walk()
+            self._walk()
 
     def __getitem__(self, path: Key) -> int:
         """The line of a key, or of what it would stand in."""
@@ -180,138 +201,76 @@ class Lines:
     def __contains__(self, path: Key) -> bool:
         return path in self._places
 
+    def _passed(self, mark: str) -> bool:
+        """Whether this mark comes next, which is passed then."""
+        here = self._tokens[0][0] == mark
+        if here:
+            self._tokens.popleft()
+        return here
 
-class _Walker:
-    def __init__(self, text: str, places: dict[Key, int]) -> None:
-        self.text = text + "\n"
-        self.places = places
-        self.at = 0
-        self.line = 1
-        self.counts: dict[Key, int] = {}
+    def _next(self) -> int:
+        """The line of what comes next, past the ends of lines."""
+        while self._passed("\n"):
+            pass
+        return self._tokens[0][1]
 
-    def step(self, count: int = 1) -> None:
-        self.line += self.text.count("\n", self.at, self.at + count)
-        self.at += count
-
-    def note(self, path: Key) -> None:
-        self.places.setdefault(path, self.line)
-
-    def blank(self, newlines: bool = True) -> None:
-        """Past white space and comments."""
-        while self.at < len(self.text):
-            here = self.text[self.at]
-            if here == "#":
-                while self.text[self.at] != "\n":
-                    self.at += 1
-            elif here in _BLANK and (newlines or here != "\n"):
-                self.step()
-            else:
-                return
-
-    def walk(self) -> None:
+    def _walk(self) -> None:
         table: Key = ()
+        counts: dict[Key, int] = {}
         while True:
-            self.blank()
-            if self.at >= len(self.text):
-                return
-            if self.text.startswith("[[", self.at):
-                self.at += 2
-                *front, last = self.key("]")
-                path = (*self.inside(front), last)
-                self.note(path)
-                self.counts[path] = self.counts.get(path, -1) + 1
-                table = (*path, self.counts[path])
-                self.at += 2
-                self.note(table)
-            elif self.text[self.at] == "[":
-                self.at += 1
-                table = self.inside(self.key("]"))
-                self.at += 1
-                self.note(table)
-            else:
-                self.pair(table)
+            line = self._next()
+            if not self._passed("["):
+                self._pair(table)
+                continue
+            is_array = self._passed("[")
+            table = ()
+            keys = self._key("]")
+            for place, key in enumerate(keys, 1):
+                table = (*table, key)
+                if is_array and place == len(keys):
+                    self._tokens.popleft()
+                    self._places.setdefault(table, line)
+                    counts[table] = counts.get(table, -1) + 1
+                if table in counts:  # the name of an array of tables means its last table
+                    table = (*table, counts[table])
+            self._places.setdefault(table, line)
 
-    def inside(self, keys: list[str]) -> Key:
-        """The path of a header: a name of an array of tables means its last table."""
-        path: Key = ()
-        for key in keys:
-            path = (*path, key)
-            if path in self.counts:
-                path = (*path, self.counts[path])
-        return path
+    def _pair(self, table: Key) -> None:
+        line = self._tokens[0][1]
+        for key in self._key("="):
+            table = (*table, key)
+            self._places.setdefault(table, line)
+        self._value(table)
 
-    def pair(self, table: Key) -> None:
-        path = table
-        start = self.line
-        for key in self.key("="):
-            path = (*path, key)
-            self.places.setdefault(path, start)
-        self.at += 1
-        self.value(path)
+    def _key(self, end: str) -> list[str]:
+        """A dotted key, up to the mark `end`."""
+        parts = []
+        while not self._passed(end):
+            part, _ = self._tokens.popleft()
+            if part[0] in "\"'":
+                part = next(iter(tomllib.loads(f"{part} = 0")))
+            elif part == ".":
+                continue
+            parts.append(part)
+        return parts
 
-    def key(self, end: str) -> list[str]:
-        """A dotted key, up to the character `end`."""
-        parts: list[str] = []
-        while True:
-            self.blank(newlines=False)
-            here = self.text[self.at]
-            if here == end:
-                return parts
-            if here == ".":
-                self.at += 1
-            elif here in "\"'":
-                start = self.at
-                self.string()
-                parts.append(_unquoted(self.text[start : self.at]))
-            else:
-                start = self.at
-                while self.text[self.at] not in f" \t.{end}":
-                    self.step()
-                parts.append(self.text[start : self.at])
-
-    def string(self) -> None:
-        quote = self.text[self.at]
-        mark = quote * 3 if self.text.startswith(quote * 3, self.at) else quote
-        self.at += len(mark)
-        while not self.text.startswith(mark, self.at):
-            self.step(2 if quote == '"' and self.text[self.at] == "\\" else 1)
-        self.at += len(mark)
-        while len(mark) == 3 and self.text[self.at] == quote:  # quotes right before the end belong to the text
-            self.at += 1
-
-    def value(self, path: Key) -> None:
-        self.blank()
-        here = self.text[self.at]
-        if here in "\"'":
-            self.string()
-        elif here == "[":
-            self.at += 1
+    def _value(self, path: Key) -> None:
+        if self._passed("["):
             index = 0
-            while self.more("]"):
-                self.note((*path, index))
-                self.value((*path, index))
+            while self._more("]"):
+                self._places.setdefault((*path, index), self._tokens[0][1])
+                self._value((*path, index))
                 index += 1
-        elif here == "{":
-            self.at += 1
-            while self.more("}"):
-                self.pair(path)
+        elif self._passed("{"):
+            while self._more("}"):
+                self._pair(path)
         else:
-            while self.text[self.at] not in ",]}\n#":
-                self.at += 1
+            while self._tokens and self._tokens[0][0] not in (",", "]", "}", "\n"):
+                self._tokens.popleft()
 
-    def more(self, end: str) -> bool:
+    def _more(self, end: str) -> bool:
         """Past a comma; False at the end of an array or inline table, which is passed too."""
-        self.blank()
-        if self.text[self.at] == ",":
-            self.at += 1
-            self.blank()
-        if self.text[self.at] == end:
-            self.at += 1
-            return False
-        return True
-
-
-def _unquoted(text: str) -> str:
-    import tomllib
-
-    return next(iter(tomllib.loads(f"{text} = 0")))
+        self._next()
+        if self._passed(","):
+            self._next()
+        return not self._passed(end)

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
+from pydantic import AfterValidator
+
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, ExtendedSystem, Formulation, formulation_of
@@ -13,10 +15,20 @@ from suboctave.errors import InputError, suggest
 from suboctave.floquet import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 
-__all__ = ["as_formulation", "as_harmonics", "as_newton", "as_seeds", "as_stability", "as_stepping"]
+__all__ = ["as_formulation", "as_harmonics", "as_newton", "as_seeds", "as_stability", "as_stepping", "read_by"]
 
 _METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}
 _FORMULATIONS: dict[str, Any] = {one.name: one for one in (BorderedSystem, ExtendedSystem, Alcorta2019)}
+
+
+def read_by(read: Callable[[Any], Any]) -> AfterValidator:
+    """What is given for a field stays as it is; where it cannot be read it is refused at its key."""
+
+    def check(given: Any) -> Any:
+        read(given)
+        return given
+
+    return AfterValidator(check)
 
 
 def as_newton(table: Mapping[str, Any] | None) -> NewtonOptions | None:

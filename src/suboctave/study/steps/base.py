@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from inspect import get_annotations
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -121,6 +122,11 @@ class Step(BaseModel):
     def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
         """The analyses whose results it starts from: the key that names each, and the name."""
         return []
+
+    def own(self, *without: str) -> dict[str, Any]:
+        """The arguments that its kind has and no other, by name."""
+        names = [name for name in get_annotations(type(self)) if name in type(self).model_fields]
+        return {name: getattr(self, name) for name in names if name not in without}
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         """What is wrong with the arguments, before any work."""

@@ -5,11 +5,11 @@ What they have in common are the options of the verbs as fields, checked and pas
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.frequency_response import continue_branch, frequency_response
@@ -24,7 +24,7 @@ from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.study.options import as_formulation, as_harmonics, as_newton, as_stability, as_stepping
+from suboctave.study.options import as_formulation, as_harmonics, as_newton, as_stability, as_stepping, read_by
 from suboctave.study.steps.base import (
     CheckContext,
     Complaint,
@@ -68,18 +68,12 @@ Start = Annotated[
 class FollowingStep(Step):
     """The options of all verbs that follow curves."""
 
-    harmonics: Any = None
+    harmonics: Annotated[Any, read_by(as_harmonics)] = None
     max_step: float | None = None
     observe: int | None = None
-    newton: dict[str, Any] | None = None
-    stepping: dict[str, Any] | None = None
-    stability: Any = None
-
-    @field_validator("newton", "stepping", "harmonics", "stability")
-    @classmethod
-    def _read(cls, given: Any, info: ValidationInfo) -> Any:
-        _READ[str(info.field_name)](given)
-        return given
+    newton: Annotated[dict[str, Any] | None, read_by(as_newton)] = None
+    stepping: Annotated[dict[str, Any] | None, read_by(as_stepping)] = None
+    stability: Annotated[Any, read_by(as_stability)] = None
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         """The options of every verb."""
@@ -114,13 +108,7 @@ class CurveStep(FollowingStep):
 
     start: Start | None = None
     events: list[EventTable] = Field(default_factory=list)
-    formulation: Any = None
-
-    @field_validator("formulation")
-    @classmethod
-    def _read_formulation(cls, given: Any) -> Any:
-        as_formulation(given)
-        return given
+    formulation: Annotated[Any, read_by(as_formulation)] = None
 
     @property
     def motion(self) -> Motion | None:
@@ -130,7 +118,6 @@ class CurveStep(FollowingStep):
         return self.start if isinstance(self.start, Motion) else None
 
     def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        """See `Step.needs`."""
         if self.motion is None:
             return []
         return [(("start",) if isinstance(self.start, str) else ("start", "analysis"), self.motion.analysis)]
@@ -182,12 +169,6 @@ class CurveStep(FollowingStep):
                 yield ("parameters", name), f"the motion that it starts from has {name} = {there:g}: leave it out"
 
 
-_READ: dict[str, Callable[[Any], Any]] = {
-    "newton": as_newton,
-    "stepping": as_stepping,
-    "harmonics": as_harmonics,
-    "stability": as_stability,
-}
 _MOST = 8000  # unknowns of a dense problem, as the verbs have it
 
 
@@ -206,12 +187,10 @@ class FrequencyResponse(CurveStep):
     omega: Range
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         yield from check_sweep(self.omega, around)
 
     def run(self, context: Context) -> Branch | BifurcationDiagram:
-        """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         start = self.started(context)
         first, last = self.omega
@@ -232,7 +211,6 @@ class Diagram(FrequencyResponse):
     max_branches: int = Field(default=32, ge=1)
 
     def run(self, context: Context) -> BifurcationDiagram:
-        """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         omega: Any = tuple(self.omega)
         options |= {"start": self.started(context), "max_branches": self.max_branches}
@@ -249,7 +227,6 @@ class ContinueBranch(CurveStep):
     omega: float | None = None
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         unknown = list(tried("parameter", lambda: check_parameter(around.system, self.parameter)))
         yield from unknown
@@ -269,7 +246,6 @@ class ContinueBranch(CurveStep):
             yield from self.differing(around)
 
     def known(self, around: CheckContext) -> Known | None:
-        """See `Step.known`."""
         source = self.inherited(around)
         if self.motion is not None and source is None:
             return None
@@ -277,7 +253,6 @@ class ContinueBranch(CurveStep):
         return Known(self.parameter, {name: value for name, value in values.items() if name != self.parameter})
 
     def run(self, context: Context) -> Branch:
-        """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         start = context.system if self.motion is None else self.started(context)
         bounds: Any = tuple(self.bounds)
@@ -294,7 +269,6 @@ class SwitchBranch(CurveStep):
     bounds: Range | None = None
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         kind = self.start.bifurcation
         if kind is None:
@@ -313,11 +287,9 @@ class SwitchBranch(CurveStep):
             check_bounds(around.system, source.free, self.bounds)
 
     def known(self, around: CheckContext) -> Known | None:
-        """See `Step.known`."""
         return self.inherited(around)
 
     def run(self, context: Context) -> Branch:
-        """See `Step.run`."""
         item = chosen(self.start, context.results)
         self._moved(item.orbit, context)
         options: dict[str, Any] = self.options(context)
@@ -342,12 +314,10 @@ class Track(CurveStep):
 
     @property
     def plane(self) -> tuple[str, str] | None:
-        """See `Step.plane`."""
         both = ["omega", self.parameter] if isinstance(self.parameter, str) else self.parameter
         return (both[0], both[1]) if len(both) == 2 else None
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         yield from self._check_start()
         names = [self.parameter] if isinstance(self.parameter, str) else self.parameter
@@ -401,7 +371,6 @@ class Track(CurveStep):
         return None
 
     def run(self, context: Context) -> Branch:
-        """See `Step.run`."""
         options: dict[str, Any] = self.options(context)
         assert self.motion is not None
         start = chosen(self.motion, context.results)

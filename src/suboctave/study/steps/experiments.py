@@ -23,7 +23,6 @@ from suboctave.study.steps.base import (
     Range,
     Step,
     as_curve,
-    as_table,
     check_branch,
     chosen_branch,
     key_of_curve,
@@ -47,11 +46,9 @@ class Basins(Step):
     what: Literal["shares", "states"] = "shares"
 
     def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        """See `Step.needs`."""
         return [(("branches", i, *key_of_curve(b, "")[1:]), as_curve(b).analysis) for i, b in enumerate(self.branches)]
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         for i, branch in enumerate(self.branches):
             yield from check_branch(as_curve(branch), ("branches", i, *key_of_curve(branch, "")[1:]), around)
         for i, side in enumerate(self.box):
@@ -65,39 +62,21 @@ class Basins(Step):
         yield from tried("rest", lambda: start_state(around.system, self.rest))
 
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
-        given: dict[str, Any] = {}
-        for one in self.branches:
-            curve = as_curve(one)
-            given[curve.words] = chosen_branch(curve, context.results)
-        result = basins(
-            context.system, omega=self.omega, box=(self._side(0), self._side(1)), grid=(self.grid[0], self.grid[1]),
-            plane=None if self.coordinates is None else (self.coordinates[0], self.coordinates[1]), rest=self.rest,
-            attractors=given or None, periods=self.periods, tolerance=self.tolerance, progress=context.progress,
-        )  # fmt: skip
+        given = {as_curve(one).words: chosen_branch(as_curve(one), context.results) for one in self.branches}
+        own = self.own("coordinates", "branches", "what") | {"plane": self.coordinates}
+        result = basins(context.system, attractors=given or None, progress=context.progress, **own)
         title = f"basins at omega = {self.omega:g}"
         if self.what == "shares":
             frame = result.to_dataframe()
             return Table({name: frame[name].to_numpy() for name in frame.columns}, f"{title}, shares", result)
         return Table(_states(result), f"{title}, state by state", result)
 
-    def _side(self, which: int) -> tuple[float, float]:
-        return self.box[which][0], self.box[which][1]
-
 
 def _states(result: BasinsResult) -> dict[str, np.ndarray]:
-    names = result.names
     x, y = np.meshgrid(result.x, result.y)
-    rows = list(
-        zip(
-            x.ravel(),
-            y.ravel(),
-            (names[label] for label in result.labels.ravel().tolist()),
-            result.settling.ravel(),
-            strict=True,
-        )
-    )
-    return as_table((*result.plane, "motion", "settling"), (float, float, str, int), rows)
+    motion = [result.names[label] for label in result.labels.ravel().tolist()]
+    columns = (x.ravel(), y.ravel(), np.array(motion, dtype=str), result.settling.ravel().astype(int))
+    return dict(zip((*result.plane, "motion", "settling"), columns, strict=True))
 
 
 class Lyapunov(Step):
@@ -114,21 +93,15 @@ class Lyapunov(Step):
     tolerance: float | None = Field(default=None, ge=1e-15, le=1e-2)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from tried("state", lambda: start_state(around.system, self.state))
         if self.count is not None and self.count > 2 * around.system.n:
             yield ("count",), f"is at most {2 * around.system.n}, two for each degree of freedom"
 
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
-        result = lyapunov_exponents(
-            context.system, self.state, omega=self.omega, periods=self.periods, transient=self.transient,
-            count=self.count, trajectories=self.trajectories, tolerance=self.tolerance, progress=context.progress,
-        )  # fmt: skip
-        rows = list(zip(result.exponents, result.standard_errors, result.per_period, strict=True))
-        names = ("exponent", "standard_error", "per_period")
-        title = f"Lyapunov exponents at omega = {self.omega:g}"
-        return Table(as_table(names, (float, float, float), rows), title, result)
+        result = lyapunov_exponents(context.system, progress=context.progress, **self.own())
+        values = (result.exponents, result.standard_errors, result.per_period)
+        columns = dict(zip(("exponent", "standard_error", "per_period"), values, strict=True))
+        return Table(columns, f"Lyapunov exponents at omega = {self.omega:g}", result)
 
 
 #: omega, degree of freedom, change of velocity
@@ -153,12 +126,10 @@ class SteppedSineStep(Step):
     observe: int | None = None
 
     def _arguments(self) -> dict[str, Any]:
-        names = ("steps", "direction", "settle", "measure", "state", "harmonics", "noise", "seed", "observe")
         tap = self.tap and (self.tap[0], int(self.tap[1]), self.tap[2])
-        return {name: getattr(self, name) for name in names} | {"tap": tap}
+        return self.own("omega") | {"tap": tap}
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         if self.tap is not None and self.tap[1] != int(self.tap[1]):
             yield ("tap",), "tap is [omega, degree of freedom, change of velocity]: the second is a whole number"
             return
@@ -166,7 +137,6 @@ class SteppedSineStep(Step):
         yield from tried("omega", lambda: check_stepped_sine(around.system, tuple(self.omega), **arguments))
 
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
         result = stepped_sine(context.system, tuple(self.omega), progress=context.progress, **self._arguments())
         frame = result.to_dataframe()
         columns = {str(name): np.asarray(frame[name].tolist()) for name in frame}

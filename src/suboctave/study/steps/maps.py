@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from suboctave.errors import ConvergenceError, suggest
 from suboctave.maps.isolas.map import isola_map
@@ -14,7 +14,7 @@ from suboctave.maps.isolas.verb import find_isolas
 from suboctave.maps.regimes.verb import regime_map
 from suboctave.model.inputs import check_bounds, check_parameter
 from suboctave.store.table import Table
-from suboctave.study.options import as_seeds
+from suboctave.study.options import as_seeds, read_by
 from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, tried
 from suboctave.study.steps.curves import FollowingStep, check_sweep
 
@@ -28,7 +28,6 @@ class DesignStep(FollowingStep):
     max_curves: int = Field(default=64, ge=1)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         yield from check_design(self.parameter, self.bounds, ("parameter", "bounds"), around)
         if self.parameter in self.parameters:
@@ -76,22 +75,14 @@ class FindIsolas(DesignStep):
     depth: int = Field(default=1, ge=0)
     levels: list[float] | None = None
     search: list[int] | None = None
-    seeds: dict[str, Any] | None = None
+    seeds: Annotated[dict[str, Any] | None, read_by(as_seeds)] = None
     at: list[float] = Field(default_factory=list)
-
-    @field_validator("seeds")
-    @classmethod
-    def _read_seeds(cls, given: Any) -> Any:
-        as_seeds(given)
-        return given
 
     @property
     def plane(self) -> tuple[str, str] | None:
-        """See `Step.plane`."""
         return "omega", self.parameter
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         if isinstance(self.values, list) and not self.values:
             yield ("values",), f"must be how many, or values of {self.parameter}, at least one"
@@ -107,13 +98,8 @@ class FindIsolas(DesignStep):
                 yield ("levels", i), "is that of the loads themselves, at which responses are followed anyway"
 
     def run(self, context: Context) -> Isolas:
-        """See `Step.run`."""
-        options = self.options(context) | {"values": self.values, "depth": self.depth}
-        for name in ("levels", "search"):
-            if getattr(self, name) is not None:
-                options[name] = tuple(getattr(self, name))
-        if self.seeds is not None:
-            options["seeds"] = as_seeds(self.seeds)
+        given = self.own("at") | {"seeds": as_seeds(self.seeds)}
+        options = self.options(context) | {name: value for name, value in given.items() if value is not None}
         return self._with_branches(find_isolas(context.system, *self.ranges, **options), context.progress)
 
     def _with_branches(self, isolas: Isolas, progress: Any) -> Isolas:
@@ -149,7 +135,6 @@ class IsolaRegions(DesignStep):
     probes: int = Field(default=3, ge=0)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         wrong = list(check_design(self.second, self.second_bounds, ("second", "second_bounds"), around))
         yield from wrong
@@ -163,7 +148,6 @@ class IsolaRegions(DesignStep):
         yield from self._check_values(self.values)
 
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
         options = self.options(context)
         isolas = find_isolas(context.system, *self.ranges, values=self.values, depth=self.depth, **options)
         if not isolas or isolas.interrupted:
@@ -190,24 +174,14 @@ class Regimes(DesignStep):
     seed: int = Field(default=0, ge=0)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
         yield from super().check(around)
         for i, order in enumerate(self.search):
             if order < 1:
                 yield ("search", i), f"is a period in periods of the load, at least 1, not {order}"
 
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
-        regimes = regime_map(
-            context.system,
-            *self.ranges,
-            depth=self.depth,
-            values=self.values,
-            resolution=self.resolution,
-            search=tuple(self.search),
-            max_slices=self.max_slices,
-            **self.options(context),
-        )
+        given = self.own("check_points", "seed") | self.options(context)
+        regimes = regime_map(context.system, *self.ranges, **given)
         table = regimes.to_table()
         title = [table.title, *(f"note: {note}" for note in regimes.notes)]
         if self.check_points and not regimes.interrupted:

@@ -35,28 +35,30 @@ from suboctave.verification.result import BranchVerification
 from suboctave.verification.verify import verify
 
 
-class Verify(Step):
+class BranchStep(Step):
+    """What it says is of the motions of a `branch`, at the parameters that they were computed with."""
+
+    branch: Named
+
+    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
+        return [(key_of_curve(self.branch, "branch"), as_curve(self.branch).analysis)]
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        yield from check_branch(as_curve(self.branch), key_of_curve(self.branch, "branch"), around)
+        if self.parameters:
+            yield ("parameters",), "its motions have the parameters that they were computed with: leave them out"
+
+
+class Verify(BranchStep):
     """`so.verify` on every `every`-th point, on the bifurcations, or on both; `tolerance` as there."""
 
     kind: ClassVar[str] = "verify"
 
-    branch: Named
     what: Literal["points", "bifurcations", "both"] = "both"
     every: int = Field(default=10, ge=1)
     tolerance: float = Field(default=1e-3, gt=0.0, lt=1.0)
 
-    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        """See `Step.needs`."""
-        return [(key_of_curve(self.branch, "branch"), as_curve(self.branch).analysis)]
-
-    def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
-        yield from check_branch(as_curve(self.branch), key_of_curve(self.branch, "branch"), around)
-        if self.parameters:
-            yield ("parameters",), "a branch is verified at the parameters that it was computed with: leave them out"
-
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
         curve = as_curve(self.branch)
         branch = chosen_branch(curve, context.results)
         whole = None if isinstance(branch, TrackedBranch) else _whole(self, branch, context)
@@ -74,16 +76,7 @@ def _whole(step: Verify, branch: Branch, context: Context) -> BranchVerification
 
 def _rows(whole: BranchVerification) -> list[tuple[Any, ...]]:
     rows: list[tuple[Any, ...]] = [
-        (
-            f"point {p.index}",
-            p.omega,
-            p.distance,
-            p.multiplier_error,
-            _word(p.stable),
-            p.agrees,
-            p.outcome,
-            p.reason,
-        )
+        (f"point {p.index}", p.omega, p.distance, p.multiplier_error, _word(p.stable), p.agrees, p.outcome, p.reason)
         for p in whole.points
     ]
     return rows + [
@@ -119,28 +112,22 @@ def _outcome(agrees: bool) -> str:
     return "agrees" if agrees else "disagrees"
 
 
-class Stability(Step):
+class Stability(BranchStep):
     """`so.stability` at `points` of `branch` and at its `bifurcations` of given kinds, by each of `methods`."""
 
     kind: ClassVar[str] = "stability"
 
-    branch: Named
     points: list[int] | None = None
     bifurcations: list[str] = Field(default_factory=list)
     nearest: dict[str, float] | None = None
     methods: list[Any] | None = None
-
-    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        """See `Step.needs`."""
-        return [(key_of_curve(self.branch, "branch"), as_curve(self.branch).analysis)]
 
     def _motion(self, **choice: Any) -> Motion:
         curve = as_curve(self.branch)
         return Motion(**{name: getattr(curve, name) for name in Curve.model_fields}, **choice)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """See `Step.check`."""
-        yield from check_branch(as_curve(self.branch), key_of_curve(self.branch, "branch"), around)
+        yield from super().check(around)
         if self.points is None and not self.bifurcations and self.nearest is None:
             yield (), "choose motions: points = [...], bifurcations = [...] or nearest = {omega = ...}"
         for i, kind in enumerate(self.bifurcations):
@@ -149,11 +136,8 @@ class Stability(Step):
         yield from check_motion(self._motion(nearest=self.nearest), (), around)
         for method in self.methods or []:
             yield from tried("methods", partial(as_stability, method))
-        if self.parameters:
-            yield ("parameters",), "stability is that of motions as they were computed: leave them out"
 
     def run(self, context: Context) -> Table:
-        """See `Step.run`."""
         motions: list[tuple[str, Any]] = []
         for point in self.points or []:
             motions.append((f"point {point}", chosen_motion(self._motion(point=point), context.results)))
