@@ -61,16 +61,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Curve:
-    """What the page says of one curve."""
+    """One curve: heading, figure, and the dataset, of which the template reads tables and sentences."""
 
     heading: str
-    summary: str
     figure: Figure
-    over: str
-    table: Table
-    notes: Sequence[str]
-    origin: Sequence[tuple[str, str]]
-    records: Sequence[tuple[str, str]]
+    dataset: xarray.Dataset
 
 
 @dataclass
@@ -145,6 +140,8 @@ def _template() -> Any:
 
     loader = PackageLoader("suboctave.pictures", "templates")
     page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    readers = (is_boundary, summary_of, bifurcations, notes_on, origin_of, records_of)
+    page.globals |= {reader.__name__: reader for reader in readers}
     page.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":")}
     return page.get_template("page.html")
 
@@ -223,18 +220,8 @@ def _isolas(name: str, head: xarray.Dataset, curves: Mapping[str, xarray.Dataset
 
 
 def _curve(name: str, dataset: xarray.Dataset, heading: str = "") -> Curve:
-    bounds = is_boundary(dataset)
-    figure = _boundaries({name: dataset}) if bounds else _responses({name: dataset})
-    return Curve(
-        heading,
-        summary_of(dataset),
-        figure,
-        "Extrema and points of codimension two" if bounds else "Bifurcations",
-        bifurcations(dataset),
-        notes_on(dataset),
-        origin_of(dataset),
-        records_of(dataset),
-    )
+    draw = _boundaries if is_boundary(dataset) else _responses
+    return Curve(heading, draw({name: dataset}), dataset)
 
 
 def _overviews(curves: Mapping[str, xarray.Dataset]) -> Iterator[Section]:
