@@ -60,56 +60,15 @@ def first_doubtful(places: Sequence[float], tests: Sequence[NDArray[np.float64]]
 
 
 @kernel()
-def _rate(places, first, last, size, s):
-    """The distance between the cubic and what is foretold from one side, without its factor (s - p) or (q - s)."""
-    for i in range(first, last):
-        size *= abs(s - places[i])
-    return size
-
-
-@kernel()
-def _looks(chord, second, third, shift, h):
-    """The grid of fractions with those at which `chord s + s (s - h) (second + third (s - shift))` is extreme."""
-    # derivative a s^2 + b s + c
-    a = 3.0 * third
-    b = 2.0 * (second - third * (shift + h))
-    c = chord - second * h + third * shift * h
-    n = _GRID.shape[0]
-    out = np.empty(n + 2)
-    for k in range(n):
-        out[k] = _GRID[k]
-    count = n
-    inside = b * b - 4.0 * a * c
-    if inside >= 0.0:
-        q = -0.5 * (b + math.copysign(math.sqrt(inside), b))
-        for k in range(2):
-            over, under = (q, a) if k == 0 else (c, q)
-            if under != 0.0 and 0.0 < over / under < h:
-                out[count] = over / (under * h)
-                count += 1
-    # few: in order by insertion
-    for k in range(n, count):
-        here, i = out[k], k
-        while i > 0 and out[i - 1] > here:
-            out[i] = out[i - 1]
-            i -= 1
-        out[i] = here
-    return out[:count]
-
-
-@kernel()
-def _doubtful(places, values, at):
-    """`doubtful`; -1 for nowhere."""
-    p, q = places[at], places[at + 1]
-    fp, fq = values[at], values[at + 1]
-    h = q - p
-    chord = (fq - fp) / h
-    n = places.shape[0]
+def _differences(places, values, at):
+    """The cubic by `bent`, `third` and `shift`, and the third differences that foretell it from before and behind."""
+    p, q, n = places[at], places[at + 1], places.shape[0]
+    chord = (values[at + 1] - values[at]) / (q - p)
     # f[p, q, x] for the places beside
     second = np.empty(n)
     for i in range(n):
         if i != at and i != at + 1:
-            second[i] = ((values[i] - fp) / (places[i] - p) - chord) / (places[i] - q)
+            second[i] = ((values[i] - values[at]) / (places[i] - p) - chord) / (places[i] - q)
     left, right = at, n - at - 2
     before = behind = 0.0
     if left == 1:
@@ -120,29 +79,47 @@ def _doubtful(places, values, at):
         behind = abs(second[at + 2])
     elif right > 1:
         behind = abs((second[at + 3] - second[at + 2]) / (places[at + 3] - places[at + 2]))
-    first, other = -1, -1
-    if left > 0 and right > 0:
-        first, other = at - 1, at + 2
-    elif left > 0:
-        first, other = at - 1, at - 2 if left > 1 else -1
-    elif right > 0:
-        first, other = at + 2, at + 3 if right > 1 else -1
-    bent, third, shift = 0.0, 0.0, p
-    if first >= 0:
-        bent, shift = second[first], places[first]
-        if other >= 0:
-            third = (second[other] - bent) / (places[other] - shift)
-    low, high = max(0, at - 2), min(n, at + 4)
+    bent, third, shift, count = 0.0, 0.0, p, 0
+    for i in (at - 1, at + 2, at - 2, at + 3):
+        if 0 <= i < n:
+            if count == 0:
+                bent, shift = second[i], places[i]
+            elif count == 1:
+                third = (second[i] - bent) / (places[i] - shift)
+            count += 1
+    return bent, third, shift, before, behind
+
+
+@kernel()
+def _doubtful(places, values, at):
+    """`doubtful`; -1 for nowhere."""
+    p, q = places[at], places[at + 1]
+    fp, fq = values[at], values[at + 1]
+    h = q - p
+    chord = (fq - fp) / h
+    bent, third, shift, before, behind = _differences(places, values, at)
+    low, high = max(0, at - 2), min(places.shape[0], at + 4)
     same = (fp > 0.0) == (fq > 0.0)
     if same:
         # all that may come off the chord against its lower end
         bend = 0.25 * h * h * (abs(bent) + abs(third) * max(abs(shift - p), abs(shift - q)))
-        stray = max(_rate(places, low, at, before, q), _rate(places, at + 2, high, behind, p))
+        stray = max(before * np.prod(np.abs(q - places[low:at])), behind * np.prod(np.abs(p - places[at + 2 : high])))
         if min(abs(fp), abs(fq)) > bend + SAFETY * h * stray:
             return -1.0
     sign = 1.0 if fp > 0.0 else -1.0
-    shares = _looks(chord, bent, third, shift - p, h)
-    looks = shares.shape[0]
+    # the grid, and where the cubic off the chord is extreme: its derivative is a s^2 + b s + c
+    shares = np.empty(_GRID.shape[0] + 2)
+    looks = _GRID.shape[0]
+    shares[:looks] = _GRID
+    a, b, c = 3.0 * third, 2.0 * (bent - third * (shift - p + h)), chord - bent * h + third * (shift - p) * h
+    inside = b * b - 4.0 * a * c
+    if inside >= 0.0:
+        q_root = -0.5 * (b + math.copysign(math.sqrt(inside), b))
+        for over, under in ((q_root, a), (c, q_root)):
+            if under != 0.0 and 0.0 < over / under < h:
+                shares[looks] = over / (under * h)
+                looks += 1
+    shares = np.sort(shares[:looks])
     value = np.empty(looks)
     doubt = np.empty(looks)
     for k in range(looks):
@@ -150,7 +127,8 @@ def _doubtful(places, values, at):
         s = p + ahead
         value[k] = sign * (fp + ahead * chord - ahead * back * (bent + third * (s - shift)))
         doubt[k] = SAFETY * max(
-            ahead * _rate(places, low, at, before, s), back * _rate(places, at + 2, high, behind, s)
+            ahead * before * np.prod(np.abs(s - places[low:at])),
+            back * behind * np.prod(np.abs(s - places[at + 2 : high])),
         )
     # one zero between places of opposite sign: where the cubic says, and nowhere else
     root = 1.0

@@ -44,34 +44,36 @@ def _between(tau, value, curve, level, other_tau, other_value, other_curve, othe
     """`contacts_between` for one gap."""
     if pass_by(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
         return 3
-    if _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
-        return 1
-    if _shrinks(other_tau, other_value, other_curve, other_level, tau, value, curve, level):
-        return 2
+    for end in range(2):
+        # whether an excursion of one motion is a small part of the same excursion of the other
+        size = 0.0
+        for i in range(value.shape[0]):
+            size = max(size, abs(value[i]))
+        for i in range(value.shape[0]):
+            # a maximum above the gap, or a minimum below it
+            sign = -1.0 if curve[i] > 0.0 else 1.0
+            here = sign * (value[i] - level)
+            if not 0.0 < here < YOUNG * size:
+                continue
+            best, there = -2.0, 0.0
+            for j in range(other_value.shape[0]):
+                if (other_curve[j] > 0.0) == (curve[i] > 0.0):
+                    near = math.cos(other_tau[j] - tau[i])
+                    if near > best:
+                        best, there = near, sign * (other_value[j] - other_level)
+            if here < SHRINKS * there:
+                return 1 + end
+        tau, value, curve, level, other_tau, other_value, other_curve, other_level = (
+            other_tau,
+            other_value,
+            other_curve,
+            other_level,
+            tau,
+            value,
+            curve,
+            level,
+        )
     return 0
-
-
-@kernel()
-def _shrinks(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
-    """Whether an excursion of one motion is a small part of the same excursion of another."""
-    size = 0.0
-    for i in range(value.shape[0]):
-        size = max(size, abs(value[i]))
-    for i in range(value.shape[0]):
-        # a maximum above the gap, or a minimum below it
-        sign = -1.0 if curve[i] > 0.0 else 1.0
-        here = sign * (value[i] - level)
-        if not 0.0 < here < YOUNG * size:
-            continue
-        best, there = -2.0, 0.0
-        for j in range(other_value.shape[0]):
-            if (other_curve[j] > 0.0) == (curve[i] > 0.0):
-                near = math.cos(other_tau[j] - tau[i])
-                if near > best:
-                    best, there = near, sign * (other_value[j] - other_level)
-        if here < SHRINKS * there:
-            return True
-    return False
 
 
 __all__ = ["CUT", "FIRST", "GRAZES", "LAST", "NOTHING", "contacts_between"]

@@ -16,7 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from suboctave.compiled import kernel
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
@@ -68,8 +67,6 @@ class HiddenPairs:
         near = self._known
         samples = [sample for sample, _ in near]
         places = [sample.point.arclength for sample in samples]
-        if _clear(np.array(places), np.array([known for _, known in near]), at):
-            return []
         if not all(a < b for a, b in pairwise(places)):
             return []
         for i, test in enumerate(self.tests):
@@ -147,7 +144,7 @@ def falling(places: Sequence[float], values: Sequence[float], at: int) -> float 
         return None
     least = min(abs(first), abs(last))
     if at > 0 and at + 2 < len(places):
-        if _straight(np.array(places), np.array(values), at):
+        if _straight(places, values, at):
             return None
         spans = [(at - 1, at + 2), (at, at + 3)]
     elif at > 0:
@@ -164,39 +161,12 @@ def falling(places: Sequence[float], values: Sequence[float], at: int) -> float 
     return None
 
 
-@kernel()
-def _clear(places, functions, at):
-    """Whether `falling` finds nothing for any of the functions at the first look; functions (m, tests, 2): signs and
-    logarithms.
-    """
-    m = places.shape[0]
-    if at < 1 or at + 2 >= m:
-        return False
-    for i in range(m - 1):
-        if not places[i] < places[i + 1]:
-            return False
-    values = np.empty(m)
-    for k in range(functions.shape[1]):
-        top = functions[:, k, 1].max()
-        if not math.isfinite(top):
-            return False
-        for i in range(m):
-            values[i] = functions[i, k, 0] * math.exp(functions[i, k, 1] - top)
-        if values[at] * values[at + 1] > 0.0 and not _straight(places, values, at):
-            return False
-    return True
-
-
-@kernel()
-def _straight(places, values, at):
+def _straight(places: Sequence[float], values: Sequence[float], at: int) -> bool:
     """Whether the parabolas through two neighbours and either place beside them stay close to the chord."""
-    bend = 0.0
-    for i in range(at - 1, at + 1):
-        first = (values[i + 1] - values[i]) / (places[i + 1] - places[i])
-        last = (values[i + 2] - values[i + 1]) / (places[i + 2] - places[i + 1])
-        bend = max(bend, abs((last - first) / (places[i + 2] - places[i])))
+    slopes = [(values[i + 1] - values[i]) / (places[i + 1] - places[i]) for i in range(at - 1, at + 2)]
+    bends = [(slopes[i + 1] - slopes[i]) / (places[at + i + 1] - places[at + i - 1]) for i in (0, 1)]
     # they leave it by no more than this
-    bend *= 0.25 * (places[at + 1] - places[at]) ** 2
+    bend = 0.25 * (places[at + 1] - places[at]) ** 2 * max(map(abs, bends))
     return bend <= (1.0 - _FALLS) * min(abs(values[at]), abs(values[at + 1]))
 
 
