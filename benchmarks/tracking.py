@@ -29,8 +29,8 @@ from threadpoolctl import threadpool_limits
 
 import suboctave as so
 from suboctave.continuation import newton
-from suboctave.curves import track_follow, tracked_events, tracked_hidden
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.tracked import events as tracked_events, follow as track_follow, hidden as tracked_hidden
 from suboctave.results.tracked_branch import TrackedBranch
 
 REPEATS = 7

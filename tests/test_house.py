@@ -54,6 +54,7 @@ CLEAN = [
     "continuation",
     "floquet",
     "bifurcation",
+    "curves",
     "store",
     "pictures",
     "results",

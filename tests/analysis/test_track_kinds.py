@@ -15,7 +15,7 @@ from suboctave.analysis.options import settings_of
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.continuation.march import March
 from suboctave.continuation.place import Place
-from suboctave.curves.track_start import Box, solved_start
+from suboctave.curves.tracked.start import Box, solved_start
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.timedomain import locate_by_shooting, state_transition
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.curves.tracked_hidden import falling
+from suboctave.curves.tracked.hidden import falling
 from suboctave.timedomain import shoot
 
 VAN_DER_POL = "mu*x**2*v"

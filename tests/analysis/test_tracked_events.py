@@ -11,11 +11,11 @@ import suboctave as so
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import make_point
-from suboctave.curves.nearest import nearest_point, same_discretisation, zero_along
 from suboctave.curves.sample import Sample
-from suboctave.curves.track_start import curve_through
-from suboctave.curves.tracked_events import events_between
-from suboctave.curves.tracked_tests import Extremum, GeneralisedDoubling
+from suboctave.curves.tracked.events import events_between
+from suboctave.curves.tracked.nearest import nearest_point, same_discretisation, zero_along
+from suboctave.curves.tracked.start import curve_through
+from suboctave.curves.tracked.tests import Extremum, GeneralisedDoubling
 from suboctave.harmonic.basis import HarmonicBasis
 
 OPTIONS = NewtonOptions()

@@ -24,18 +24,17 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.nearest import nearest_point
 from suboctave.curves.sample import Sample
-from suboctave.curves.track_start import (
+from suboctave.curves.tracked.events import Found, as_event
+from suboctave.curves.tracked.nearest import nearest_point
+from suboctave.curves.tracked.start import (
     curve_through,
     discretisation,
     is_extremum,
     spans_of,
     with_extremum,
 )
-from suboctave.curves.tracked_events import Found
-from suboctave.curves.tracked_located import as_event
-from suboctave.curves.tracked_tests import Extremum
+from suboctave.curves.tracked.tests import Extremum
 from suboctave.errors import InputError, shortened
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.interruption import limited

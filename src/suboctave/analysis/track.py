@@ -18,8 +18,8 @@ from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
-from suboctave.curves.track_follow import follow_tracked
-from suboctave.curves.track_start import Box, discretisation, is_extremum, kind_of, solved_start
+from suboctave.curves.tracked.follow import follow_tracked
+from suboctave.curves.tracked.start import Box, discretisation, is_extremum, kind_of, solved_start
 from suboctave.errors import InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance

@@ -36,7 +36,7 @@ from suboctave.curves.events.locate import Guess, Singular
 from suboctave.curves.events.monitors import PERIOD_DOUBLING
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.refine import solved_bifurcation
-from suboctave.curves.track_start import Box, curve_through, spans_of
+from suboctave.curves.tracked.start import Box, curve_through, spans_of
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.perturbation import Kind

@@ -10,6 +10,7 @@ hint at is not found; smaller steps do.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -19,13 +20,11 @@ import numpy as np
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
-from suboctave.curves.nearest import same_discretisation
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked_events import SAME, Found, brackets, located, slowest_between
-from suboctave.curves.tracked_tests import CurveTest, Extremum
+from suboctave.curves.tracked.events import SAME, Found, brackets, located, slowest_between
+from suboctave.curves.tracked.nearest import same_discretisation
+from suboctave.curves.tracked.tests import CurveTest, Extremum, PairCrossing
 from suboctave.errors import ConvergenceError
-
-__all__ = ["HiddenPairs"]
 
 #: share of the smaller end's value below which the function must be suspected to fall inside
 _FALLS = 0.8
@@ -180,3 +179,69 @@ def _interpolated(x: Sequence[float], f: Sequence[float], s: Array) -> Array:
     for i in range(len(x) - 2, -1, -1):
         value = value * (s - x[i]) + c[i]
     return value
+
+
+#: most steps between two points whose multipliers are computed
+_STRIDE = 4
+#: factor between two such points up to which it hardly changes
+_SLOWLY = 2.0
+
+
+class PairWatch:
+    """Looks at the points of a curve in order; `test` is None where no pair can pass."""
+
+    def __init__(self, test: PairCrossing | None, newton: NewtonOptions) -> None:
+        self.test = test
+        self.newton = newton
+        self._hidden = HiddenPairs([] if test is None else [test], newton)
+        self._waiting: list[Sample] = []
+        self._stride = 1
+
+    def passed(self, sample: Sample, warnings: list[str]) -> list[Found]:
+        """Take in the next point; pairs found before it."""
+        if self.test is None:
+            return []
+        self._waiting.append(sample)
+        if len(self._waiting) == 1:
+            return self._hidden.passed(sample, warnings)
+        return self._look(warnings) if len(self._waiting) > self._stride else []
+
+    def rest(self, warnings: list[str]) -> list[Found]:
+        """Pairs found before the last point."""
+        found = self._look(warnings) if len(self._waiting) > 1 else []
+        found += self._hidden.rest(warnings)
+        self._waiting, self._stride = [], 1
+        return found
+
+    def _look(self, warnings: list[str]) -> list[Found]:
+        """Pairs between the points that wait."""
+        assert self.test is not None
+        first, last = self._waiting[0], self._waiting[-1]
+        steps = len(self._waiting) - 1
+        least, most = sorted(_margin(sample) for sample in (first, last))
+        same = self.test.smooth(first)[0] == self.test.smooth(last)[0]
+        slow = same and most <= _SLOWLY * least and not self.test.changed(first, last)
+        looked = [last] if slow else self._waiting[1:]
+        found: list[Found] = []
+        for a, b in itertools.pairwise([first, *looked]):
+            found += self._hidden.passed(b, warnings)
+            if self.test.changed(a, b):
+                try:
+                    item = located(self.test, a, b, self.newton)
+                except ConvergenceError as failure:
+                    warnings.append(f"{self.test.kind} near {b.where}: {failure}")
+                    continue
+                found += [] if item is None else [item]
+        self._stride = min(_STRIDE, 2 * steps) if slow else 1
+        self._waiting = [last]
+        return found
+
+
+def _margin(sample: Sample) -> float:
+    """The least |1 - mu_i mu_j|, in units of 1 + |mu_i mu_j|."""
+    mu = sample.others
+    products = np.outer(mu, mu)[np.triu_indices(len(mu), 1)]
+    return float((np.abs(1.0 - products) / (1.0 + np.abs(products))).min())
+
+
+__all__ = ["HiddenPairs", "PairWatch"]

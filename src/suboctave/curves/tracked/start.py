@@ -25,8 +25,8 @@ from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
 from suboctave.curves.kinds.grazing import GrazingContactEquations
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.nearest import null_row
 from suboctave.curves.trace import Settings
+from suboctave.curves.tracked.nearest import null_row
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance

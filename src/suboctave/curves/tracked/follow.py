@@ -20,15 +20,12 @@ from suboctave.curves.points import TrackedPoint
 from suboctave.curves.sample import Sample
 from suboctave.curves.subharmonic_part import keeps_subharmonics
 from suboctave.curves.trace import Settings, Trace
-from suboctave.curves.track_approach import points_before
-from suboctave.curves.track_corners import beyond_corner
-from suboctave.curves.track_ends import End, comes_close, end_ahead, end_between, is_lopsided, rebased
-from suboctave.curves.track_start import Box
-from suboctave.curves.tracked_events import Found, events_between, extreme_of, refined
-from suboctave.curves.tracked_hidden import HiddenPairs
-from suboctave.curves.tracked_located import as_event
-from suboctave.curves.tracked_pairs import PairWatch
-from suboctave.curves.tracked_tests import CurveTest, Extremum, PairCrossing, tests_of
+from suboctave.curves.tracked.corners import beyond_corner
+from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
+from suboctave.curves.tracked.events import Found, as_event, events_between, extreme_of, refined
+from suboctave.curves.tracked.hidden import HiddenPairs, PairWatch
+from suboctave.curves.tracked.start import Box
+from suboctave.curves.tracked.tests import CurveTest, Extremum, PairCrossing, tests_of
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
