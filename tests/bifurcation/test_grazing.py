@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import suboctave as so
-from suboctave.bifurcation import KINDS
 from suboctave.bifurcation.gaps import levels
 from suboctave.harmonic import trigonometric
+from suboctave.kinds import KINDS
 from suboctave.timedomain import integrate, shoot
 
 

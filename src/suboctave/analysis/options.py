@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar, cast
 
 import numpy as np
 
-from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.events.formulation import FORMULATIONS, Formulation, formulation_of, written
@@ -21,6 +21,7 @@ from suboctave.errors import InputError, is_number, shortened
 from suboctave.floquet import StabilityMethod, method_of
 from suboctave.floquet.methods import METHODS
 from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.kinds import KINDS
 from suboctave.model.system import System
 from suboctave.options import RunOptions
 

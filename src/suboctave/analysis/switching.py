@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.analysis.options import CurveOptions, Inherited, settings_of
 from suboctave.analysis.run import CurveRun
-from suboctave.bifurcation import KINDS, Bifurcation
+from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation
 from suboctave.continuation import CurvePoint
@@ -30,6 +30,7 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.trace import Settings, Trace
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.perturbation import Kind
+from suboctave.kinds import KINDS
 from suboctave.model.inputs import check_bounds
 from suboctave.model.timed import timed
 from suboctave.options import with_options
@@ -101,7 +102,7 @@ def switch_branch(
     value = bifurcation.parameter(name)
     low, high = sorted(ends)
     if not low <= value <= high:
-        raise InputError(f"the {KINDS[kind]} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+        raise InputError(f"the {KINDS[kind].words} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
     settings = replace(settings_of(orbit.system, known.under(options)), half=kind == "BP" and side is not None)
     nu = orbit.basis.nu * (2 if kind == "PD" else 1)
     run = CurveRun(orbit.system, name, ends, harmonics_of(orbit) if harmonics is None else harmonics, settings)
@@ -234,8 +235,8 @@ def _away(
     close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
     if close is None:
         raise ConvergenceError(
-            f"no point of the other branch was found beside the {KINDS[item.kind]} at {curve.where(u)}: its direction "
-            "may be too close to that of the first branch, or too few harmonics are kept"
+            f"no point of the other branch was found beside the {KINDS[item.kind].words} at {curve.where(u)}: its "
+            "direction may be too close to that of the first branch, or too few harmonics are kept"
         )
     point = close.point
     adapted = curve.adapted(point.u, point.evaluation)

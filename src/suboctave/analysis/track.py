@@ -10,7 +10,7 @@ from typing import Any, Unpack
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
 from suboctave.analysis.track_onto import aside, curve_onto, start_onto
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.tracked import CURVES_THROUGH, TRACKED_KINDS, TrackedEvent
+from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
 from suboctave.continuation import CurvePoint, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
@@ -24,6 +24,7 @@ from suboctave.errors import InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.kinds import TRACKED_KINDS
 from suboctave.model.inputs import check_bounds, check_parameter, check_range
 from suboctave.model.timed import timed
 from suboctave.options import with_options

@@ -15,35 +15,23 @@ from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.floquet import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.kinds import KINDS
 from suboctave.lazy import lazy
 
-#: what the kinds mean
-KINDS = {
-    "LP": "limit point",
-    "BP": "branch point",
-    "PD": "period doubling",
-    "NS": "Neimark-Sacker",
-    "grazing": "grazing contact",
-    "extremum": "extremum of a parameter along a curve of bifurcations",
-    "CP": "cusp",
-    "GPD": "generalised period doubling",
-    "R1": "1:1 resonance",
-    "R2": "1:2 resonance",
-    "R3": "1:3 resonance",
-    "R4": "1:4 resonance",
-    "LPPD": "fold-flip",
-    "LPNS": "fold-Neimark-Sacker",
-    "PDNS": "flip-Neimark-Sacker",
-    "NSNS": "double Neimark-Sacker",
-    "isola_centre": "a closed branch shrinks to a point",
-    "isola_merging": "a closed branch meets another branch",
-}
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)
 
 
 #: way along a curve, in scaled arclength, that its smallest steps resolve
 _RESOLVED = 1e-7
+
+
+def target_multiplier(kind: str, angle: float) -> complex | None:
+    """The multiplier that motions of a kind have on the unit circle, None if they need none; angle: that of an NS."""
+    row = KINDS.get(kind)
+    if row is None or not row.critical:
+        return None
+    return cmath.exp(1j * angle) if row.multiplier is None else complex(row.multiplier)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,10 +177,8 @@ class Bifurcation:
         if self.kind == "NS" and self.kappa == 0.0:  # only bracketed: the complex pair nearest to the circle
             pairs = mu[mu.imag > 0.0]
             return complex(min(pairs if pairs.size else mu, key=lambda m: abs(abs(m) - 1.0)))
-        targets = {"LP": 1.0, "BP": 1.0, "PD": -1.0, "NS": cmath.exp(1j * self.kappa * self.orbit.period)}
-        if self.kind not in targets:
-            return complex(mu[0])
-        return complex(min(mu, key=lambda m: abs(m - targets[self.kind])))
+        target = target_multiplier(self.kind, self.kappa * self.orbit.period)
+        return complex(mu[0] if target is None else min(mu, key=lambda m: abs(m - target)))
 
     def remark(self) -> str:
         """What a table says beside the numbers: the contact that grazes, and what is not resolved."""

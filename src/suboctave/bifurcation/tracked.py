@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import cmath
 from dataclasses import dataclass
 
-from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation, target_multiplier
 
-#: kinds of bifurcation that can be followed in two parameters
-TRACKED_KINDS = ("LP", "BP", "PD", "NS", "grazing")
 #: kinds of the curves that pass through points of codimension two, or begin there
 CURVES_THROUGH = {
     "GPD": ("PD", "LP"),
@@ -67,11 +64,9 @@ class TrackedEvent(Bifurcation):
 
     def critical_multiplier(self) -> complex:
         """The multiplier on the unit circle that the curve's bifurcations have."""
-        targets = {"LP": 1.0, "BP": 1.0, "PD": -1.0, "NS": cmath.exp(1j * self.kappa * self.orbit.period)}
-        target = _AT_ENDS.get(self.kind, targets.get(self.curve))
-        if target is None:
-            return complex(self.multipliers[0])
-        return complex(min(self.multipliers, key=lambda m: abs(m - target)))
+        mu, target = self.multipliers, target_multiplier(self.curve, self.kappa * self.orbit.period)
+        target = _AT_ENDS.get(self.kind, target)
+        return complex(mu[0] if target is None else min(mu, key=lambda m: abs(m - target)))
 
     def remark(self) -> str:
         """What a table says beside the numbers."""
@@ -87,4 +82,4 @@ class TrackedEvent(Bifurcation):
         return "; ".join(words)
 
 
-__all__ = ["CURVES_THROUGH", "TRACKED_KINDS", "TrackedEvent"]
+__all__ = ["CURVES_THROUGH", "TrackedEvent"]

@@ -23,6 +23,7 @@ from suboctave.floquet import FloquetResult, StabilityMethod
 from suboctave.floquet.result import written
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.interruption import Interruption
+from suboctave.kinds import KINDS
 
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
@@ -142,11 +143,12 @@ def _open(result: FloquetResult) -> np.ndarray:
 def _others_open(item: Bifurcation) -> np.ndarray:
     """The same without those that make the bifurcation."""
     within = _open(item.floquet)
-    if item.kind in _CRITICAL:
+    count = KINDS[item.kind].critical if item.kind in KINDS else 0
+    if count:
         mu = item.multipliers
         critical = item.critical_multiplier()
         distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
-        within[np.argsort(distance, kind="stable")[: _CRITICAL[item.kind]]] = False
+        within[np.argsort(distance, kind="stable")[:count]] = False
     return within
 
 
@@ -162,10 +164,6 @@ def _doubt_beside(item: Bifurcation) -> str | None:
         f"at the {item.kind} at {where} another multiplier, {written(mu, error)}, lies within its error of the unit "
         "circle: which motions beside it are stable is open"
     )
-
-
-#: multipliers on the unit circle that make a bifurcation
-_CRITICAL = {"LP": 1, "BP": 1, "PD": 1, "NS": 2}
 
 
 def _unexpected(

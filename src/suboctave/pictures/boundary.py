@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.errors import InputError, suggest
+from suboctave.kinds import KINDS
 from suboctave.pictures import style
 from suboctave.pictures.drawing import (
     Axis,
@@ -71,8 +72,6 @@ SMALL = 0.55
 _NAMED = 4
 #: share of the axes beyond what is drawn
 _MARGIN = 0.06
-_COLOURS = {"NS": "#009E73", "BP": "#CC79A7", "grazing": style.SOFT}
-_WIDTHS = {"PD": 1.35, "grazing": 0.8}
 #: share of white in the colours of those of kinds with a colour of their own, for motions of several periods
 _STAGE = 0.4
 #: of the second and third curve of one kind and period: share of white, width
@@ -218,15 +217,13 @@ def boundary_styles(group: Sequence[xarray.Dataset], names: Sequence[str]) -> li
             alike.append(name)
         place = alike.index(name)
         white, width = _APART[place % len(_APART)]
-        pens.append(
-            Pen(tinted(_colour(kind, nu), white), width * _WIDTHS.get(kind, 1.0), style.curve_style(place).dash)
-        )
+        pens.append(Pen(tinted(_colour(kind, nu), white), width * KINDS[kind].width, style.curve_style(place).dash))
     return pens
 
 
 def _colour(kind: str, nu: int) -> str:
-    if kind in _COLOURS:
-        return tinted(_COLOURS[kind], 0.0 if nu == 1 else _STAGE)
+    if KINDS[kind].line:
+        return tinted(KINDS[kind].line, 0.0 if nu == 1 else _STAGE)
     return period_colour(2 * nu if kind == "PD" else nu)
 
 

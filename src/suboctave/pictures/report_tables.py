@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.kinds import KINDS
 from suboctave.pictures import style
 from suboctave.pictures.boundary import is_boundary, kind_of, plane_of
 from suboctave.pictures.isolas import parameter_of
@@ -131,14 +132,12 @@ def _critical_multipliers(dataset: xarray.Dataset) -> np.ndarray:
     """
     mu, kind = dataset["multipliers"].to_numpy(), kind_of(dataset)
     critical = np.zeros(mu.shape, dtype=bool)
-    target = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(kind)
-    if target is None and kind != "NS":
-        return critical
+    target, count = KINDS[kind].multiplier, KINDS[kind].critical
     # a pair that becomes real in a resonance is at the circle still
     distance = np.abs(np.abs(mu) - 1.0) if target is None else np.abs(mu - target)
     distance = np.where(np.isnan(distance), np.inf, distance)
     rows = np.arange(len(mu))
-    for place in np.argsort(distance, axis=1, kind="stable")[:, : 2 if kind == "NS" else 1].T:
+    for place in np.argsort(distance, axis=1, kind="stable")[:, :count].T:
         critical[rows, place] = True
     return critical
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from suboctave.errors import InputError, suggest
+from suboctave.kinds import KINDS as ROWS
 
 if TYPE_CHECKING:
     import xarray
@@ -202,24 +203,7 @@ class KindStyle:
 
 
 KINDS = {
-    "LP": KindStyle("limit point", "o", "#ffffff"),
-    "PD": KindStyle("period doubling", "v", "#D55E00", MARKER_SIZE * 1.12),
-    "NS": KindStyle("Neimark–Sacker", "s", "#009E73", MARKER_SIZE * 0.92),
-    "BP": KindStyle("branch point", "D", "#F0E442", MARKER_SIZE * 0.88),
-    "grazing": KindStyle("grazing contact", "x", INK, MARKER_SIZE * 1.4),
-    "extremum": KindStyle("extremum", "d", "#ffffff", MARKER_SIZE * 0.9),
-    "CP": KindStyle("cusp", "P", "#0072B2", MARKER_SIZE * 1.1),
-    "GPD": KindStyle("generalised period doubling", "h", "#E69F00", MARKER_SIZE * 1.12),
-    "R1": KindStyle("1:1 resonance", "<", "#56B4E9"),
-    "R2": KindStyle("1:2 resonance", ">", "#56B4E9"),
-    "R3": KindStyle("1:3 resonance", "p", "#56B4E9", MARKER_SIZE * 1.1),
-    "R4": KindStyle("1:4 resonance", "8", "#56B4E9"),
-    "LPPD": KindStyle("fold-flip", "X", "#CC79A7", MARKER_SIZE * 1.05),
-    "LPNS": KindStyle("fold–Neimark–Sacker", (3, 1, 0), "#009E73", MARKER_SIZE * 1.05),
-    "PDNS": KindStyle("flip–Neimark–Sacker", (3, 1, 180), "#D55E00", MARKER_SIZE * 1.05),
-    "NSNS": KindStyle("double Neimark–Sacker", (4, 1, 45), "#0072B2", MARKER_SIZE * 1.05),
-    "isola_centre": KindStyle("isola is born", (4, 1, 0), "#F0E442", MARKER_SIZE * 1.6),
-    "isola_merging": KindStyle("isola merges", "^", "#F0E442", MARKER_SIZE * 1.15),
+    name: KindStyle(row.legend or row.words, row.marker, row.fill, MARKER_SIZE * row.size) for name, row in ROWS.items()
 }
 
 

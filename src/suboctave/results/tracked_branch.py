@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -10,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import target_multiplier
 from suboctave.continuation.ending import sentence
 from suboctave.continuation.problem import Array
 from suboctave.curves.points import BranchPoint, TrackedPoint
+from suboctave.kinds import KINDS
 from suboctave.results.branch import Branch
 
 
@@ -91,12 +92,10 @@ class TrackedBranch(Branch):
 
     def _others_inside(self, point: Any) -> bool:
         mu = point.floquet.multipliers
-        target: complex | None = {"LP": 1.0, "BP": 1.0, "PD": -1.0}.get(self.kind)
-        if self.kind == "NS":
-            target = cmath.exp(1j * point.extra * point.orbit.period)
+        target = target_multiplier(self.kind, point.extra * point.orbit.period)
         if target is not None:
             distance = np.minimum(np.abs(mu - target), np.abs(mu - np.conj(target)))
-            mu = np.delete(mu, np.argsort(distance, kind="stable")[: 2 if self.kind == "NS" else 1])
+            mu = np.delete(mu, np.argsort(distance, kind="stable")[: KINDS[self.kind].critical])
         return bool(np.all(np.abs(mu) < 1.0))
 
     @property

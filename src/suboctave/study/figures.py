@@ -12,9 +12,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator
 
-from suboctave.bifurcation import KINDS
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, suggest
+from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isolas
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum

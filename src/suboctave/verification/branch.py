@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
+from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.interruption import Interruption
+from suboctave.kinds import KINDS
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch
@@ -172,7 +173,7 @@ def _confirmed(
             along = distance_from_gap(item, place.shot.state, place.omega)
             words = "The same motion, and it just reaches the gap"
         else:
-            along, words = abs(place.along), f"Shooting finds {KINDS[item.kind]} at omega = {place.omega:.9g}"
+            along, words = abs(place.along), f"Shooting finds {KINDS[item.kind].words} at omega = {place.omega:.9g}"
         if along <= tolerance:
             return verdict(place.omega, max(place.shot.distance, along), True, words)
     try:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, KINDS, Bifurcation
+from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
@@ -16,6 +16,7 @@ from suboctave.curves.points import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import FloquetResult, StabilityMethod, method_of
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.kinds import KINDS
 from suboctave.model.elements.coupled import reads
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 
@@ -113,9 +114,9 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
         return Verification(distance, error, solution.stable, agrees, solution, reason)
 
     if kind is not None:
-        words = f"Shooting finds {KINDS[kind]} at omega = {solution.omega:.9g}"
+        words = f"Shooting finds {KINDS[kind].words} at omega = {solution.omega:.9g}"
         if solution.kind is None:
-            words = f"Shooting sees multipliers cross as at {KINDS[kind]} close to omega = {solution.omega:.9g}"
+            words = f"Shooting sees multipliers cross as at {KINDS[kind].words} close to omega = {solution.omega:.9g}"
         same = distance <= tolerance
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if not distance <= tolerance:

@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from suboctave.analysis.diagram import Keeper
-from suboctave.bifurcation import KINDS
 from suboctave.errors import InputError, suggest
+from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isola, Isolas
 from suboctave.model.system import System
 from suboctave.results.branch import Branch

@@ -16,10 +16,10 @@ from suboctave.analysis.frequency_response import continue_branch, frequency_res
 from suboctave.analysis.options import settings_of
 from suboctave.analysis.switching import check_left, switch_branch
 from suboctave.analysis.track import track
-from suboctave.bifurcation import KINDS
-from suboctave.bifurcation.tracked import CURVES_THROUGH, TRACKED_KINDS
+from suboctave.bifurcation.tracked import CURVES_THROUGH
 from suboctave.continuation import Event
 from suboctave.errors import InputError, is_number, suggest
+from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
 from suboctave.results.branch import Branch

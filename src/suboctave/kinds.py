@@ -1,0 +1,78 @@
+"""The table of kinds: what can be met along a curve of motions, what a curve can consist of, and how both are drawn.
+
+Everything that is the same for every kind but for a word, a number or a colour is asked of this table. A kind whose
+curves can be followed names its equations, a class in `curves.kinds`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["KINDS", "TRACKED_KINDS", "Kind"]
+
+_WHITE, _INK, _GREY = "#ffffff", "#1a1a1a", "#8c8c8c"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One row.
+
+    words, legend
+        Its name in a sentence, and in a legend where that is another one.
+    marker, fill, size
+        How it is marked: a marker of matplotlib, its colour, and its size as a multiple of the usual one.
+    multiplier, critical
+        The multiplier on the unit circle, None where it is any or none; how many are critical.
+    equations
+        Of a kind that can be followed: module in `curves.kinds` and class, "module:Class".
+    line, width
+        Of these, colour of the curve in a plane of two parameters, empty for that of its period; width as a multiple.
+    """
+
+    words: str
+    marker: str | tuple[int, int, int]
+    fill: str
+    size: float = 1.0
+    legend: str = ""
+    multiplier: float | None = None
+    critical: int = 0
+    equations: str = ""
+    line: str = ""
+    width: float = 1.0
+
+
+#: in the order of legends
+KINDS: dict[str, Kind] = {
+    "LP": Kind("limit point", "o", _WHITE, multiplier=1.0, critical=1, equations="singular:SingularOperator"),
+    "PD": Kind(
+        "period doubling", "v", "#D55E00", 1.12, multiplier=-1.0, critical=1, equations="singular:SingularOperator",
+        width=1.35,
+    ),
+    "NS": Kind(
+        "Neimark-Sacker", "s", "#009E73", 0.92, "Neimark–Sacker", critical=2, equations="singular:SingularOperator",
+        line="#009E73",
+    ),
+    "BP": Kind(
+        "branch point", "D", "#F0E442", 0.88, multiplier=1.0, critical=1, equations="branch_point:BranchPointUnfolded",
+        line="#CC79A7",
+    ),
+    "grazing": Kind(
+        "grazing contact", "x", _INK, 1.4, equations="grazing:GrazingContactEquations", line=_GREY, width=0.8
+    ),
+    "extremum": Kind("extremum of a parameter along a curve of bifurcations", "d", _WHITE, 0.9, "extremum"),
+    "CP": Kind("cusp", "P", "#0072B2", 1.1),
+    "GPD": Kind("generalised period doubling", "h", "#E69F00", 1.12),
+    "R1": Kind("1:1 resonance", "<", "#56B4E9"),
+    "R2": Kind("1:2 resonance", ">", "#56B4E9"),
+    "R3": Kind("1:3 resonance", "p", "#56B4E9", 1.1),
+    "R4": Kind("1:4 resonance", "8", "#56B4E9"),
+    "LPPD": Kind("fold-flip", "X", "#CC79A7", 1.05),
+    "LPNS": Kind("fold-Neimark-Sacker", (3, 1, 0), "#009E73", 1.05, "fold–Neimark–Sacker"),
+    "PDNS": Kind("flip-Neimark-Sacker", (3, 1, 180), "#D55E00", 1.05, "flip–Neimark–Sacker"),
+    "NSNS": Kind("double Neimark-Sacker", (4, 1, 45), "#0072B2", 1.05, "double Neimark–Sacker"),
+    "isola_centre": Kind("a closed branch shrinks to a point", (4, 1, 0), "#F0E442", 1.6, "isola is born"),
+    "isola_merging": Kind("a closed branch meets another branch", "^", "#F0E442", 1.15, "isola merges"),
+}  # fmt: skip
+
+#: kinds whose curves can be followed in two parameters
+TRACKED_KINDS = tuple(name for name, kind in KINDS.items() if kind.equations)
