@@ -70,8 +70,6 @@ class StructuralMatrices:
         self.size = system.n
         #: M, C, K, shape (3, n, n)
         self.matrices = np.array(system.matrices(self.values), dtype=float)
-        #: the same of one DOF
-        self.scalars = tuple(float(matrix[0, 0]) for matrix in self.matrices)
 
     def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
         """The same structure at other parameter values."""
