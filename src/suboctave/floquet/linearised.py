@@ -22,14 +22,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 
-from suboctave.floquet.propagate import growth, on_panels, propagate, structure
+from suboctave.floquet.propagate import parts_needed, propagate, structure
 from suboctave.floquet.time_mesh import (
-    ADJOINT,
-    INTEGRATION,
-    LOWER,
     NODES,
     ORDER,
-    WEIGHTS,
     along_panels,
     changed_laws,
     events_along,
@@ -37,12 +33,13 @@ from suboctave.floquet.time_mesh import (
     panels_between,
     split,
 )
-from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.aft.channel import Channel, Group
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import LawAlong
 from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.quadrature import FEWEST, search_grid, singular_instants
 from suboctave.model.elements.base import Element
 from suboctave.model.elements.smoothness import (
@@ -63,7 +60,7 @@ _BLIND, _TANGENT = 48.0, 7.0
 _SLICE = 1e-9
 #: how close to a corner where powers of a half begin panels are graded, in units of the motion
 _ROUGH = 1e-6
-_NONE, _NO_PIECES = np.zeros(0), np.zeros((0, 3))
+_NONE, _NO_PIECES, _NO_PASSAGES = np.zeros(0), np.zeros((0, 3)), np.zeros((2, 0))
 
 
 class Linearised:
@@ -88,65 +85,46 @@ class Linearised:
         self.state = state
         self._given = state.laws.groups
         own = self._own = Channels(state, len(self._given))
-        reading = [group.direction for group in balance.groups] + own.right
-        acting = reading[: len(self._given)] + own.left
-        laws = self._given + own.laws
-        self._laws = PackedLaws.of(laws) if own.laws else state.packed
-        degree, finest = max(own.degree, self._laws.polynomial.shape[1] - 2), own.finest
-        for law in laws:
-            if law.graded or len(law.steps):
-                degree = max(degree, 1)
-            for member in law.uniform:
-                degree = max(degree, law.degree - 1, 1)
-                if _smoothness(member.kind).unknown:
-                    finest = min(finest, _BLIND / (member.samples or FEWEST))
+        self._modes = modes = _in_modes(state.linear, balance.all_groups)
+        self.size = 2 * len(modes.stiffness)
+        self._laws = laws = PackedLaws.of(self._given + own.laws) if own.laws else state.packed
+        self._motions, self._forces, self.active = state.motions, state.force_spectra, modes.active
+        if own.laws:
+            self._motions = np.concatenate((state.motions, own.motions))
+            self._forces = np.concatenate((state.force_spectra[: own.first], own.forces))
+            self.active = np.concatenate((np.arange(own.first), own.numbers))[modes.active]
+        degree = max(own.degree, laws.degree)
         self.varying = degree > 0
-        forces, motions = state.force_spectra[: len(balance.groups)], state.motions
-        if own.motions:
-            forces, motions = np.concatenate((forces, own.forces)), np.concatenate((motions, own.motions))
-        within = -2.0 * forces[:, : state.basis.harmonics + 1]
-        within[:, 0] *= 0.5
-        self._motions, self._within = motions, within
-        longest = min(longest_panel(motions, degree), finest)
+        longest = min(longest_panel(self._motions, degree), own.finest)
+        if laws.unknown_samples:
+            longest = min(longest, _BLIND / laws.unknown_samples)
         grid = search_grid(state.basis.harmonics)
         # singularities further away than the longest panel do not disturb it
-        passages = [
-            singular_instants(motion, points, widths, longest, grid.zr, grid.zi)
-            for law, motion in zip(laws, motions, strict=True)
-            for points, widths in ((law.points, law.widths), law.step_places)
-            if len(points)
+        passed = [
+            singular_instants(self._motions[g], points, widths, longest, grid.zr, grid.zi)
+            for g, points, widths in laws.singularities
         ]
-        passed = np.concatenate(passages, axis=1) if passages else np.zeros((2, 0))
-        self.events = events_along(motions, self._laws.pieces, self._laws.owner, passed, grid)
-        linear = state.linear
-        left, right = (np.array([linear.expand(d) for d in rows], dtype=float) for rows in (acting, reading))
-        self.active = np.flatnonzero(left.any(axis=1)) if len(left) else np.zeros(0, dtype=int)
-        mass, damping, stiffness = (np.asarray(matrix, dtype=float) for matrix in linear.equation_of_motion())
-        self._matrices, rates = _in_modes(
-            mass.tobytes(), damping.tobytes(), stiffness.tobytes(),
-            left[self.active].tobytes(), right[self.active].tobytes(), len(mass), len(self.active),
-        )  # fmt: skip
-        self.size = 2 * len(self._matrices[0])
+        passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
+        self.events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         panels, start = panels_between(self.events, longest)
-        parts = self._evaluated(panels, rates)
-        while len(panels) < parts.sum() <= _MOST:
+        parts, total = self._evaluated(panels)
+        while len(panels) < total <= _MOST:
             panels, start = split(panels, start, parts)
-            parts = self._evaluated(panels, rates)
+            parts, total = self._evaluated(panels)
         self.start = start
-        own.locate(self.events, start, self._laws.owner, len(panels))
-        self._structures = structure(self.spans, INTEGRATION, ADJOINT, *self._matrices)
+        own.locate(self.events, start, laws.owner, len(panels))
+        self._structures = structure(self.spans, *modes.matrices)
 
-    def _evaluated(self, panels: Array, rates: tuple[float, float, Array]) -> np.ndarray:
-        """Evaluate all laws on panels; how many parts each of these needs, (P,). rates: see `_in_modes`."""
-        laws, rate = self._laws, self.state.rate
-        stretch, self.path, self.law, self.base = along_panels(
-            panels, NODES, self._motions, self._within, rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
+    def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
+        """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
+        laws = self._laws
+        self.spans, self.path, self.law, self.base = along_panels(
+            panels, self._motions, self._forces, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
             laws.step_owner, laws.line,
         )  # fmt: skip
-        self.spans = stretch / rate
         #: (group, element, its coefficients, whether sharp, f_u, f_v) of the elements not known in closed form
         self._sampled = []
-        for g, law in enumerate(self._given):
+        for g, law in enumerate(() if self.state.packed.closed_form else self._given):
             for members, sharp in ((law.graded, True), (law.uniform, False)):
                 for _, element, _, a, _ in members:
                     assert isinstance(element, Element)
@@ -157,36 +135,29 @@ class Linearised:
                         self.law[g, 2] += f_v
                     self._sampled.append((g, element, a, sharp, f_u, f_v))
         self._own.evaluate(self.path, self.law)
-        k, c = self._tangent = self._on_panels(self.law[:, 1], self.law[:, 2])
-        parts: np.ndarray = np.ceil(growth(self.spans, WEIGHTS, k, c, *rates) / _LONGEST).astype(int)
-        return parts
+        parts: np.ndarray
+        total: float
+        parts, total = parts_needed(self.spans, self.law, self.base, self.active, *self._modes.rates, _LONGEST)
+        return parts, total
 
-    def _on_panels(self, stiffness: Array, damping: Array) -> tuple[Array, Array]:
-        """Stiffness, with that of the pieces, and damping (G, N) of the active channels on every panel, (A, P, m)."""
-        panels = len(self.spans)
-        k = on_panels(stiffness, self.active, panels) + self.base[self.active][:, :, None]
-        return k, on_panels(damping, self.active, panels)
-
-    def standing(self) -> tuple[Array, Array]:
-        """Along the motion as it stands, by polynomials of lower degree: see `propagate`, with the unbalanced force."""
-        k, c = self._tangent
-        force = on_panels(self.law[:, 0], self.active, len(self.spans))
-        return self._propagated(k @ LOWER, c @ LOWER, force @ LOWER, np.zeros(k.shape[:2]))
+    def standing(self) -> tuple[Array, Array, Array]:
+        """Along the motion as it stands, with the unbalanced force: see `propagate`."""
+        return self._propagated(self.law, np.zeros(self.base.shape), True)
 
     def corrected(self, change: Array) -> Array:
         """Monodromy matrix along the motion changed by (G, 2, N)."""
-        law, kick = self._changed(change)
-        return self._propagated(*self._on_panels(law[:, 0], law[:, 1]), np.zeros((0, 0, 0)), kick[self.active])[0]
+        return self._propagated(*self._changed(change), False)[0]
 
-    def _propagated(self, k: Array, c: Array, force: Array, kick: Array) -> tuple[Array, Array]:
-        kinds, matrices = self._structures
-        left, right = self._matrices[2:]
-        result: tuple[Array, Array] = propagate(kinds, matrices, k, c, force, kick, left, right)
+    def _propagated(self, law: Array, kick: Array, forced: bool) -> tuple[Array, Array, Array]:
+        modes, (kinds, structures) = self._modes, self._structures
+        result: tuple[Array, Array, Array] = propagate(
+            kinds, structures, law, self.base, kick, self.active, modes.left, modes.right, forced
+        )
         return result
 
     def _changed(self, change: Array) -> tuple[Array, Array]:
-        """Along the motion changed by (G, 2, N): stiffness and damping (G, 2, N), kicks at the beginnings of panels
-        (G, P).
+        """Along the motion changed by (G, 2, N): no force, stiffness and damping (G, 3, N), kicks at the beginnings of
+        panels (G, P).
         """
         laws = self._laws
         law: Array
@@ -206,26 +177,50 @@ class Linearised:
                     f_v = f_v + f_uv * d_u + f_vv * d_v
             else:
                 _, f_u, f_v = element.tangent(u + d_u, v + d_v, a)
-            law[g, 0] += f_u
+            law[g, 1] += f_u
             if f_v is not None:
-                law[g, 1] += f_v
+                law[g, 2] += f_v
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
 
-@lru_cache(maxsize=16)
-def _in_modes(
-    mass: bytes, damping: bytes, stiffness: bytes, left: bytes, right: bytes, size: int, channels: int
-) -> tuple[tuple[Array, Array, Array, Array], tuple[float, float, Array]]:
-    """Matrices (size, size) and directions (channels, size) in modes of the linear part normalised by mass: norms have
-    no units, and most products are with diagonal matrices. Where mass or stiffness is not symmetric, or the mass not
-    positive definite, in DOFs weighted by the square roots of their masses.
+class _Modes(NamedTuple):
+    """The linear part in its modes, normalised by mass: norms have no units, and most products are with diagonal
+    matrices. Where mass or stiffness is not symmetric, or the mass not positive definite, in DOFs weighted by the
+    square roots of their masses.
 
-    Returns K, C, left, right, and what bounds the rates of the motion: the norms of K and C, and what a channel's
-    stiffness or damping of one adds to them, (channels,).
+    stiffness, damping
+        K, C, (n, n).
+    left, right
+        Where the active channels act and what they read, (A, n).
+    active
+        Which of all groups' inputs they are, (A,).
+    rates
+        What bounds the rates of the motion: the norms of K and C, and what a channel's stiffness or damping of one adds
+        to them, (A,).
     """
-    m, c, k = (np.frombuffer(matrix).reshape(size, size) for matrix in (mass, damping, stiffness))
-    l, r = (np.frombuffer(rows).reshape(channels, size) for rows in (left, right))
+
+    stiffness: Array
+    damping: Array
+    left: Array
+    right: Array
+    active: np.ndarray
+    rates: tuple[float, float, Array]
+
+    @property
+    def matrices(self) -> tuple[Array, Array, Array, Array]:
+        """K, C, left, right."""
+        return self.stiffness, self.damping, self.left, self.right
+
+
+@lru_cache(maxsize=16)
+def _in_modes(linear: LinearPart, groups: tuple[Group, ...]) -> _Modes:
+    m, c, k = (np.asarray(matrix, dtype=float) for matrix in linear.equation_of_motion())
+    # in one unknown DOF channels have one direction
+    pairs = [(d if len(d) == 1 else group.direction, d) for group in groups for d in group.inputs]
+    rows = np.array([[linear.expand(d) for d in pair] for pair in pairs], dtype=float).reshape(-1, 2, len(m))
+    active = np.flatnonzero(rows[:, 0].any(axis=1))
+    l, r = rows[active, 0], rows[active, 1]
     modes = None
     if np.array_equal(m, m.T) and np.array_equal(k, k.T):
         try:
@@ -243,7 +238,8 @@ def _in_modes(
         l, r, k, c = l @ inverse.T, r / weight, inverse @ k / weight, inverse @ c / weight
     k, c, l, r = (np.ascontiguousarray(matrix) for matrix in (k, c, l, r))
     shares = np.abs(l).max(axis=1, initial=0.0) * np.abs(r).sum(axis=1)
-    return (k, c, l, r), (float(np.linalg.norm(k, np.inf)), float(np.linalg.norm(c, np.inf)), shares)
+    rates = float(np.linalg.norm(k, np.inf)), float(np.linalg.norm(c, np.inf)), shares
+    return _Modes(k, c, l, r, active, rates)
 
 
 class _Smoothness(NamedTuple):
@@ -278,8 +274,8 @@ class Channels:
     ----------
     motions, forces
         Displacement and Fourier coefficients of the force of every channel, lists of (H + 1,) and (top + 1,).
-    left, right
-        Where a channel acts and what it reads, in the unknown DOFs; zero for those without force.
+    numbers
+        The channel of every input of these elements.
     laws
         What panels follow: see `DirectionLaws`.
     degree, finest
@@ -290,8 +286,7 @@ class Channels:
         self.state, self.first = state, first
         self.motions: list[ComplexArray] = []
         self.forces: list[ComplexArray] = []
-        self.left: list[Array] = []
-        self.right: list[Array] = []
+        self.numbers: list[int] = []
         self.laws: list[DirectionLaws] = []
         self.degree, self.finest = 0, math.inf
         self._elements: list[tuple[GeneralLaw, int, Array]] = []
@@ -300,23 +295,19 @@ class Channels:
         #: by channel
         self._sliced: dict[int, list[tuple[int, int]]] = {}
         self._slices: dict[int, list[tuple[int, int]]] = {}
-        for channel in state.own_channels:
-            self._add(channel.laws[0], channel)
         self._clock = -1
+        for channel in state.own_channels if state.balance.own else ():
+            self._add(channel.laws[0], channel)
         if any(law.harmonic for law, _, _ in self._elements):
             turning = np.zeros(state.basis.harmonics + 1, dtype=complex)
             turning[1] = 1.0
-            self._clock = self._channel(turning, None, None)
+            self._clock = self._channel(turning)
 
     def _channel(
-        self, motion: ComplexArray, left: Array | None, right: Array | None, pieces: Array = _NO_PIECES,
-        singular: tuple[Array, Array] = (_NONE, _NONE),
-    ) -> int:  # fmt: skip
-        size = self.state.balance.size
+        self, motion: ComplexArray, pieces: Array = _NO_PIECES, singular: tuple[Array, Array] = (_NONE, _NONE)
+    ) -> int:
         self.motions.append(motion)
         self.forces.append(np.zeros(self.state.balance.top + 1, dtype=complex))
-        self.left.append(np.zeros(size) if left is None else left)
-        self.right.append(np.zeros(size) if right is None else right)
         self.laws.append(DirectionLaws(pieces, points=singular[0], widths=singular[1]))
         return self.first + len(self.motions) - 1
 
@@ -326,12 +317,11 @@ class Channels:
         scale = np.ones(own.count)
         begin = len(self.motions)
         for i, (d, motion) in enumerate(zip(own.ins, along.motions, strict=True)):
-            left = own.out
             if len(d) == 1:
-                # one unknown DOF: channels have one direction there
-                scale[i], left = own.out[0] / d[0], d
+                # see `_in_modes`
+                scale[i] = own.out[0] / d[0]
             points = law.points if i == 0 else ()
-            self._channel(motion, left, d, _marks(points, motion), _grading(law, points, motion))
+            self.numbers.append(self._channel(motion, _marks(points, motion), _grading(law, points, motion)))
             if i == 0 and law.points:
                 self._sliced.setdefault(self.first + begin, []).append((self.first + begin, 0))
         self.forces[begin] = scale[0] * own.spectra[0]
@@ -339,10 +329,10 @@ class Channels:
         velocity = 1j * along.rate * np.arange(len(along.motions[0])) * along.motions[0]
         if law.velocities and velocity.any():
             marks, grading = _marks(law.velocities, velocity), _grading(law, law.velocities, velocity)
-            probe = self._channel(velocity, None, None, marks, grading)
+            probe = self._channel(velocity, marks, grading)
             self._sliced.setdefault(self.first + begin, []).append((probe, 1))
         if law.sharp[0] and velocity.any():
-            self._channel(velocity, None, None, singular=(np.array(law.sharp[0]), np.array(law.sharp[1])))
+            self._channel(velocity, singular=(np.array(law.sharp[0]), np.array(law.sharp[1])))
         degree = max(1, law.degree - 1)
         self.degree = max(self.degree, degree)
         if law.cornered or law.unknown:
@@ -361,25 +351,25 @@ class Channels:
         return np.ascontiguousarray(q), nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
 
     def evaluate(self, path: Array, law: Array) -> None:
-        """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, 4, N)."""
+        """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, >= 3, N)."""
         self._tangents = []
         for nodal, begin, scale in self._elements:
             q, theta = self._state(nodal, begin, path)
             force, f_q = nodal.law.tangent(q, theta, nodal.c)
             law[begin, 0] += scale[0] * force
             self._tangents.append(f_q)
-            self._put(nodal, begin, scale, f_q, law[:, 1:])
+            self._put(nodal, begin, scale, f_q, law)
 
     def _put(self, nodal: GeneralLaw, begin: int, scale: Array, f_q: Array, law: Array) -> None:
-        """Add a tangent (Q, N) to stiffness and damping (G, >= 2, N)."""
+        """Add a tangent (Q, N) to stiffness and damping in `law` (G, >= 3, N)."""
         count = nodal.count
         for i in range(count):
-            law[begin + i, 0] += scale[i] * f_q[i]
+            law[begin + i, 1] += scale[i] * f_q[i]
             if nodal.along.moving:
-                law[begin + i, 1] += scale[i] * f_q[count + i]
+                law[begin + i, 2] += scale[i] * f_q[count + i]
 
     def changed(self, path: Array, change: Array, law: Array, spans: Array) -> None:
-        """Add stiffness and damping along the path changed by `change` to `law` (G, 2, N).
+        """Add stiffness and damping along the path changed by `change` to `law` (G, 3, N).
 
         Of laws with corners every node keeps its side. For the time by which the motion reaches a corner later the law
         before it stays: an impulse, put into the slice that was cut out there.
@@ -405,7 +395,7 @@ class Channels:
                     later = -change[begin, order, i] / slope
                     length = 2.0 * spans[p, 0]
                     bump = 1.5 * scale[0] * jump * later / length * (1.0 - NODES**2)
-                    law[begin, order, i : i + ORDER] -= bump
+                    law[begin, 1 + order, i : i + ORDER] -= bump
 
     def locate(self, events: Array, start: np.ndarray, owner: np.ndarray, panels: int) -> None:
         """Find the slices around corners: panels between the two marks of one corner.

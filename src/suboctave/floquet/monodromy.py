@@ -28,10 +28,10 @@ import scipy.linalg
 from scipy.linalg import lapack
 
 from suboctave.floquet.linearised import Linearised
-from suboctave.floquet.propagate import response, shifts
+from suboctave.floquet.propagate import multipliers_and_shifts, response
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.evaluation import BalanceState, length
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.interruption import check_time
 
 #: a correction larger than this share of the motion is cut down to it
@@ -109,52 +109,29 @@ class _Motion:
 
     def __init__(self, along: Linearised, corrected: bool) -> None:
         self.along = along
-        total, self._nodes = along.standing()
-        size = along.size
-        self.before = np.ascontiguousarray(total[:, :size])
-        self._start: Array | None = None
-        if corrected and total.shape[1] > size:
-            *_, start, singular = lapack.dgesv(np.eye(size) - self.before, total[:, size])
-            self._start = np.full(size, np.inf) if singular else start
+        self.before, start, self._nodes = along.standing()
+        self._start = start if corrected and len(self._nodes) and len(along.active) else None
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """Multipliers, how far the correction has moved them, and the share of it that was taken.
 
         weight: share of its part along the direction of the real multiplier nearest to +1.
         """
-        along, share = self.along, 1.0
-        change = np.zeros_like(along.path)
-        if self._start is not None:
-            start = self._start
+        along, share, start = self.along, 1.0, self._start
+        if start is None:
+            change = np.zeros_like(along.path)
+        else:
             if weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
-            change = response(start, self._nodes, along.active, len(change))
-            for u, d in zip(along.path, change, strict=True):
-                size, limit = float(np.abs(d[0]).max()), _LARGEST * float(np.abs(u[0]).max())
-                if not size <= limit:
-                    share = min(share, limit / size if size < math.inf else 0.0)
-            if share < 1.0:
-                change = share * change if share > 0.0 else np.zeros_like(change)
+            change, share = response(start, self._nodes, along.active, along.path, _LARGEST)
         after = along.corrected(change)
-        mu, shift = perturbed(after, after - self.before)
+        real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
+        mu, shift = multipliers_and_shifts(real, imaginary, left, right, after, self.before)
         return mu, shift, share
 
     def gap(self) -> float:
         """Distance to +1 of the nearest multiplier of the motion as it stands."""
         return float(np.abs(1.0 - np.linalg.eigvals(self.before)).min())
-
-
-def perturbed(phi: Array, change: Array) -> tuple[ComplexArray, Array]:
-    """Eigenvalues of phi (N, N), by descending modulus, and their first-order shifts by a change and by rounding."""
-    real, imaginary, left, right, _ = lapack.dgeev(phi, 1, 1)
-    mu = real + 1j * imaginary
-    shift = shifts(imaginary, left, right, phi, change, 1e-15)
-    # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
-    norm = length(change) + 1e-15 * length(phi)
-    size = np.abs(mu)
-    shift = np.minimum(shift, math.sqrt(norm * max(1.0, size.max()))) + 1e-14
-    order = np.argsort(-size, kind="stable")
-    return mu[order], shift[order]
 
 
 def projector(phi: Array) -> Array:

@@ -19,9 +19,12 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.floquet.time_mesh import ADJOINT, INTEGRATION, LOWER, ORDER, WEIGHTS
 
 #: sums may be reordered; infinities keep their meaning
 _FAST = {"reassoc", "contract", "nsz"}
+#: relative errors of the entries of a monodromy matrix by rounding
+_ROUNDING = 1e-15
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -56,7 +59,7 @@ def eliminate(a, b):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def structure(spans, integration, adjoint, stiffness, damping, left, right):
+def structure(spans, stiffness, damping, left, right):
     """What the linear part makes of initial states and forces, on panels with dt/ds = spans (P, m).
 
     Returns which kind each panel is, (P,), a panel like the one before being of the same kind, and for each kind the
@@ -71,7 +74,7 @@ def structure(spans, integration, adjoint, stiffness, damping, left, right):
                 kinds[p] = kinds[p - 1] + 1
                 break
     groups, n = left.shape
-    m = integration.shape[0]
+    m = ORDER
     size, forces = 2 * n, groups * m
     columns = size + forces
     out = np.zeros((kinds[-1] + 1, 2 * forces + size, columns))
@@ -79,8 +82,8 @@ def structure(spans, integration, adjoint, stiffness, damping, left, right):
         d = kinds[p]
         if p > 0 and d == kinds[p - 1]:
             continue
-        once = integration * spans[p]
-        rate = adjoint * spans[p]
+        once = INTEGRATION * spans[p]
+        rate = ADJOINT * spans[p]
         twice = once @ rate
         time = once.sum(axis=1)
         # unknowns are the accelerations, mode by mode
@@ -130,46 +133,62 @@ def _add_product(a, b, out):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def propagate(kinds, structures, k, c, r, kick, left, right):
-    """The state (y, y') after one period, (2 n, cols), and q_g, q_g' at the nodes of all panels, (P, 2 G m, cols).
+def propagate(kinds, structures, law, base, kick, active, left, right, forced):
+    """Along the panels of one period: the monodromy matrix (2 n, 2 n), the state in which the periodic response to the
+    forces begins, (2 n,), and q_g, q_g' at the nodes of all panels, (P, 2 G m, 2 n + 1).
 
-    kinds (P,), structures (D, ., .): see `structure`; k, c (G, P, m): stiffness and damping of the channels at the
-    nodes; r (G, P, m) or (0, 0, 0): their forces; kick (G, P): impulses `-kick left right^T y` at the beginnings of
-    panels. The first 2 n columns begin with the unit vectors; with forces there is one more, which begins at rest and
-    is the only one to feel them. Without forces nothing is kept of the nodes.
+    kinds (P,), structures (D, ., .): see `structure`; law (C, >= 3, N): forces, stiffness and damping of all channels
+    at the nodes of the period; base (C, P): what is added to the stiffness on every panel; kick (C, P): impulses
+    `-kick left right^T y` at the beginnings of panels; active (G,): the channels that act.
+
+    If `forced`, laws are polynomials of lower degree on panels, and the nodes have one column for every initial state
+    and one for the forces; otherwise there are no forces, and the last two results are empty.
     """
-    groups, panels, m = k.shape
+    groups, panels, m = active.shape[0], kinds.shape[0], ORDER
     n = left.shape[1]
     size, forces = 2 * n, groups * m
-    forced = r.shape[0] > 0
     columns = size + 1 if forced else size
     total = np.eye(size, columns)
     nodes = np.empty((panels if forced else 0, 2 * forces, columns))
+    values, lower = np.empty((3, forces)), np.empty((3, forces))
     a = np.empty((forces, forces))
     f = np.empty((forces, columns))
     free = np.empty((2 * forces, columns))
     end = np.empty((size, columns))
     for p in range(panels):
         for g in range(groups):
-            if kick[g, p] != 0.0:
+            channel, at = active[g], p * (m - 1)
+            if kick[channel, p] != 0.0:
                 for j in range(columns):
                     q = 0.0
                     for i in range(n):
                         q += right[g, i] * total[i, j]
                     for i in range(n):
-                        total[n + i, j] -= kick[g, p] * q * left[g, i]
+                        total[n + i, j] -= kick[channel, p] * q * left[g, i]
+            for j in range(m):
+                for part in range(3):
+                    values[part, g * m + j] = law[channel, part, at + j]
+                values[1, g * m + j] += base[channel, p]
+        if forced:
+            lower[:] = 0.0
+            for row in range(forces):
+                g, j = row // m, row % m
+                for i in range(m):
+                    for part in range(3):
+                        lower[part, row] += values[part, g * m + i] * LOWER[i, j]
+            values[:] = lower
+        r, k, c = values
         one = structures[kinds[p]]
         free[:] = 0.0
         _add_product(one[: 2 * forces, :size], total, free)
         for row in range(forces):
-            g, j = row // m, row % m
             for l in range(forces):
-                a[row, l] = -k[g, p, j] * one[row, size + l] - c[g, p, j] * one[forces + row, size + l]
+                a[row, l] = -k[row] * one[row, size + l] - c[row] * one[forces + row, size + l]
             a[row, row] += 1.0
             for l in range(columns):
-                f[row, l] = k[g, p, j] * free[row, l] + c[g, p, j] * free[forces + row, l]
+                f[row, l] = k[row] * free[row, l] + c[row] * free[forces + row, l]
             if forced:
-                f[row, size] += r[g, p, j]
+                f[row, size] += r[row]
         eliminate(a, f)
         if forced:
             _add_product(one[: 2 * forces, size:], f, free)
@@ -178,49 +197,58 @@ def propagate(kinds, structures, k, c, r, kick, left, right):
         _add_product(one[2 * forces :, :size], total, end)
         _add_product(one[2 * forces :, size:], f, end)
         total[:] = end
-    return total, nodes
+    monodromy = np.empty((size, size))
+    start = np.empty((size if forced else 0, 1))
+    closing = np.eye(size)
+    for i in range(size):
+        for j in range(size):
+            monodromy[i, j] = total[i, j]
+            closing[i, j] -= total[i, j]
+        if forced:
+            start[i, 0] = total[i, size]
+    if forced:
+        eliminate(closing, start)
+    return monodromy, start[:, 0], nodes
 
 
 @kernel()
-def on_panels(values, active, panels):
-    """Values (G, N) at the nodes of the period, on every panel, for the active channels: (A, P, m)."""
-    m = (values.shape[1] - 1) // panels + 1
-    out = np.empty((active.shape[0], panels, m))
-    for g in range(active.shape[0]):
-        for p in range(panels):
-            for j in range(m):
-                out[g, p, j] = values[active[g], p * (m - 1) + j]
-    return out
+def parts_needed(spans, law, base, active, stiffness, damping, shares, longest):
+    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), and how many there are then, a float.
 
-
-@kernel()
-def growth(spans, weights, k, c, stiffness, damping, shares):
-    """Length of every panel in units of the fastest time scale, (P,).
-
-    weights: of the quadrature; k, c (G, P, m): of the channels; stiffness, damping: norms of those of the linear part;
-    shares (G,): what k or c of one adds to them.
+    law, base, active: see `propagate`; stiffness, damping: norms of those of the linear part; shares (G,): what k or c
+    of one channel adds to them; longest: length of a part in units of the fastest time scale.
     """
-    out = np.empty(spans.shape[0])
-    for p in range(spans.shape[0]):
+    panels, m = spans.shape
+    parts, total = np.ones(panels, dtype=np.int64), 0.0
+    for p in range(panels):
         a, b, length = stiffness, damping, 0.0
-        for j in range(weights.shape[0]):
-            length += weights[j] * spans[p, j]
-        for g in range(shares.shape[0]):
-            a += shares[g] * np.abs(k[g, p]).max()
-            b += shares[g] * np.abs(c[g, p]).max()
-        out[p] = length * (math.sqrt(a) + b)
-    return out
+        for j in range(m):
+            length += WEIGHTS[j] * spans[p, j]
+        for g in range(active.shape[0]):
+            channel = active[g]
+            k = c = 0.0
+            for j in range(p * (m - 1), p * (m - 1) + m):
+                k = max(k, abs(law[channel, 1, j] + base[channel, p]))
+                c = max(c, abs(law[channel, 2, j]))
+            a += shares[g] * k
+            b += shares[g] * c
+        wanted = math.ceil(length * (math.sqrt(a) + b) / longest)
+        total += wanted
+        # no more than a number of parts: beyond a million nothing is cut
+        parts[p] = int(min(wanted, 1e6)) if wanted >= 1.0 else 1
+    return parts, total
 
 
 @kernel()
-def response(start, nodes, active, channels):
-    """q_g, q_g' at the nodes along all channels, (channels, 2, N), of the response that begins with the state `start`.
+def response(start, nodes, active, path, largest):
+    """q_g, q_g' at the nodes along all channels, (C, 2, N), of the response that begins with the state `start`, and the
+    share of it that is left: none is larger than `largest` times the displacement.
 
-    nodes: see `propagate`; active (G,): its channels among all.
+    nodes: see `propagate`; path (C, 2, N): the motion along all channels; active (G,): those that act.
     """
     panels, rows, columns = nodes.shape
-    m = rows // (2 * max(1, active.shape[0]))
-    out = np.zeros((channels, 2, panels * (m - 1) + 1))
+    m = ORDER
+    out = np.zeros(path.shape)
     for p in range(panels):
         for row in range(rows):
             a = nodes[p, row, columns - 1]
@@ -228,36 +256,55 @@ def response(start, nodes, active, channels):
                 a += nodes[p, row, i] * start[i]
             part, g = row // (m * active.shape[0]), row // m % active.shape[0]
             out[active[g], part, p * (m - 1) + row % m] = a
-    return out
+    share = 1.0
+    for g in range(path.shape[0]):
+        size, limit = np.abs(out[g, 0]).max(), largest * np.abs(path[g, 0]).max()
+        if not size <= limit:
+            share = min(share, limit / size if size < np.inf else 0.0)
+    if share == 0.0:
+        out[:] = 0.0
+    elif share < 1.0:
+        out *= share
+    return out, share
 
 
 @kernel()
-def shifts(imaginary, left, right, phi, change, rounding):
-    """First-order shifts of eigenvalues of phi (N, N) by a change, and by relative rounding errors of its entries.
+def multipliers_and_shifts(real, imaginary, left, right, phi, before):
+    """Eigenvalues of phi (N, N) by descending modulus, and how far each may have moved from those of `before`, and by
+    rounding of the entries; both (N,).
 
-    imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
+    real, imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
     """
     size = phi.shape[0]
-    out = np.empty(size)
-    for first in range(size):
-        j = first
+    mu, moved = np.empty(size, dtype=np.complex128), np.empty(size)
+    change, norm, largest = 0.0, 0.0, 1.0
+    for i in range(size):
+        mu[i] = complex(real[i], imaginary[i])
+        largest = max(largest, abs(mu[i]))
+        for j in range(size):
+            change += (phi[i, j] - before[i, j]) ** 2
+            norm += phi[i, j] ** 2
+    # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
+    most = math.sqrt((math.sqrt(change) + _ROUNDING * math.sqrt(norm)) * largest)
+    for j in range(size):
         if imaginary[j] < 0.0:
-            out[j] = out[j - 1]
+            moved[j] = moved[j - 1]
             continue
         more = j + 1 if imaginary[j] > 0.0 else j
         u = left[:, j] + (0.0 if more == j else 1.0j) * left[:, more]
         v = right[:, j] + (0.0 if more == j else 1.0j) * right[:, more]
-        by_change = 0.0j
+        by_change = scale = 0.0j
         by_rounding = 0.0
-        scale = 0.0j
         for i in range(size):
             changed = 0.0j
             rounded = 0.0
             for q in range(size):
-                changed += change[i, q] * v[q]
+                changed += (phi[i, q] - before[i, q]) * v[q]
                 rounded += abs(phi[i, q]) * abs(v[q])
             scale += u[i].conjugate() * v[i]
             by_change += u[i].conjugate() * changed
             by_rounding += abs(u[i]) * rounded
-        out[j] = (abs(by_change) + rounding * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
-    return out
+        first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
+        moved[j] = min(first, most) + 1e-14
+    order = np.argsort(-np.abs(mu), kind="mergesort")
+    return mu[order], moved[order]

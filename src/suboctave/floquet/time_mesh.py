@@ -14,9 +14,9 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.harmonic.aft.polynomial import add_values
 from suboctave.harmonic.aft.steps import add_step
-from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import Nodes
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.trigonometric import crossings_of, displacement, jet, motion, slope
 
 #: nodes per panel, both ends among them: quadrature of order 12
@@ -67,29 +67,19 @@ ADJOINT = WEIGHTS * (1.0 - INTEGRATION.T / WEIGHTS[:, None])
 LOWER = _lower()
 
 
-def events_along(c: ComplexArray, pieces: Array, owner: np.ndarray, passages: Array, grid: Nodes) -> Array:
+@kernel()
+def events_along(c, pieces, owner, passages, zr, zi):
     """What happens along a motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
 
     A crossing of the gap of a piece has infinite depth; an extremum that falls short of it has the distance `miss`. A
     passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece.
 
     c (G, H + 1): the motion along all directions; pieces (Q, 3), owner (Q,): stiffness, gap, side of each, and its
-    direction; passages (2, K): instants and depths; grid: a uniform one.
+    direction; passages (2, K): instants and depths; zr, zi: a uniform grid on the circle.
     """
-    rows = contacts(c, pieces, owner, grid.zr, grid.zi) if len(pieces) else np.zeros((0, 6))
-    if passages.shape[1]:
-        more = np.zeros((passages.shape[1], 6))
-        more[:, :2], more[:, 5] = passages.T, -1.0
-        rows = np.concatenate((rows, more))
-    return rows[np.argsort(rows[:, 0], kind="stable")] if len(rows) > 1 else rows
-
-
-@kernel()
-def contacts(c, pieces, owner, zr, zi):
-    """The crossings of gaps, and the extrema that miss them: see `events_along`."""
     n = zr.shape[0]
     h = 2.0 * math.pi / n
-    rows = np.empty((3 * n * pieces.shape[0], 6))
+    rows = np.empty((3 * n * pieces.shape[0] + passages.shape[1], 6))
     count = 0
     last = -1
     size = 0.0
@@ -126,7 +116,10 @@ def contacts(c, pieces, owner, zr, zi):
             if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
                 rows[count] = np.array((tau, np.inf, 0.0, s, x - gap, float(q)))
                 count += 1
-    return rows[:count].copy()
+    for i in range(passages.shape[1]):
+        rows[count] = np.array((passages[0, i], passages[1, i], 0.0, 0.0, 0.0, -1.0))
+        count += 1
+    return rows[np.argsort(rows[:count, 0], kind="mergesort")]
 
 
 @kernel()
@@ -225,15 +218,15 @@ def longest_panel(c, degree):
 
 
 @kernel()
-def along_panels(panels, nodes, c, within, rate, pieces, owner, polynomial, steps, step_owner, line):
+def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step_owner, line):
     """Motion and laws at the nodes of panels; node j of panel p is node `p (m - 1) + j` of the period, N in all.
 
-    panels: see `panels_between`; c, within (G, H + 1): displacement along the directions, and minus the force within
-    the basis, as real parts of series in exp(i tau); pieces, owner: see `events_along`; polynomial (G, D);
-    steps (S, 3), step_owner (S,), line (G, 2): of arctan steps gap, width, stiffness, direction, and constant and
-    slope of the laws that they belong to. Returns
+    panels: see `panels_between`; c (G, H + 1), forces (G, top + 1): displacement along the directions, and Fourier
+    coefficients of the force there; pieces, owner: see `events_along`; polynomial (G, D); steps (S, 3),
+    step_owner (S,), line (G, 2): of arctan steps gap, width, stiffness, direction, and constant and slope of the laws
+    that they belong to. Returns
 
-    - dtau/ds on every panel, s in [-1, 1], (P, m)
+    - dt/ds on every panel, s in [-1, 1], (P, m)
     - u, du/dt at the nodes, (G, 2, N)
     - force beyond the basis, stiffness, damping at the nodes, and the part of the stiffness due to steps, (G, 4, N);
       the stiffness without that of the pieces
@@ -241,31 +234,34 @@ def along_panels(panels, nodes, c, within, rate, pieces, owner, polynomial, step
     """
     groups = c.shape[0]
     count = panels.shape[0]
-    m = nodes.shape[0]
+    m = ORDER
     total = count * (m - 1) + 1
     cos = np.empty(total)
     sin = np.empty(total)
-    stretch = np.empty((count, m))
+    spans = np.empty((count, m))
     for p in range(count):
         half = 0.5 * (panels[p, 1] - panels[p, 0])
         depth = panels[p, 3]
         for j in range(m):
-            tau = 0.5 * (panels[p, 0] + panels[p, 1]) + half * nodes[j]
-            stretch[p, j] = half
+            tau = 0.5 * (panels[p, 0] + panels[p, 1]) + half * NODES[j]
+            spans[p, j] = half / rate
             if depth > 0.0:
                 e = math.exp(tau)
                 tau = panels[p, 2] + 0.5 * depth * (e - 1.0 / e)
-                stretch[p, j] = 0.5 * depth * (e + 1.0 / e) * half
+                spans[p, j] = 0.5 * depth * (e + 1.0 / e) * half / rate
             cos[p * (m - 1) + j] = math.cos(tau)
             sin[p * (m - 1) + j] = math.sin(tau)
     path = np.empty((groups, 2, total))
     law = np.zeros((groups, 4, total))
     base = np.zeros((groups, count))
+    within = np.empty(c.shape[1], dtype=np.complex128)
     for g in range(groups):
+        for k in range(c.shape[1]):
+            within[k] = (-2.0 if k > 0 else -1.0) * forces[g, k]
         displacement(c[g], cos, sin, path[g, 0])
         displacement(slope(c[g], rate), cos, sin, path[g, 1])
-        displacement(within[g], cos, sin, law[g, 0])
-        add_polynomial(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
+        displacement(within, cos, sin, law[g, 0])
+        add_values(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
         for j in range(total):
             law[g, 0, j] += line[g, 0] + line[g, 1] * path[g, 0, j]
             law[g, 3, j] = line[g, 1]
@@ -285,49 +281,33 @@ def along_panels(panels, nodes, c, within, rate, pieces, owner, polynomial, step
         for j in range(total):
             if (u[j] > gap) == right:
                 law[g, 0, j] += k * (u[j] - gap)
-    return stretch, path, law, base
-
-
-@kernel()
-def add_polynomial(coefficients, u, force, stiffness):
-    """Add `sum c_p u^p` and its derivative to force and stiffness (N,), in place."""
-    degree = coefficients.shape[0] - 1
-    if degree < 0:
-        return
-    for j in range(u.shape[0]):
-        f = slope = 0.0
-        for p in range(degree, -1, -1):
-            slope = slope * u[j] + f
-            f = f * u[j] + coefficients[p]
-        force[j] += f
-        stiffness[j] += slope
+    return spans, path, law, base
 
 
 @kernel()
 def changed_laws(path, law, change, rate, pieces, owner, polynomial, steps, step_owner, events, start, panels):
     """The laws known in closed form along the motion changed by `change` (G, 2, N).
 
-    path, law: see `along_panels`. Returns stiffness and damping at the old nodes (G, 2, N), polynomials as they are
-    there, steps to first order (panels are graded towards the old passages; where the change exceeds a step's width,
-    the new ones lie between the nodes, and the linear form has the right integral all the same), and the impulses
-    `-kick y` at the beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing moves by
-    `t = -d / u'` (a root of the parabola where the motion grazes), and a slice of stiffness k that is as thin is an
-    impulse k t.
+    path, law: see `along_panels`. Returns no force, stiffness, damping at the old nodes (G, 3, N), polynomials as they
+    are there, steps to first order (panels are graded towards the old passages; where the change exceeds a step's
+    width, the new ones lie between the nodes, and the linear form has the right integral all the same), and the
+    impulses `-kick y` at the beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing
+    moves by `t = -d / u'` (a root of the parabola where the motion grazes), and a slice of stiffness k that is as thin
+    is an impulse k t.
     """
     groups, _, total = path.shape
-    out = np.zeros((groups, 2, total))
+    out = np.zeros((groups, 3, total))
     kick = np.zeros((groups, panels))
-    idle = np.zeros(total)
     for g in range(groups):
         for j in range(total):
-            out[g, 0, j] = law[g, 3, j]
-        add_polynomial(polynomial[g], path[g, 0] + change[g, 0], idle, out[g, 0])
+            out[g, 1, j] = law[g, 3, j]
+        add_values(polynomial[g], path[g, 0] + change[g, 0], out[g, 0], out[g, 1])
     for s in range(steps.shape[0]):
         g = step_owner[s]
         point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
         for j in range(total):
             ratio = (path[g, 0, j] - point) / width
-            out[g, 0, j] += k / (width * (1.0 + ratio * ratio)) * change[g, 0, j]
+            out[g, 1, j] += k / (width * (1.0 + ratio * ratio)) * change[g, 0, j]
     m = (total - 1) // panels
     for i in range(events.shape[0]):
         q = int(events[i, 5])

@@ -64,6 +64,7 @@ class Equations:
         #: elements that share the displacement along one direction, and those with channels of their own
         self.groups = self._grouped()
         self.own = [self._own_channel(i, e) for i, e in enumerate(system.elements) if e.own_nodes]
+        self.all_groups = (*self.groups, *self.own)
         #: whether any force depends on velocity
         self.any_moving = any(group.moving for group in self.groups)
         self._load_shapes = [self.linear.retain(c.direction) for c in system.load_components()]
@@ -109,7 +110,7 @@ class Equations:
     @lazy
     def directions(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Where forces act, packed channel by channel: where each begins, its DOFs, its entries there."""
-        packed = [group.outgoing for group in [*self.groups, *self.own]]
+        packed = [group.outgoing for group in self.all_groups]
         return (
             np.cumsum([0] + [len(dofs) for dofs, _ in packed]),
             np.concatenate([np.zeros(0, dtype=np.int64)] + [dofs for dofs, _ in packed]),

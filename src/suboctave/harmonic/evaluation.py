@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.aft.channel import Channel, Group
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, LocalMotion
 from suboctave.harmonic.aft.sampled import settled_samples
@@ -130,13 +130,25 @@ class BalanceState:
         return motions
 
     @lazy
+    def _exact(self) -> ComplexArray:
+        """Spectra of force, stiffness and damping along all groups and of the force of all other elements, (3, C,
+        top + 1), so far with directions that have pieces and polynomials alone.
+        """
+        table = np.zeros((3, len(self.balance.all_groups), self.balance.top + 1), dtype=complex)
+        if not self.packed.add_spectra(self.motions, table):
+            for c, group in enumerate(self.balance.groups):
+                self._require_finite(table[:2, c], group)
+        return table
+
+    @lazy
     def channels(self) -> list[Channel]:
         """All elements along the motion: the groups of one displacement, then those with channels of their own."""
         balance, nu, top = self.balance, self.basis.nu, self.balance.top
+        table, exact = self._exact, self.packed.exact.tolist()
         channels = []
-        for group, laws, motion in zip(balance.groups, self.laws.groups, self.motions, strict=True):
-            along = Along(motion[None], self.rate, nu, group.moving, top)
-            channels.append(Channel(group, along, laws.along(along)))
+        for g, (group, laws) in enumerate(zip(balance.groups, self.laws.groups, strict=True)):
+            along = Along(self.motions[g : g + 1], self.rate, nu, group.moving, top)
+            channels.append(Channel(group, along, laws.along(along), table[: 1 + along.size, g] if exact[g] else None))
         for group in balance.own:
             motions = np.ascontiguousarray((to_complex(self.x) @ group.inputs.T).T)
             along = Along(motions, self.rate, nu, group.moving, top)
@@ -147,7 +159,7 @@ class BalanceState:
     @property
     def own_channels(self) -> list[Channel]:
         """The channels of elements with several inputs, corners, or time."""
-        return self.channels[len(self.balance.groups) :]
+        return self.channels[len(self.balance.groups) :] if self.balance.own else []
 
     def local(self, index: int) -> LocalMotion:
         """One of the system's elements on the motion."""
@@ -156,19 +168,29 @@ class BalanceState:
         return LocalMotion(member.element, member.kind, member.coefficients, channel.along.motions)
 
     @lazy
-    def force_spectra(self) -> ComplexArray:
-        """Fourier coefficients 0 .. top of the force along every channel, (C, top + 1)."""
-        table = np.empty((len(self.channels), self.balance.top + 1), dtype=complex)
+    def _spectra(self) -> ComplexArray:
+        """`_exact` with all elements."""
+        table, packed = self._exact, self.packed
+        if packed.exact.all() and not self.balance.own:
+            return table
         for c, channel in enumerate(self.channels):
-            spectra = channel.spectra
-            # a number that is not finite at any instant is in all coefficients
-            if not cmath.isfinite(spectra[:, 0].sum()):
-                self._refuse(channel)
-            table[c] = spectra[0]
+            if c >= len(packed.exact) or not packed.exact[c]:
+                self._require_finite(channel.spectra, channel.group)
+                rows = 1 if c >= len(packed.exact) else 1 + channel.along.size
+                table[:rows, c] = channel.spectra[:rows]
         return table
 
-    def _refuse(self, channel: Channel) -> None:
-        labels = ", ".join(member.element.label for member, _ in channel.members())
+    @property
+    def force_spectra(self) -> ComplexArray:
+        """Fourier coefficients 0 .. top of the force along every channel, (C, top + 1)."""
+        force: ComplexArray = self._spectra[0]
+        return force
+
+    def _require_finite(self, spectra: ComplexArray, group: Group) -> None:
+        # a number that is not finite at any instant is in all coefficients
+        if cmath.isfinite(spectra[:, 0].sum()):
+            return
+        labels = ", ".join(self.laws.members[i].element.label for i in group.members)
         raise ConvergenceError(
             f"{labels} returned a force that is not finite at omega = {self.omega:.6g} "
             f"(largest coefficient of the motion {np.abs(self.x).max():.3g})"
@@ -210,16 +232,20 @@ class BalanceState:
     @lazy
     def force_jacobian(self) -> Array:
         """dF/dX for all harmonics up to H, square, with size (2 H + 1) rows."""
-        return self._tangent(np.zeros((self.x.size, self.x.size)), mean=True)
+        return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks[:0], mean=True)
 
-    def _tangent(self, out: Array, mean: bool) -> Array:
-        """Add the Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis to `out`."""
-        count, n = self.basis.harmonics + 1, self.balance.size
-        for channel in self.channels:
+    def _add_tangent(self, out: Array, blocks: ComplexArray, mean: bool) -> Array:
+        """Add the Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis, and linear blocks
+        (H + 1, size, size) or none, to `out`.
+        """
+        balance = self.balance
+        count, groups = self.basis.harmonics + 1, len(balance.groups)
+        add_operator(out, self._spectra, groups, balance.any_moving, self.rate, mean, *balance.directions, blocks)
+        for channel in self.own_channels:
             for i, incoming in enumerate(channel.group.incoming):
                 stiffness, damping = channel.stiffness(i), channel.damping(i)
                 outgoing = channel.group.outgoing
-                add_galerkin(out, stiffness, damping, self.rate, mean, count, *outgoing, *incoming, n)
+                add_galerkin(out, stiffness, damping, self.rate, mean, count, *outgoing, *incoming, balance.size)
         return out
 
     @lazy
@@ -247,11 +273,11 @@ class BalanceState:
 
     def _operator(self, out: Array, blocks: ComplexArray, compliance: ComplexArray | None, mean: bool) -> Array:
         """Add `A + B dF/dX` to zeros, whose first columns it takes."""
-        self._tangent(out, mean)
-        if compliance is not None:
-            expanded = np.zeros((len(out), len(out)))
-            add_linear(expanded, compliance, mean)
-            out = expanded @ out
+        if compliance is None:
+            return self._add_tangent(out, blocks, mean)
+        expanded = np.zeros((len(out), len(out)))
+        add_linear(expanded, compliance, mean)
+        out = expanded @ self._add_tangent(out, blocks[:0], mean)
         add_linear(out, blocks, mean)
         return out
 
@@ -434,6 +460,23 @@ def balance_residual(x, blocks, force, load, starts, dofs, shape, weight, parts,
             sizes[3] += w * load[r, i] * load[r, i]
     for k in range(4):
         sizes[k] = math.sqrt(sizes[k])
+
+
+@kernel()
+def add_operator(out, spectra, groups, moving, rate, mean, starts, dofs, shape, blocks):
+    """Add the Galerkin matrix of the tangents along the first `groups` directions and linear blocks to a real matrix of
+    the integer (mean) or the half-odd basis.
+
+    spectra (3, C, top + 1): of force, stiffness, damping; moving: whether any has damping; rate: base frequency;
+    starts, dofs, shape: directions, as in `balance_residual`; blocks: (H + 1, n, n), or (0, n, n).
+    """
+    n = blocks.shape[1]
+    count = (out.shape[0] // n + 1) // 2
+    for g in range(groups):
+        at, entries = dofs[starts[g] : starts[g + 1]], shape[starts[g] : starts[g + 1]]
+        damping = spectra[2, g] if moving else spectra[2, g, :0]
+        add_galerkin(out, spectra[1, g], damping, rate, mean, count, at, entries, at, entries, n)
+    add_linear(out, blocks, mean)
 
 
 @kernel()

@@ -60,6 +60,9 @@ class LinearPart(Protocol):
     def expand(self, direction: Array) -> Array:
         """A direction in the unknown DOFs (size,) as one in those of the equation of motion (N,)."""
 
+    def __hash__(self) -> int:
+        """By identity: what depends on the linear part alone is kept with it as the key."""
+
 
 class StructuralMatrices:
     """Stiffness form straight from a system's M, C, K: `A = K - Omega^2 M + i Omega C`."""

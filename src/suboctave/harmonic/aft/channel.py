@@ -58,16 +58,22 @@ class Group:
 
 
 class Channel:
-    """The laws of a group along a motion."""
+    """The laws of a group along a motion.
 
-    def __init__(self, group: Group, along: Along, laws: list[LawAlong]) -> None:
-        self.group, self.along, self.laws = group, along, laws
+    known
+        Fourier coefficients of f and f_q, (1 + Q, top + 1), where they are known.
+    """
+
+    def __init__(self, group: Group, along: Along, laws: list[LawAlong], known: ComplexArray | None = None) -> None:
+        self.group, self.along, self.laws, self._known = group, along, laws, known
         self.out, self.ins = group.direction, group.inputs
         self.count, self.moving = len(group.inputs), along.moving
 
     @lazy
     def spectra(self) -> ComplexArray:
         """Fourier coefficients of f and f_q, (1 + Q, top + 1)."""
+        if self._known is not None:
+            return self._known
         out = np.zeros((1 + self.along.size, self.along.top + 1), dtype=complex)
         for law in self.laws:
             law.add_spectra(out)

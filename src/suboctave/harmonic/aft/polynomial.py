@@ -26,57 +26,62 @@ class Polynomial(Sampled):
         """See `LawAlong.reaching`."""
         return Polynomial(along, members, self.coefficients)
 
-    @property
+    @lazy
     def nodes(self) -> Nodes:
-        """Instants, none of whose harmonics up to degree times H alias onto those up to `top`."""
-        return uniform_nodes(even((len(self.coefficients) - 1) * self.along.high + self.along.top + 1))
+        """See `polynomial_nodes`."""
+        return polynomial_nodes(len(self.coefficients) - 1, self.along.high, self.along.top)
 
     def _path(self) -> tuple[Array, Array, Array, Array, Array]:
         nodes = self.nodes
         u, slope = motion(self.along.motion, nodes.zr, nodes.zi)
         return nodes.zr, nodes.zi, nodes.weights, u, slope
 
-    @lazy
-    def _values(self) -> Array:
-        """The polynomial and its first three derivatives at the nodes, (4, N)."""
-        values: Array = at_nodes(self.along.motion, self.coefficients, self.nodes.zr, self.nodes.zi)
-        return values
+    def _derivative(self, order: int) -> Array:
+        """Weights of the polynomial's derivative of that order at the nodes."""
+        derived = np.polynomial.polynomial.polyder(self.coefficients, order)
+        values: Array = self.nodes.weights * np.polynomial.polynomial.polyval(self.path[3], derived)
+        return self.along.in_displacement(values, order)
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
         nodes = self.nodes
-        add_polynomial(self.along.motion, self.coefficients, nodes.weights, nodes.zr, nodes.zi, out)
+        add_polynomial(self.along.motion, self.coefficients, nodes.weights, nodes.zr, nodes.zi, out[0], out[1])
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
-        nodes = self.nodes
-        return [Second(nodes.zr, nodes.zi, self.along.in_displacement(nodes.weights * self._values[2], 2))]
+        return [Second(self.nodes.zr, self.nodes.zi, self._derivative(2))]
 
     def third(self) -> list[Third]:
         """See `LawAlong.third`."""
-        nodes = self.nodes
-        return [Third(nodes.zr, nodes.zi, self.along.in_displacement(nodes.weights * self._values[3], 3), None)]
+        return [Third(self.nodes.zr, self.nodes.zi, self._derivative(3), None)]
+
+
+def polynomial_nodes(degree: int, high: int, top: int) -> Nodes:
+    """Instants, none of whose harmonics up to `degree` times `high` alias onto those up to `top`."""
+    return uniform_nodes(even(degree * high + top + 1))
 
 
 @kernel(fastmath=FAST)
-def at_nodes(c, coefficients, zr, zi):
-    """A polynomial and its first three derivatives, (4, N), by Horner's rule, of a motion at instants."""
-    out = np.zeros((4, zr.shape[0]))
-    u = np.empty(zr.shape[0])
-    displacement(c, zr, zi, u)
-    for p in range(coefficients.shape[0] - 1, -1, -1):
-        for j in range(u.shape[0]):
-            out[3, j] = out[3, j] * u[j] + 3.0 * out[2, j]
-            out[2, j] = out[2, j] * u[j] + 2.0 * out[1, j]
-            out[1, j] = out[1, j] * u[j] + out[0, j]
-            out[0, j] = out[0, j] * u[j] + coefficients[p]
-    return out
+def add_values(coefficients, u, force, stiffness):
+    """Add a polynomial of the displacement and its derivative, by Horner's rule, to force and stiffness (N,)."""
+    if coefficients.shape[0] == 0:
+        return
+    for j in range(u.shape[0]):
+        f = slope = 0.0
+        for p in range(coefficients.shape[0] - 1, -1, -1):
+            slope = slope * u[j] + f
+            f = f * u[j] + coefficients[p]
+        force[j] += f
+        stiffness[j] += slope
 
 
 @kernel()
-def add_polynomial(c, coefficients, weights, zr, zi, out):
-    """Add the Fourier coefficients of a polynomial and its slope to `out` (>= 2, top + 1); arguments as `at_nodes`."""
-    found = spectra(at_nodes(c, coefficients, zr, zi)[:2], weights, zr, zi, out.shape[1] - 1)
-    for q in range(out.shape[1]):
-        out[0, q] += found[0, q]
-        out[1, q] += found[1, q]
+def add_polynomial(c, coefficients, weights, zr, zi, force, stiffness):
+    """Add the Fourier coefficients of a polynomial of the motion and of its slope to force and stiffness (top + 1,)."""
+    values, u = np.zeros((2, zr.shape[0])), np.empty(zr.shape[0])
+    displacement(c, zr, zi, u)
+    add_values(coefficients, u, values[0], values[1])
+    sums = spectra(values, weights, zr, zi, force.shape[0] - 1)
+    for q in range(force.shape[0]):
+        force[q] += sums[0, q]
+        stiffness[q] += sums[1, q]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import NamedTuple
@@ -9,14 +10,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.aft.law import Along, LawAlong, Member
-from suboctave.harmonic.aft.pieces import Pieces
-from suboctave.harmonic.aft.polynomial import Polynomial
+from suboctave.harmonic.aft.pieces import Pieces, add_pieces
+from suboctave.harmonic.aft.polynomial import Polynomial, add_polynomial, polynomial_nodes
 from suboctave.harmonic.aft.sampled import GradedLaw, UniformLaw
 from suboctave.harmonic.aft.steps import ArctanSteps
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.quadrature import FEWEST, search_grid
 from suboctave.lazy import lazy
-from suboctave.model.elements.smoothness import PiecewiseLinear, PolynomialSampling, SharpSampling, levels
+from suboctave.model.elements.smoothness import (
+    AdaptiveSampling,
+    PiecewiseLinear,
+    PolynomialSampling,
+    SharpSampling,
+    levels,
+)
 
 __all__ = ["DirectionLaws", "PackedLaws"]
 
@@ -118,9 +127,21 @@ class DirectionLaws:
         )
 
     @property
-    def step_places(self) -> tuple[Array, Array]:
-        """Places and widths of the arctan steps, (S,) each."""
-        return self.steps[:, 0].copy(), self.steps[:, 1].copy()
+    def tangent_degree(self) -> int:
+        """Degree of the tangent as a polynomial in the motion, or what counts as such between singularities."""
+        sampled = max(1, self.degree - 1) if self.uniform else 0
+        return max(len(self.polynomial) - 2, 1 if self.graded or len(self.steps) else 0, sampled)
+
+    @property
+    def singularities(self) -> list[tuple[Array, Array]]:
+        """Where laws of displacement are sharp: places and widths."""
+        steps = self.steps[:, 0].copy(), self.steps[:, 1].copy()
+        return [pair for pair in ((self.points, self.widths), steps) if len(pair[0])]
+
+    @property
+    def unknown_samples(self) -> int:
+        """Nodes on a period that laws of unknown smoothness want, 0 without any."""
+        return max([m.samples or FEWEST for m in self.uniform if isinstance(m.kind, AdaptiveSampling)], default=0)
 
     @property
     def in_closed_form(self) -> bool:
@@ -146,25 +167,36 @@ class DirectionLaws:
 class PackedLaws(NamedTuple):
     """The laws of several directions that are known in closed form, as arrays.
 
-    pieces, owner
-        Stiffness, gap, side of pieces (P, 3), direction by direction, and the direction of each, (P,).
+    pieces, owner, first
+        Stiffness, gap, side of pieces (P, 3), direction by direction, the direction of each, (P,), and where each
+        direction's begin, (G + 1,).
     polynomial
         Coefficients of u^0, u^1, ... along every direction (G, D).
-    steps, step_owner, step_first, line
-        Place, width, size of arctan steps (S, 3), their directions (S,), where each direction's begin, (G + 1,);
-        constant and slope of the laws that they belong to, (G, 2).
+    steps, step_owner, line
+        Place, width, size of arctan steps (S, 3), their directions (S,); constant and slope of the laws that they
+        belong to, (G, 2).
     closed_form
         Whether that is all of them.
+    exact
+        Which directions have pieces and polynomials alone, (G,).
+    singularities
+        Direction, places and widths of where laws are sharp.
+    degree, unknown_samples
+        The largest `tangent_degree` and `unknown_samples` of the directions.
     """
 
     pieces: Array
     owner: NDArray[np.int64]
+    first: NDArray[np.int64]
     polynomial: Array
     steps: Array
     step_owner: NDArray[np.int64]
-    step_first: NDArray[np.int64]
     line: Array
     closed_form: bool
+    exact: NDArray[np.bool_]
+    singularities: list[tuple[int, Array, Array]]
+    degree: int
+    unknown_samples: int
 
     @classmethod
     def of(cls, laws: list[DirectionLaws]) -> PackedLaws:
@@ -173,14 +205,48 @@ class PackedLaws(NamedTuple):
         polynomial = np.zeros((len(laws), max((len(law.polynomial) for law in laws), default=0)))
         for g, law in enumerate(laws):
             polynomial[g, : len(law.polynomial)] = law.polynomial
-        counts = [len(law.steps) for law in laws]
+        counts = [len(law.pieces) for law in laws]
         return cls(
             np.concatenate([_NO_ROWS] + [law.pieces for law in laws]),
-            np.repeat(number, [len(law.pieces) for law in laws]),
-            polynomial,
-            np.concatenate([_NO_ROWS] + [law.steps for law in laws]),
             np.repeat(number, counts),
             np.cumsum([0, *counts]),
+            polynomial,
+            np.concatenate([_NO_ROWS] + [law.steps for law in laws]),
+            np.repeat(number, [len(law.steps) for law in laws]),
             np.array([law.line for law in laws]).reshape(-1, 2),
             all(law.in_closed_form for law in laws),
+            np.array([law.in_closed_form and not len(law.steps) for law in laws], dtype=bool),
+            [(g, *pair) for g, law in enumerate(laws) for pair in law.singularities],
+            max([law.tangent_degree for law in laws], default=0),
+            max([law.unknown_samples for law in laws], default=0),
         )
+
+    def add_spectra(self, motions: ComplexArray, table: ComplexArray) -> bool:
+        """Add the Fourier coefficients of force and stiffness along motions (G, H + 1) to `table` (>= 2, >= G,
+        top + 1), of directions that have pieces and polynomials alone; returns whether they are finite.
+        """
+        high = motions.shape[1] - 1
+        grid, nodes = search_grid(high), polynomial_nodes(self.polynomial.shape[1] - 1, high, table.shape[2] - 1)
+        finite: bool = add_exact(
+            motions, self.exact, self.pieces, self.first, self.polynomial, grid.zr, grid.zi, nodes.weights, nodes.zr,
+            nodes.zi, table,
+        )  # fmt: skip
+        return finite
+
+
+@kernel()
+def add_exact(motions, exact, pieces, first, polynomial, grid_r, grid_i, weights, zr, zi, table):
+    """See `PackedLaws.add_spectra`; grid: points on the circle for searches; weights, z: `polynomial_nodes`."""
+    finite = True
+    for g in range(motions.shape[0]):
+        if not exact[g]:
+            continue
+        force, stiffness = table[0, g], table[1, g]
+        if first[g + 1] > first[g]:
+            add_pieces(motions[g], pieces[first[g] : first[g + 1]], grid_r, grid_i, force, stiffness)
+        if polynomial.shape[1] > 0:
+            add_polynomial(motions[g], polynomial[g], weights, zr, zi, force, stiffness)
+        # a number that is not finite at any instant is in all coefficients
+        total = force[0] + stiffness[0]
+        finite = finite and math.isfinite(total.real) and math.isfinite(total.imag)
+    return finite
