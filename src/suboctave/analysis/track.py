@@ -10,7 +10,7 @@ from typing import Any, Unpack
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
 from suboctave.analysis.track_onto import aside, curve_onto, start_onto
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
+from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
@@ -19,7 +19,7 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
-from suboctave.curves.tracked.start import Box, discretisation, is_extremum, kind_of, solved_start
+from suboctave.curves.tracked.start import Box, discretisation, is_extremum, solved_start
 from suboctave.errors import InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance

@@ -82,4 +82,9 @@ class TrackedEvent(Bifurcation):
         return "; ".join(words)
 
 
-__all__ = ["CURVES_THROUGH", "TrackedEvent"]
+def kind_of(item: Bifurcation) -> str:
+    """Kind of the curve that is followed from a located point."""
+    return item.curve if isinstance(item, TrackedEvent) else item.kind
+
+
+__all__ = ["CURVES_THROUGH", "TrackedEvent", "kind_of"]

@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
@@ -71,6 +72,11 @@ class Augmentation(ABC):
     def own(self) -> Augmentation:
         """That of the bifurcation alone, without the equation of an extremum."""
         return self
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[Augmentation, Array]:
+        """That of the curve through a located point, at its motion, and the start of the extra unknowns."""
+        raise TypeError(f"no curve begins with {cls.__name__}")
 
     @abstractmethod
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> Equations:

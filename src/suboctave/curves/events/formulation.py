@@ -15,10 +15,12 @@ from abc import ABC
 from dataclasses import dataclass
 from typing import ClassVar
 
+from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.alcorta import locate_doubling
 from suboctave.curves.events.locate import Guess, Singular, locate_singular
+from suboctave.curves.kinds import equations_of
 from suboctave.curves.kinds.extended import ExtendedOperator, PublishedDoubling
-from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.kinds.singular import OPERATORS, SingularOperator
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.perturbation import Kind
 
@@ -44,6 +46,10 @@ class Formulation(ABC):
     def operator(self, kind: Kind) -> type[SingularOperator]:
         """The equations that single them out."""
         return SingularOperator
+
+    def equations(self, name: str) -> type[Augmentation]:
+        """The equations of curves of a kind, by its name."""
+        return self.operator(OPERATORS[name]) if name in OPERATORS else equations_of(name)
 
     def locate(self, guess: Guess, kind: Kind) -> Singular:
         """Locate one from a guess; raises ConvergenceError."""

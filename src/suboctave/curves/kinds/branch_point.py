@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.curves.augmentation import Augmentation, Equations, gradient_of
 from suboctave.harmonic.basis import Array, HarmonicBasis
@@ -45,6 +46,13 @@ class BranchPointUnfolded(Augmentation):
     def _force(state: BalanceState) -> float:
         """Size of the forces; at rest, where there are none, that of a motion of unit size."""
         return state.force_scale() or state.omega**2
+
+    @classmethod
+    def through(
+        cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]
+    ) -> tuple[BranchPointUnfolded, Array]:
+        """See `Augmentation.through`."""
+        return cls.of(state, names[0]), np.zeros(1)
 
     def renewed(self, state: BalanceState, borders: NullVectors) -> BranchPointUnfolded:
         """The same at another motion, with its null vectors."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.gaps import level_rate, levels
 from suboctave.bifurcation.grazing import basis_rows, read_direction
 from suboctave.curves.augmentation import Augmentation, Equations
@@ -34,6 +35,16 @@ class GrazingContactEquations(Augmentation):
     def of(cls, state: BalanceState, element: int, index: int) -> GrazingContactEquations:
         """With the unit of a motion."""
         return cls(element, index, motion_size(state) / float(np.max(state.balance.scales()[0])) or 1.0)
+
+    @classmethod
+    def through(
+        cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]
+    ) -> tuple[GrazingContactEquations, Array]:
+        """See `Augmentation.through`: of its contact."""
+        assert item.contact is not None
+        places = np.array(levels(state.local(item.contact.element)))
+        index = int(np.argmin(np.abs(places - item.contact.gap)))
+        return cls.of(state, item.contact.element, index), np.array([item.contact.time * state.rate])
 
     name = "grazing"
     extras = 1

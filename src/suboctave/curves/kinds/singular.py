@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
+from suboctave.bifurcation.tracked import kind_of
 from suboctave.curves.augmentation import Augmentation, Equations, gradient_of
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
@@ -21,6 +23,7 @@ from suboctave.harmonic.perturbation import Kind, rate_by_kappa
 from suboctave.lazy import lazy
 
 _NAMES = {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}
+OPERATORS = {name: kind for kind, name in _NAMES.items()}
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,14 @@ class SingularOperator(Augmentation):
         """
         borders = null_vectors(state, kind, kappa) if vectors is None else vectors
         return cls(kind, borders, state.omega**2), np.array([kappa] if kind is Kind.FREE else [])
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[SingularOperator, Array]:
+        """See `Augmentation.through`."""
+        kind, kappa = OPERATORS[kind_of(item)], 0.0
+        if kind is Kind.FREE:
+            kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
+        return cls.started(state, kind, kappa, names=names)
 
     @property
     def name(self) -> str:
@@ -132,4 +143,4 @@ class SingularEquations(Equations):
         return SingularOperator(self.of.kind, self.bordered.vectors, self.state.omega**2)
 
 
-__all__ = ["SingularEquations", "SingularOperator"]
+__all__ = ["OPERATORS", "SingularEquations", "SingularOperator"]

@@ -10,8 +10,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.gaps import levels
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.tracked import TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct, tangent
@@ -19,21 +18,17 @@ from suboctave.continuation.point import make_point
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.discretisation import rule_of
 from suboctave.curves.events.formulation import BORDERED, Formulation
-from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
-from suboctave.curves.kinds.grazing import GrazingContactEquations
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.trace import Settings
 from suboctave.curves.tracked.nearest import null_row
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
-from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 
-_OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
 #: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
 _NEAR = 0.05
 
@@ -63,36 +58,12 @@ def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
     return isinstance(item, TrackedEvent) and bool(item.extreme)
 
 
-def kind_of(item: Bifurcation) -> str:
-    """Kind of the bifurcations that are followed."""
-    return item.curve if isinstance(item, TrackedEvent) else item.kind
-
-
 def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
     """The rule for harmonics, None for a number of them, and the basis that tracking begins with."""
     rule = rule_of(wanted)
     if isinstance(rule, AdaptiveHarmonics):
         return rule, basis
     return None, HarmonicBasis(rule * basis.nu, basis.nu)
-
-
-def _augmentation(
-    item: Bifurcation, state: BalanceState, names: tuple[str, ...], formulation: Formulation
-) -> tuple[Augmentation, np.ndarray]:
-    """What singles the bifurcation out, and the start of its extra unknowns."""
-    if kind_of(item) == "grazing":
-        assert item.contact is not None
-        places = np.array(levels(state.local(item.contact.element)))
-        index = int(np.argmin(np.abs(places - item.contact.gap)))
-        tau = item.contact.time * state.rate
-        return GrazingContactEquations.of(state, item.contact.element, index), np.array([tau])
-    if kind_of(item) == "BP":
-        return BranchPointUnfolded.of(state, names[0]), np.zeros(1)
-    kind = _OPERATORS[kind_of(item)]
-    kappa = 0.0
-    if kind is Kind.FREE:
-        kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
-    return formulation.operator(kind).started(state, kind, kappa, names=names)
 
 
 def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tuple[float, ...]:
@@ -117,7 +88,7 @@ def curve_through(
     x = orbit.basis.resized(orbit.coefficients, balance.basis)
     balance = balance.settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
-    augmentation, extra = _augmentation(item, state, names, formulation)
+    augmentation, extra = formulation.equations(kind_of(item)).through(item, state, names)
     force = state.force_scale()
     curve = MotionProblem(
         balance,
@@ -201,7 +172,6 @@ __all__ = [
     "curve_through",
     "discretisation",
     "is_extremum",
-    "kind_of",
     "solved_start",
     "spans_of",
     "with_extremum",
