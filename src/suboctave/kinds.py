@@ -6,9 +6,10 @@ curves can be followed names its equations, a class in `curves.kinds`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["KINDS", "TRACKED_KINDS", "Kind"]
+__all__ = ["KINDS", "MOTION_KINDS", "TRACKED_KINDS", "Kind"]
 
 _WHITE, _INK, _GREY = "#ffffff", "#1a1a1a", "#8c8c8c"
 
@@ -20,13 +21,18 @@ class Kind:
     words, legend
         Its name in a sentence, and in a legend where that is another one.
     marker, fill, size
-        How it is marked: a marker of matplotlib, its colour, and its size as a multiple of the usual one.
+        How it is marked: a marker of matplotlib (one of `pictures.browser.SYMBOLS`), its colour, and its size as a
+        multiple of the usual one.
     multiplier, critical
         The multiplier on the unit circle, None where it is any or none; how many are critical.
     equations
         Of a kind that can be followed: module in `curves.kinds` and class, "module:Class".
+    choices
+        Of a kind that is located nowhere, whose curves begin at any motion beside them: numbers, with defaults, that
+        choose the curve; None for all others.
     line, width
-        Of these, colour of the curve in a plane of two parameters, empty for that of its period; width as a multiple.
+        Of those that can be followed: colour of the curve in a plane of two parameters, empty for that of its period;
+        width as a multiple of the usual one.
     """
 
     words: str
@@ -37,6 +43,7 @@ class Kind:
     multiplier: float | None = None
     critical: int = 0
     equations: str = ""
+    choices: Mapping[str, float] | None = None
     line: str = ""
     width: float = 1.0
 
@@ -74,5 +81,7 @@ KINDS: dict[str, Kind] = {
     "isola_merging": Kind("a closed branch meets another branch", "^", "#F0E442", 1.15, "isola merges"),
 }  # fmt: skip
 
-#: kinds whose curves can be followed in two parameters
-TRACKED_KINDS = tuple(name for name, kind in KINDS.items() if kind.equations)
+#: kinds that are located, and whose curves can be followed in two parameters
+TRACKED_KINDS = tuple(name for name, kind in KINDS.items() if kind.equations and kind.choices is None)
+#: kinds whose curves begin at any motion beside them
+MOTION_KINDS = tuple(name for name, kind in KINDS.items() if kind.choices is not None)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Unpack
 
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
-from suboctave.analysis.track_onto import aside, curve_onto, start_onto
+from suboctave.analysis.track_onto import aside, begun, curve_onto, start_onto
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint, SteppingOptions
@@ -16,6 +16,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.points import BranchPoint
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
@@ -24,7 +25,7 @@ from suboctave.errors import InputError, is_number
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
-from suboctave.kinds import TRACKED_KINDS
+from suboctave.kinds import MOTION_KINDS, TRACKED_KINDS
 from suboctave.model.inputs import check_bounds, check_parameter, check_range
 from suboctave.model.timed import timed
 from suboctave.options import with_options
@@ -40,12 +41,12 @@ _STEPPING = SteppingOptions(angle=0.15, growth=4.0)
 @with_options(TrackOptions)
 @timed
 def track(
-    bifurcation: Bifurcation,
+    bifurcation: Bifurcation | BranchPoint,
     parameter: str | Sequence[str],
     bounds: Sequence[Any],
     *,
     omega: Range | None = None,
-    onto: str | None = None,
+    onto: str | Mapping[str, Any] | None = None,
     harmonics: int | str | AdaptiveHarmonics | None = None,
     **options: Unpack[TrackOptions],
 ) -> TrackedBranch:
@@ -58,7 +59,8 @@ def track(
     bifurcation
         A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); one of the
         `extrema` of a tracked curve; or one of its points of codimension two through which another curve passes, or
-        from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS).
+        from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS). With `onto` a kind of motions also a user's event
+        or a point of a branch, one of its `points`, beside the curve.
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
@@ -69,6 +71,8 @@ def track(
     onto
         From a point of codimension two: the kind of the curve to follow. Default: that on which it was not found, the
         Neimark-Sacker points that begin in an R1 or R2 of a curve of LP or PD, the LP or PD through that of an NS.
+        From any motion: a kind of motions that is located nowhere, by its name or as a mapping with its `name` and what
+        chooses the curve.
     harmonics
         As in `frequency_response`; default: as the bifurcation was computed.
 
@@ -94,30 +98,33 @@ def track(
     -----
     Minimally augmented systems and pseudo-arclength. A branch point can be followed only where a symmetry forces it.
     """
-    turning = bifurcation.parameter_name if is_extremum(bifurcation) else ""
-    if is_extremum(bifurcation):
-        names, (first, second), between = _third(bifurcation, parameter, bounds, omega)
+    item, through = begun(bifurcation, onto, options.get("observe"))
+    turning = item.parameter_name if is_extremum(item) else ""
+    if is_extremum(item):
+        names, (first, second), between = _third(item, parameter, bounds, omega)
     else:
-        (names, (first, second)), between = _free(bifurcation, parameter, bounds, omega), None
-    kind = curve_onto(bifurcation, onto)
-    settings = _settings(bifurcation, turning, options)
-    wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
+        (names, (first, second)), between = _free(item, parameter, bounds, omega), None
+    kind = curve_onto(item, through)
+    settings = _settings(item, turning, options)
+    wanted, adaptive, basis = _harmonics(item, harmonics)
     assert second is not None
     box = Box(None if first is None else (min(first), max(first)), (min(second), max(second)), between)
     with one_thread(), reporting(options.get("progress"), f"{kind} over {names[-1]}") as report:
         settings = settings.reporting_to(report, box.second, "event")
-        if bifurcation.kind in CURVES_THROUGH:
-            assert isinstance(bifurcation, TrackedEvent)
-            bifurcation = start_onto(bifurcation, kind, names, box, settings.newton)
-            wanted, adaptive, basis = _harmonics(bifurcation, harmonics)
-        balance = HarmonicBalance(bifurcation.orbit.system, basis, linear=own_linear_part(bifurcation.orbit))
-        start = solved_start(bifurcation, balance, adaptive, names, box, settings)
-        if bifurcation.kind in CURVES_THROUGH:
+        if item.kind in CURVES_THROUGH:
+            assert isinstance(item, TrackedEvent)
+            item = start_onto(item, kind, names, box, settings.newton)
+            wanted, adaptive, basis = _harmonics(item, harmonics)
+        balance = HarmonicBalance(item.orbit.system, basis, linear=own_linear_part(item.orbit))
+        start = solved_start(item, balance, adaptive, names, box, settings)
+        if item.kind in CURVES_THROUGH:
             start = aside(start, box, settings.newton)
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     ranges_by_name = ((names[0], first), (names[1], between), (names[-1], second))
     kept = options_of(settings, wanted, {name: given for name, given in ranges_by_name if given is not None})
-    return _branch(bifurcation, names, turning, trace, settings, kept)
+    if kind_of(item) in MOTION_KINDS:
+        kept["onto"] = item.context["onto"]
+    return _branch(item, names, turning, trace, settings, kept)
 
 
 def _settings(item: Bifurcation, turning: str, options: TrackOptions) -> Settings:
@@ -215,7 +222,7 @@ def _free(
         raise InputError(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
         )
-    if item.kind not in (*TRACKED_KINDS, *CURVES_THROUGH):
+    if item.kind not in (*TRACKED_KINDS, *MOTION_KINDS, *CURVES_THROUGH):
         raise InputError(
             f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves, and other curves from "
             f"{', '.join(CURVES_THROUGH)}; this is a {item.kind}"

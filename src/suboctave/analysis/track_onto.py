@@ -17,6 +17,7 @@ branch followed, and its first limit point taken.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -35,14 +36,16 @@ from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.locate import Guess, Singular
 from suboctave.curves.events.monitors import PERIOD_DOUBLING
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.points import BranchPoint
 from suboctave.curves.refine import solved_bifurcation
 from suboctave.curves.tracked.start import Box, curve_through, spans_of
-from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.perturbation import Kind
 from suboctave.interruption import pass_on
+from suboctave.kinds import KINDS, MOTION_KINDS
 
-__all__ = ["aside", "curve_onto", "start_onto"]
+__all__ = ["aside", "begun", "curve_onto", "motion_kind", "start_onto"]
 
 #: distances of kappa from 0 or w0/2, in units of w0, at which Neimark-Sacker points are looked for beside a resonance
 _SHARES = (0.02, 0.01, 0.03, 0.005, 0.0025)
@@ -60,6 +63,46 @@ _STEPS = 24
 _CLEAR = 0.01
 #: range of the first parameter in which the doubled branch is followed, in units of its value
 _AROUND = 0.05
+
+
+def motion_kind(onto: Any) -> tuple[str, dict[str, float]] | None:
+    """The kind of motions that `onto` names, with the numbers that choose among its curves; None where it names none.
+
+    Raises
+    ------
+    InputError
+        For a kind or a number that there is not.
+    """
+    given = dict(onto) if isinstance(onto, Mapping) else {"name": onto}
+    name = given.pop("name", None)
+    choices = KINDS[name].choices if name in MOTION_KINDS else None
+    if choices is None:
+        if isinstance(onto, Mapping):
+            raise InputError(f"onto= has no kind of motions {name!r}{suggest(str(name), MOTION_KINDS)}")
+        return None
+    for key, number in given.items():
+        if key not in choices:
+            raise InputError(f"{name} has no {key!r}{suggest(str(key), choices)}")
+        if not (is_number(number) and number > 0.0):
+            raise InputError(f"{key} of {name} must be a positive number, not {shortened(number)}")
+    return name, {**choices, **given}
+
+
+def begun(start: Any, onto: Any, observe: int | None) -> tuple[Any, str | None]:
+    """What a curve begins at, and the kind that is chosen of those through it: a motion as a point of its own curve."""
+    kind = motion_kind(onto)
+    if kind is None:
+        return start, onto
+    if not isinstance(start, Bifurcation | BranchPoint):
+        raise InputError(
+            f"a curve of {kind[0]} begins at a point of a branch or at a located one, not {type(start).__name__}"
+        )
+    known = start.context or {} if isinstance(start, Bifurcation) else {}
+    orbit = start.orbit
+    dof = next((d for d in (observe, known.get("observe")) if d is not None), orbit.system.observed_dof)
+    context = {**known, "observe": dof, "onto": {"name": kind[0], **kind[1]}}
+    floquet, size = start.floquet, orbit.amplitude(dof)
+    return Bifurcation(kind[0], orbit, floquet, orbit.residual, size, "omega", context=context), None
 
 
 def curve_onto(item: Bifurcation, onto: str | None) -> str:

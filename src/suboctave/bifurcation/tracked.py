@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from suboctave.bifurcation.bifurcation import Bifurcation, target_multiplier
+from suboctave.kinds import TRACKED_KINDS
 
 #: kinds of the curves that pass through points of codimension two, or begin there
 CURVES_THROUGH = {
@@ -27,7 +28,7 @@ class TrackedEvent(Bifurcation):
     Besides what a `Bifurcation` has (`null_vectors` and `kappa` are those of the tracked kind):
 
     curve
-        Kind of the bifurcations that the curve consists of; where one ends in a point of another (R1, R2, GPD) the null
+        Kind of the motions that the curve consists of; where one ends in a point of another (R1, R2, GPD) the null
         vectors are those of the other.
     names
         The two free parameters.
@@ -64,6 +65,8 @@ class TrackedEvent(Bifurcation):
 
     def critical_multiplier(self) -> complex:
         """The multiplier on the unit circle that the curve's bifurcations have."""
+        if self.kind in TRACKED_KINDS:
+            return super().critical_multiplier()
         mu, target = self.multipliers, target_multiplier(self.curve, self.kappa * self.orbit.period)
         target = _AT_ENDS.get(self.kind, target)
         return complex(mu[0] if target is None else min(mu, key=lambda m: abs(m - target)))
@@ -84,7 +87,7 @@ class TrackedEvent(Bifurcation):
 
 def kind_of(item: Bifurcation) -> str:
     """Kind of the curve that is followed from a located point."""
-    return item.curve if isinstance(item, TrackedEvent) else item.kind
+    return item.curve if isinstance(item, TrackedEvent) and item.kind not in TRACKED_KINDS else item.kind
 
 
 __all__ = ["CURVES_THROUGH", "TrackedEvent", "kind_of"]

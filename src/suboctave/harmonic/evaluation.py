@@ -220,7 +220,7 @@ class BalanceState:
     @lazy
     def unbalanced(self) -> Array:
         """S = F - P, shape (2 H + 1, size)."""
-        return self.force - self.balance.load(self.values, self.omega)
+        return self.force - self.load
 
     @lazy
     def residual(self) -> Array:
@@ -314,11 +314,20 @@ class BalanceState:
             result += change if self.compliance is None else apply_blocks(self.compliance, change)
         return result.ravel()
 
+    @property
+    def load(self) -> Array:
+        """Coefficients of the loads, shape (2 H + 1, size)."""
+        return self.balance.load(self.values, self.omega)
+
+    def load_by(self, name: str) -> Array:
+        """The same differentiated by "omega" or a parameter."""
+        return self.balance.loads.value({**self.values, "omega": self.omega}, self.balance.size, (name,))
+
     def unbalanced_by(self, name: str) -> Array | None:
         """S differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""
         load = None
         if name in self.balance.load_names:
-            load = -self.balance.loads.value({**self.values, "omega": self.omega}, self.balance.size, (name,))
+            load = -self.load_by(name)
         force = self._force_by(name)
         if force is None:
             return load
@@ -410,7 +419,7 @@ class BalanceState:
             _, linear, force, load = sizes.tolist()
             return float(linear + force + load)
         weight = self.balance.scales()[1]
-        load = self.balance.load(self.values, self.omega)
+        load = self.load
         return float(sizes[1]) + sum(
             length(apply_blocks(self.compliance, part) * weight) for part in (self.force, load)
         )

@@ -23,7 +23,7 @@ __all__ = ["SYMBOLS", "figure_data", "html_of"]
 SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "o": "circle", "v": "triangle-down", "^": "triangle-up", "<": "triangle-left", ">": "triangle-right",
     "s": "square", "D": "diamond", "d": "diamond-tall", "P": "cross", "x": "x-thin", "X": "x", "*": "star",
-    "p": "pentagon", "h": "hexagon", "8": "octagon",
+    "p": "pentagon", "h": "hexagon", "H": "hexagon2", "8": "octagon",
     (4, 1, 0): "star-diamond", (3, 1, 0): "star-triangle-up", (3, 1, 180): "star-triangle-down",
     (4, 1, 45): "star-square",
 }  # fmt: skip

@@ -15,6 +15,7 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
+from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, Ticks, ordered, plain
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
@@ -150,10 +151,10 @@ def response_frame(
     if labels is not None and len(labels) != len(group):
         raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
     periods = several_periods(group) if by_period is None else by_period
-    names = [plain(name) for name in (labels if labels is not None else _tell_apart(group, periods))]
+    names = [plain(name) for name in (labels if labels is not None else _names(group, periods))]
     several = len(group) > 1
     titles = names if called is None else [plain(name) for name in called]
-    pens = curve_styles(group, names, periods)
+    pens = _pens(group, names, periods)
     # sub-harmonic motions over those that they branch off from
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
     spread = _spread(np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1))
@@ -237,6 +238,32 @@ def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:
     if len(free) > 1:
         raise InputError(f"the curves were followed in different parameters ({', '.join(free)}): choose one with x=")
     return free[0]
+
+
+def _names(group: Sequence[xarray.Dataset], by_period: bool) -> list[str]:
+    """Of response curves what tells them apart, of tracked curves among them their kinds."""
+    tracked, responses = _parted(group)
+    words = dict(zip(tracked, boundary_names([group[i] for i in tracked]), strict=True))
+    if len(responses) == 1 and tracked:
+        words[responses[0]] = "response"
+    else:
+        words |= zip(responses, _tell_apart([group[i] for i in responses], by_period), strict=True)
+    return [words[i] for i in range(len(group))]
+
+
+def _pens(group: Sequence[xarray.Dataset], names: Sequence[str], by_period: bool) -> list[Pen]:
+    """Of response curves by period or in turn, of tracked curves among them those of their kinds."""
+    tracked, responses = _parted(group)
+    pens = dict(zip(tracked, boundary_styles([group[i] for i in tracked], [names[i] for i in tracked]), strict=True))
+    own = curve_styles([group[i] for i in responses], [names[i] for i in responses], by_period)
+    pens |= zip(responses, own, strict=True)
+    return [pens[i] for i in range(len(group))]
+
+
+def _parted(group: Sequence[xarray.Dataset]) -> tuple[list[int], list[int]]:
+    """The places of tracked curves, and of all others."""
+    tracked = [i for i, dataset in enumerate(group) if is_boundary(dataset)]
+    return tracked, [i for i in range(len(group)) if i not in tracked]
 
 
 def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:

@@ -28,9 +28,11 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.kinds import KINDS, MOTION_KINDS
 
-#: a start moves at most this far from the bifurcation given, in units of the parameters' spans and of the motion
-_NEAR = 0.05
+#: a start moves at most this far from the located point, or the motion given, in units of the parameters' spans and of
+#: the motion
+_NEAR, _BESIDE = 0.05, 0.5
 
 
 @dataclass(frozen=True)
@@ -143,8 +145,7 @@ def solved_start(
         u[curve.index(name)] = min(high, max(low, u[curve.index(name)]))
     if is_extremum(item):
         curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
-    begin = u
-    origin = curve
+    begin, origin, anywhere = u, curve, item.kind in MOTION_KINDS
     along: np.ndarray | None = None
     try:
         for _ in range(8):
@@ -160,11 +161,16 @@ def solved_start(
             along = adapted.transfer(tangent(solved), curve)
             u, curve = adapted.transfer(solved.u, curve), adapted
         moved = weights * (solved.u - curve.transfer(begin, origin))
-        if float(np.linalg.norm(moved)) > _NEAR:
+        if float(np.linalg.norm(moved)) > (_BESIDE if anywhere else _NEAR):
             raise ConvergenceError(f"what was found lies elsewhere, at {curve.where(solved.u)}")
         return make_point(solved, curve, None, 0.0)
     except ConvergenceError as failure:
-        raise ConvergenceError(f"the {item.kind} at {curve.where(begin)} was not found again: {failure}") from None
+        where = curve.where(begin)
+        if anywhere:
+            words = f"no {KINDS[item.kind].words} was found beside {where}: begin closer to it ({failure})"
+        else:
+            words = f"the {item.kind} at {where} was not found again: {failure}"
+        raise ConvergenceError(words) from None
 
 
 __all__ = [

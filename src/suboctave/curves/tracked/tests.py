@@ -9,6 +9,7 @@
     LPNS, PDNS        det J_0, det J_half on NS curves; the number of multipliers outside the unit circle on LP, PD
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
+    LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
 
 The multiplier or the pair that is critical all along the curve is not counted. Two real multipliers whose product
 passes one (a neutral saddle) stay where they are. (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., chapters
@@ -24,18 +25,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.bifurcation import measures
-from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
+from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
+from suboctave.kinds import MOTION_KINDS
 
 #: component of the tangent in scaled arclength that may be rounding at both ends of a step
 _LEVEL = 1e-9
 #: distance of the other multiplier from +1 or -1 at a point where det J_0 or det J_half vanishes
 _CRITICAL = 0.1
+#: share of a parameter's forces along the left null vector below which it does not move the multiplier
+_TRANSVERSAL = 1e-6
 #: distance of the critical pair from there within which that is asked for
 _RESONANT = 0.5
 #: corrections of kappa, and their size in units of the base frequency, after which it is known
@@ -224,10 +228,20 @@ class RealCrossing(CurveTest):
             return True
         target = 1.0 if self.operator is Kind.INTEGER else -1.0
         critical = sample.evaluation.critical
-        assert critical is not None
-        apart = abs(critical - target) > _RESONANT
+        apart = critical is None or abs(critical - target) > _RESONANT
         error = float(sample.evaluation.floquet.errors.max(initial=0.0))
         return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL + error))
+
+
+@dataclass(frozen=True)
+class LimitOrBranchPoint(RealCrossing):
+    """LP or BP of the motions that a curve consists of: the latter where no free parameter moves the multiplier."""
+
+    def genuine(self, sample: Sample) -> bool:
+        """See `CurveTest.genuine`."""
+        vectors = null_vectors(sample.state, Kind.INTEGER)
+        forced = all(transversality(sample.state, vectors, name) <= _TRANSVERSAL for name in sample.curve.names)
+        return forced == (self.label == "BP")
 
 
 @dataclass(frozen=True)
@@ -335,10 +349,21 @@ def _census(mu: ComplexArray) -> tuple[int, int, int]:
     return int((np.abs(mu) > 1.0).sum()), int((real > 1.0).sum()) % 2, int((real < -1.0).sum()) % 2
 
 
+#: on curves of motions that need no critical multiplier
+_OF_MOTIONS = (
+    LimitOrBranchPoint(Kind.INTEGER, "LP"),
+    LimitOrBranchPoint(Kind.INTEGER, "BP"),
+    RealCrossing(Kind.HALF, "PD"),
+    PairCrossing("NS"),
+)
+
+
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns = tuple(Extremum(name) for name in curve.names)
     augmentation = curve.augmentation.own
+    if augmentation.name in MOTION_KINDS:
+        return (*turns, *_OF_MOTIONS)
     if not isinstance(augmentation, SingularOperator):
         return turns
     own: dict[Kind, tuple[CurveTest, ...]] = {

@@ -16,6 +16,7 @@ from suboctave.analysis.frequency_response import continue_branch, frequency_res
 from suboctave.analysis.options import settings_of
 from suboctave.analysis.switching import check_left, switch_branch
 from suboctave.analysis.track import track
+from suboctave.analysis.track_onto import motion_kind
 from suboctave.bifurcation.tracked import CURVES_THROUGH
 from suboctave.continuation import Event
 from suboctave.errors import InputError, is_number, suggest
@@ -310,7 +311,7 @@ class Track(CurveStep):
     parameter: str | list[str]
     bounds: Range | list[Range]
     omega: Range | None = None
-    onto: str | None = None
+    onto: str | dict[str, Any] | None = None
 
     @property
     def plane(self) -> tuple[str, str] | None:
@@ -348,6 +349,15 @@ class Track(CurveStep):
             yield ("bounds",), f"the bifurcations there have {name} = {value:g}: let the range hold it"
 
     def _check_start(self) -> Iterator[Complaint]:
+        wrong = list(tried("onto", lambda: motion_kind(self.onto)))
+        if wrong or motion_kind(self.onto) is not None:
+            yield from wrong
+            if self.motion is None:
+                yield (
+                    ("start",),
+                    'name a motion: start = { analysis = "response", nearest = { omega = 1.0 } }',
+                )
+            return
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
