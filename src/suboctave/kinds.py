@@ -66,6 +66,10 @@ KINDS: dict[str, Kind] = {
     "grazing": Kind(
         "grazing contact", "x", _INK, 1.4, equations="grazing:GrazingContactEquations", line=_GREY, width=0.8
     ),
+    "phase_resonance": Kind(
+        "phase resonance", "H", "#56B4E9", equations="phase_resonance:PhaseResonance", choices={"harmonic": 1.0},
+        line="#D55E00",
+    ),
     "extremum": Kind("extremum of a parameter along a curve of bifurcations", "d", _WHITE, 0.9, "extremum"),
     "CP": Kind("cusp", "P", "#0072B2", 1.1),
     "GPD": Kind("generalised period doubling", "h", "#E69F00", 1.12),

@@ -1,0 +1,80 @@
+"""Phase resonance: a harmonic of the observed displacement lags the load by a quarter of its period.
+
+    Re(z^q conj(f)^k) = 0,        q arg z = k arg f - pi/2 (up to pi)
+
+z the complex amplitude at `k/q omega` (in lowest terms), f that of the load at omega; shifts by load periods change
+nothing. At k/q = 1 it is phase quadrature, the backbone; at 3 a super-, at 1/3 a subharmonic resonance (Volvert &
+Kerschen, Phase resonance nonlinear modes of mechanical systems, Journal of Sound and Vibration 511, 2021).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from suboctave.bifurcation import Bifurcation
+from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.basis import Array, harmonic_index
+from suboctave.harmonic.evaluation import BalanceState
+
+
+@dataclass(frozen=True)
+class PhaseResonance(Augmentation):
+    """`order` k/q; `dof` of the displacement; `driven`, the unknown whose load counts; `unit` of the equation."""
+
+    order: Fraction
+    dof: int
+    driven: int
+    unit: float = 1.0
+    name = "phase_resonance"
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[PhaseResonance, Array]:
+        """See `Augmentation.through`; the number `harmonic` is a multiple of omega."""
+        nu, extra = state.basis.nu, np.zeros(0)
+        load = state.load[2 * nu - 1 : 2 * nu + 1]
+        if not load.any():
+            raise InputError("there is no load at omega that a phase could be measured against")
+        order, driven = harmonic_index(item.context["onto"]["harmonic"], nu), int(np.argmax((load**2).sum(axis=0)))
+        return cls(Fraction(order, nu), item.context["observe"], driven).at(state, extra, names).renewed(), extra
+
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> PhaseEquations:
+        """See `Augmentation.at`."""
+        return PhaseEquations(self, state, names)
+
+
+class PhaseEquations(Equations):
+    """The real part in units of `z^q conj(f)^k` at the last point."""
+
+    def __init__(self, of: PhaseResonance, state: BalanceState, names: tuple[str, ...]) -> None:
+        self.of, self.state, self.names = of, state, names
+        self.at = int(of.order * 2 * state.basis.nu) - 1
+        if self.at > len(state.x) - 2:
+            raise ConvergenceError(f"the harmonic at {of.order} omega is not kept")
+        self.reads = state.linear.retain(np.eye(state.balance.system.n)[of.dof])
+        z = complex(*(state.x[self.at : self.at + 2] @ self.reads)).conjugate()
+        f, (k, q) = self._conjugate(state.load), of.order.as_integer_ratio()
+        self.product, self.by_z, self.by_f = z**q * f**k, q * z ** (q - 1) * f**k, k * z**q * f ** (k - 1)
+
+    def _conjugate(self, load: Array) -> complex:
+        return complex(*load[2 * self.state.basis.nu - 1 :, self.of.driven][:2])
+
+    @property
+    def values(self) -> Array:
+        """See `Equations.values`."""
+        return np.array([self.product.real / self.of.unit])
+
+    @property
+    def rows(self) -> Array:
+        """See `Equations.rows`."""
+        by_x = np.zeros_like(self.state.x)
+        by_x[self.at : self.at + 2] = np.outer((self.by_z.real, self.by_z.imag), self.reads)
+        along = [(self.by_f * self._conjugate(self.state.load_by(name))).real for name in self.names]
+        return np.append(by_x.ravel(), along)[None] / self.of.unit
+
+    def renewed(self) -> PhaseResonance:
+        """See `Equations.renewed`."""
+        return replace(self.of, unit=abs(self.product) or 1.0)
