@@ -122,7 +122,8 @@ def _one_input(element: Element, c: Array, u: ArrayLike | None, v: ArrayLike | N
         speeds = list(kind.velocities)
         q = _away_from(q, 1, speeds, _BESIDE * STEP * max(map(abs, [*speeds, *rate])))
     if isinstance(kind, PiecewiseLinear | CornerSampling):
-        q = _away_from(q, 0, points, _BESIDE * STEP * max(length, reach))
+        margin = _BESIDE_ROUGH if isinstance(kind, CornerSampling) and kind.rough else _BESIDE
+        q = _away_from(q, 0, points, margin * STEP * max(length, reach))
     slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
     steps = []
     for value in c:
