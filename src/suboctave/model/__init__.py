@@ -12,6 +12,7 @@ from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.elements.dampers import QuadraticDamper, TanhFriction
 from suboctave.model.elements.derivative_check import DerivativeReport, check_derivatives
 from suboctave.model.elements.expression import Expression
+from suboctave.model.elements.hertz import HertzContact
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     CornerSampling,
@@ -54,6 +55,7 @@ __all__ = [
     "Freeplay",
     "Gravity",
     "HarmonicLoad",
+    "HertzContact",
     "Load",
     "LoadComponent",
     "MatrixCoefficient",
