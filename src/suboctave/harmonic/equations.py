@@ -75,7 +75,8 @@ class Equations:
         self._all_names = sorted({name for names in self._names for name in names})
         #: of every element: values of its names, and what it is there; of all elements: the same
         self._members: dict[int, tuple[tuple[float, ...], Member]] = {}
-        self._laws: tuple[tuple[float, ...], Laws] | None = None
+        #: the laws at the equations' own values (True), and at the last others, with the values of their names
+        self._laws: dict[bool, tuple[tuple[float, ...] | None, Laws]] = {}
         self._write_in(basis, (None,) * len(system.elements) if samples is None else samples)
 
     def _write_in(self, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> None:
@@ -134,12 +135,11 @@ class Equations:
         # the same mapping of values too: so a motion's values are known to be its own, with what the laws are there
         _ = self._scales, self.highest_load, self.directions
         other = type(self).__new__(type(self))
-        own = _OF_BASIS if samples == self.samples else _OF_BASIS | {"_own_laws"}
         for name, value in vars(self).items():
-            if name not in own:
+            if name not in _OF_BASIS:
                 setattr(other, name, value)
         if samples != self.samples:
-            other._members, other._laws = {}, None
+            other._members, other._laws = {}, {}
         other._write_in(basis, samples)
         return other
 
@@ -152,19 +152,14 @@ class Equations:
         return np.tile(scale, self.basis.size)
 
     def laws(self, values: Mapping[str, float]) -> Laws:
-        """The laws of all elements at parameter values."""
-        if values is self.values:
-            return self._own_laws
-        key = tuple([values[name] for name in self._all_names])
-        if self._laws is None or self._laws[0] != key:
-            self._laws = key, self._laws_at(values)
-        return self._laws[1]
-
-    @lazy
-    def _own_laws(self) -> Laws:
-        return self._laws_at(self.values)
-
-    def _laws_at(self, values: Mapping[str, float]) -> Laws:
+        """The laws of all elements at parameter values; those of the equations' own values, and the last others, are
+        kept.
+        """
+        own = values is self.values
+        key = None if own else tuple([values[name] for name in self._all_names])
+        kept = self._laws.get(own)
+        if kept is not None and kept[0] == key:
+            return kept[1]
         members = []
         for i, element in enumerate(self.system.elements):
             key = tuple([values[name] for name in self._names[i]])
@@ -173,7 +168,9 @@ class Equations:
                 c = element.coefficient_values(values)
                 cached = self._members[i] = key, Member(i, element, element.sampling(c), c, self.samples[i])
             members.append(cached[1])
-        return Laws(members, [DirectionLaws.of(tuple([members[i] for i in group.members])) for group in self.groups])
+        groups = [DirectionLaws.of(tuple([members[i] for i in group.members])) for group in self.groups]
+        self._laws[own] = key, Laws(members, groups)
+        return self._laws[own][1]
 
     @lazy
     def settled(self) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 import numpy as np
 
 from suboctave.errors import ConvergenceError
-from suboctave.interruption import limited
+from suboctave.interruption import time_limit
 from suboctave.model.system import System
 
 __all__ = ["timed"]
@@ -29,17 +29,16 @@ class Timed(Protocol):
 
 
 def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
-    """A verb with a time limit (`limited`) whose result says in `seconds` how long it took, and whose failures are put
+    """A verb with a time limit, `seconds`, whose result says in `seconds` how long it took, and whose failures are put
     in words.
     """
-
-    within = limited(verb)
 
     @functools.wraps(verb)
     def measured(*positional: Arguments.args, **named: Arguments.kwargs) -> Curve:
         begin = perf_counter()
         try:
-            result = within(*positional, **named)
+            with time_limit(named.get("seconds")):
+                result = verb(*positional, **named)
         except (ZeroDivisionError, OverflowError, ConvergenceError) as failure:
             extreme = extreme_number(*positional, *named.values())
             if extreme is None or hasattr(failure, "__notes__"):  # a mistake of ours, or of a user's function
