@@ -78,7 +78,8 @@ def track(
 
     Scaled arclength has each parameter in units of its range (omega without one in units of its value at the start).
     Default of `stepping`: `SteppingOptions(angle=0.15, growth=4)`. The formulation "extended" has the null vector among
-    the unknowns, "alcorta2019" is the published system of period doublings.
+    the unknowns, "alcorta2019" is the published system of period doublings. A branch point can be followed only where
+    a symmetry forces it.
 
     Returns
     -------
@@ -93,10 +94,6 @@ def track(
         Wrong input, before any work.
     ConvergenceError
         If the bifurcation given is not found again, or nothing of the kind wanted beside it.
-
-    Notes
-    -----
-    Minimally augmented systems and pseudo-arclength. A branch point can be followed only where a symmetry forces it.
     """
     item, through = begun(bifurcation, onto, options.get("observe"))
     turning = item.parameter_name if is_extremum(item) else ""
@@ -122,8 +119,6 @@ def track(
         trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
     ranges_by_name = ((names[0], first), (names[1], between), (names[-1], second))
     kept = options_of(settings, wanted, {name: given for name, given in ranges_by_name if given is not None})
-    if kind_of(item) in MOTION_KINDS:
-        kept["onto"] = item.context["onto"]
     return _branch(item, names, turning, trace, settings, kept)
 
 
@@ -156,6 +151,8 @@ def _branch(
 ) -> TrackedBranch:
     """The curve that begins at a bifurcation, with how it was computed."""
     system = item.orbit.system
+    if kind_of(item) in MOTION_KINDS:
+        options = {**options, "onto": item.context["onto"]}
     context = {"system": system, "parameter": names[-1], **options}
     return TrackedBranch(
         kind_of(item),
