@@ -25,7 +25,7 @@ from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import Found, as_event
+from suboctave.curves.tracked.events import LocatedEvent, as_event
 from suboctave.curves.tracked.nearest import nearest_point
 from suboctave.curves.tracked.start import (
     curve_through,
@@ -96,7 +96,7 @@ def locate_extremum(
         curve, u = curve_through(extremum, balance, None, names, spans_of(extremum, names, None))
         options = replace(settings.newton, iterations=max(_ITERATIONS, settings.newton.iterations))
         u = newton_extremum(curve, u, extremum.parameter_name, options, chosen)
-        located = Found(Extremum(extremum.parameter_name), _sample(curve, u, options), extremum.extreme)
+        located = LocatedEvent(Extremum(extremum.parameter_name), _sample(curve, u, options), extremum.extreme)
         event = as_event(located, settings.stability, settings.observe)
     return replace(event, arclength=extremum.arclength, context=extremum.context)
 

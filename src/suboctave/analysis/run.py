@@ -11,13 +11,12 @@ from suboctave.analysis.options import options_of
 from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import Harmonics, make_curve
-from suboctave.curves.follow import follow
+from suboctave.curves.follow import both_ways, follow
 from suboctave.curves.junction import Junction
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import linear_response
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.verdicts import with_verdicts
-from suboctave.curves.ways import both_ways
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.model.system import System
 from suboctave.progress import reporting

@@ -123,7 +123,8 @@ class Bifurcation:
     def with_normal_form(self, form: NormalForm | None) -> Bifurcation:
         """The same with a normal form that is known: it is not computed again."""
         other = replace(self)
-        other.__dict__["normal_form"] = form
+        # in place of the value that would be computed
+        object.__setattr__(other, "normal_form", form)
         return other
 
     def seen_backwards(self, arclength: float) -> Bifurcation:

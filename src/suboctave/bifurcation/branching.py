@@ -98,12 +98,12 @@ def branching_equation(
         )
     root = b + math.copysign(math.sqrt(inside), b)
     weights = np.append(1.0 / (scale * (motion_size(state) or 1.0)), 1.0 / span)
-    found = []
+    directions = []
     # the roots s : r are -root : c and -a : root, whichever of a, c vanishes
     for s, r in ((-root, c), (-a, root)):
         direction = np.append(s * phi + r * v, r * span)
-        found.append(direction / length(weights * direction))
-    return BranchingEquation(a, b, c, (found[0], found[1]), weights)
+        directions.append(direction / length(weights * direction))
+    return BranchingEquation(a, b, c, (directions[0], directions[1]), weights)
 
 
 def doubled_direction(vector: Array, size: int, doubled: HarmonicBasis) -> Array:

@@ -38,18 +38,18 @@ class GapExtrema:
 def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     """Every gap of every element on a motion."""
     grid = state.balance.grid
-    found = []
+    gaps = []
     for law, motion in zip(state.laws.groups, state.motions, strict=True):
         if law.levels:
             turns = _rows(extrema(motion, grid[0], grid[1]))
-            found += [GapExtrema(element, place, level, *turns) for element, place, level in law.levels]
+            gaps += [GapExtrema(element, place, level, *turns) for element, place, level in law.levels]
     for channel in state.own_channels:
         for member, _ in channel.members():
             places = levels_of(member.kind, member.coefficients)
             if places:
                 turns = _rows(extrema(channel.along.motion, grid[0], grid[1]))
-                found += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
-    return tuple(found)
+                gaps += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
+    return tuple(gaps)
 
 
 def _rows(turns: Array) -> tuple[Array, Array, Array]:

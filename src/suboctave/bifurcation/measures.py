@@ -65,24 +65,24 @@ def contradicted(result: FloquetResult, integer: float, half: float) -> list[tup
     """
     if not result.applicable:
         return []
-    mu, found = result.multipliers, []
+    mu, contradictions = result.multipliers, []
     sign = measured(_ONE, _ONE, 0, mu)[0]
     for target, solved, completed in ((1.0, integer, sign[1]), (-1.0, half, sign[2])):
         if solved * completed < 0.0:
             real = np.abs(mu.imag) <= 1e-12 * np.abs(mu)
             distance = np.where(real | ~real.any(), np.abs(mu - target), np.inf)
             nearest = int(np.argmin(distance))
-            found.append((nearest, float(distance[nearest])))
-    return found
+            contradictions.append((nearest, float(distance[nearest])))
+    return contradictions
 
 
 def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResult:
     """Multipliers whose errors cover what the signs of det J_0 (`integer`) and det J_half say of them."""
-    found = contradicted(result, integer, half)
-    if not found:
+    contradictions = contradicted(result, integer, half)
+    if not contradictions:
         return result
     errors = result.errors.copy()
-    for which, distance in found:
+    for which, distance in contradictions:
         errors[which] = max(errors[which], 2.0 * distance)
     return replace(result, errors=errors)
 

@@ -61,8 +61,8 @@ class Bounds:
         slack = _ON_IT * (self.high - self.low)
         if self.low - slack <= top <= self.high + slack or not 0.0 < share < 1.0:
             return None
-        found = self.land(a, b, self.high if top > self.high else self.low, newton, share)
-        return found if found is not None and found.arclength <= b.arclength else None
+        landed = self.land(a, b, self.high if top > self.high else self.low, newton, share)
+        return landed if landed is not None and landed.arclength <= b.arclength else None
 
     def land(
         self, a: CurvePoint, b: CurvePoint, bound: float, newton: NewtonOptions, share: float = 1.0

@@ -88,15 +88,15 @@ _GO_ON = ", or go on from curve.orbits[{}] with so.continue_branch(...)"
 
 def sentence(endings: Sequence[Ending], go_on: str = _GO_ON) -> str:
     """Why a curve ends, at its one end or at both (first, last); after a time limit with what goes on from there."""
-    told = list(dict.fromkeys(str(ending) for ending in endings if ending.reason is not EndReason.START))
-    text = told[0] if len(told) == 1 else f"{told[0]} in one direction, {told[1]} in the other" if told else ""
+    sentences = list(dict.fromkeys(str(ending) for ending in endings if ending.reason is not EndReason.START))
+    text = " in one direction, ".join(sentences) + (" in the other" if len(sentences) > 1 else "")
     late = [at for at, ending in zip((0, -1), endings, strict=False) if ending.reason is EndReason.TIME_LIMIT]
     return text + (f". Give more seconds={go_on.format(late[-1])}" if late else "")
 
 
 def interruption_of(endings: Sequence[Ending]) -> Interruption | None:
     """What stopped a curve in one of its directions; None where it came to its ends."""
-    return next((found for ending in endings if (found := ending.interruption) is not None), None)
+    return next((stop for ending in endings if (stop := ending.interruption) is not None), None)
 
 
 def read_endings(text: str) -> tuple[Ending, ...]:
@@ -110,8 +110,8 @@ def _read(text: str) -> Ending:
         pattern = re.escape(words)
         for name in ("where", "detail"):
             pattern = pattern.replace(re.escape(f"{{{name}}}"), f"(?P<{name}>.*)")
-        found = re.fullmatch(pattern, text, re.DOTALL)
-        if found:
-            named = found.groupdict(default="")
+        match = re.fullmatch(pattern, text, re.DOTALL)
+        if match:
+            named = match.groupdict(default="")
             return Ending(reason, named.get("where", ""), named.get("detail", ""))
     return Ending(EndReason.OTHER, detail=text)

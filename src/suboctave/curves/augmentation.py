@@ -19,6 +19,9 @@ from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import form_rates
 
+#: of g by the coefficients, by parameters, by kappa
+Gradient = tuple[np.ndarray, dict[str, complex], complex]
+
 
 class Equations(ABC):
     """The scalar equations at one motion, dimensionless."""
@@ -107,7 +110,7 @@ class Augmentation(ABC):
         return extra
 
 
-def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
+def gradient_of(b: Bordered, names: tuple[str, ...]) -> Gradient:
     """The gradient of g, the parameters' part apart: most of it is the same whatever the parameters are."""
     named = tuple(name for name in names if name != "omega")
     rates = form_rates(b.state, b.kind, b.left, b.right, named, b.kappa)
@@ -115,4 +118,4 @@ def gradient_of(b: Bordered, names: tuple[str, ...]) -> tuple[np.ndarray, dict[s
     return by_x, plain | {name: -rate for name, rate in rates.items()}, by_kappa
 
 
-__all__ = ["Augmentation", "Equations", "gradient_of"]
+__all__ = ["Augmentation", "Equations", "Gradient", "gradient_of"]

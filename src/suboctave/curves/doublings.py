@@ -54,16 +54,16 @@ class DoublingWatch:
         """The period doublings that the step from a to b leads to, each with the samples it lies between."""
         if PERIOD_DOUBLING.changed(a, b):
             self._open.append(((a, b), False))
-        found = []
+        doublings = []
         for p, q in self._indicated(a, b):
             low, high = p.point.arclength, q.point.arclength
             self._open = [(pair, known or _within(pair, low, high)) for pair, known in self._open]
             located = self.locate(self.kind, p, q)
             if located is not None:
-                found.append((located, p, q))
+                doublings.append((located, p, q))
                 self._explained(low + located.fraction * (high - low), _ASIDE * (high - low))
         self._last = a
-        return found
+        return doublings
 
     def moved(self, old: Sample, again: Sample) -> None:
         """The same motion was solved for with other harmonics: its test functions jump a little."""

@@ -10,6 +10,7 @@ import numpy as np
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.measures import fold
 from suboctave.continuation import CurvePoint, Event, March
+from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.point import point_between, solved_again
@@ -64,9 +65,9 @@ class _Follower(Driver):
         if settings.formulation.doubling_test is not None:
             self._watch = DoublingWatch(settings.formulation.doubling_test, self._kinds["PD"], self._located)
         #: somebody who keeps what has been found (`progress.reporting`)
-        self._found: Callable[[Trace], None] | None = None
+        self._keeper: Callable[[Trace], None] | None = None
         if settings.report is not None:
-            self._found = getattr(settings.report.report, "found", None)
+            self._keeper = getattr(settings.report.report, "found", None)
 
     def _walk(self) -> None:
         # in a fresh installation the first verdict on stability waits for its kernels to be compiled
@@ -187,8 +188,8 @@ class _Follower(Driver):
         if passage is not None:
             self._look_behind(passage)
         self._report(point)
-        if self._found is not None:
-            self._found(self.trace)
+        if self._keeper is not None:
+            self._keeper(self.trace)
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation | None:
         sentences: list[str] = []
@@ -200,8 +201,8 @@ class _Follower(Driver):
     def _look_behind(self, passage: Passage) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
         for stretch in self._hidden.passed(passage.inside):
-            found = [] if self._watch else pair_in(stretch, self.settings.newton)
-            items = [item for entry in found if (item := self._bifurcation(*entry)) is not None]
+            pairs = [] if self._watch else pair_in(stretch, self.settings.newton)
+            items = [item for entry in pairs if (item := self._bifurcation(*entry)) is not None]
             for item in items:
                 if self._insert(item):
                     self._count.noted(item)
@@ -237,7 +238,7 @@ class _Follower(Driver):
             self._guard.doubt(old, again, f"{kind.name} may have happened twice within what more harmonics change")
 
     def _search(self, a: Sample, b: Sample) -> None:
-        found: list[tuple[float, Bifurcation]] = []
+        events: list[tuple[float, Bifurcation]] = []
         missing: list[str] = []
         turned: Bifurcation | None = None
         # at rest the equations have a corner where a contact is closed: nothing bifurcates there
@@ -254,7 +255,7 @@ class _Follower(Driver):
                 if located is not None or kind.name != "NS":
                     missing.append(kind.name)
                 continue
-            found.append((located.fraction, item))
+            events.append((located.fraction, item))
             if crossing is not None and crossing.turns:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
                 turned = item
@@ -264,18 +265,18 @@ class _Follower(Driver):
         if missing:
             self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
         unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
-        complaint = self._count.complaint(b, [item.kind for _, item in found] + missing + unseen)
+        complaint = self._count.complaint(b, [item.kind for _, item in events] + missing + unseen)
         if not resting and self._guard.grazes(a, b):
             for touched in locate_grazings(a, b, self.settings.newton):
                 item = self._bifurcation(touched, a, b)
                 if item is not None:
-                    found.append((touched.fraction, item))
+                    events.append((touched.fraction, item))
         if complaint is not None:
             self._guard.doubt(*complaint)
-        if found:
+        if events:
             met = self.trace.bifurcations[-4:]
-            fresh = [pair for pair in found if not any(same_event(pair[1], other) for other in met)]
-            for _, item in found:
+            fresh = [pair for pair in events if not any(same_event(pair[1], other) for other in met)]
+            for _, item in events:
                 again = next((other for other in met if same_event(item, other)), None)
                 # of a hidden pair that more harmonics have shown one may lie ahead again
                 if again is not None and item.kind not in CONTACT_KINDS and again not in self._shown:
@@ -296,8 +297,8 @@ class _Follower(Driver):
 
     def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
         """The kinds to look for between two samples, as they are to be solved for."""
-        found = [self._kinds[kind.name] for kind in changes(a, b)]
-        return found if self._watch is None else [kind for kind in found if kind.name != "PD"]
+        kinds = [self._kinds[kind.name] for kind in changes(a, b)]
+        return kinds if self._watch is None else [kind for kind in kinds if kind.name != "PD"]
 
     def _insert(self, item: Bifurcation) -> bool:
         """Put a bifurcation into its place on the branch unless it is there already."""
@@ -319,11 +320,11 @@ class _Follower(Driver):
             return known[3]
         must_solve = kind is BRANCH_POINT
         begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
-        found = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
-        if must_solve and found is not None and found.solution is None:
-            found = None
-        self._last_located = (kind, a, b, found)
-        return found
+        located = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
+        if must_solve and located is not None and located.solution is None:
+            located = None
+        self._last_located = (kind, a, b, located)
+        return located
 
     def _event_value(self, event: Event, sample: Sample) -> float:
         orbit = sample.orbit
@@ -373,4 +374,26 @@ class _Follower(Driver):
         )
 
 
-__all__ = ["follow"]
+def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:
+    """Follow a curve from an inner point to both sides; from a bound inwards only."""
+    low, high = bounds
+    slack = 1e-9 * (high - low)
+    if abs(point.parameter - (low if ahead > 0 else high)) <= slack:
+        return follow(point, ahead, bounds, settings)
+    if abs(point.parameter - (high if ahead > 0 else low)) <= slack:
+        back = follow(point, -ahead, bounds, settings)
+        only = Trace(back.points[:1], endings=(Ending(EndReason.START), Ending(EndReason.START)))
+        return back.reversed_before(only)
+    forward = follow(point, ahead, bounds, settings)
+    if forward.closed or forward.interrupted:
+        return forward
+    back = follow(point, -ahead, bounds, settings)
+    # between two folds the curve runs the other way: what matters is where it ends
+    assert isinstance(point.curve, MotionProblem)
+    name, target = point.curve.name, high if ahead > 0 else low
+    ends = [t.points[-1].orbit for t in (forward, back)]
+    misses = [abs((o.omega if name == "omega" else o.values[name]) - target) for o in ends]
+    return back.reversed_before(forward) if misses[0] <= misses[1] else forward.reversed_before(back)
+
+
+__all__ = ["both_ways", "follow"]

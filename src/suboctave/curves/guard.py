@@ -293,11 +293,11 @@ class _Step:
             return 0.5, "nothing was looked at"
         if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
-        found = first_doubtful([s.place for s in stencil], [self._measures(s) for s in stencil], at)
-        if found is None or (_REASONS[found[0]] == _RETURNS and h <= _EXAMINED and self.turned):
+        doubt = first_doubtful([s.place for s in stencil], [self._measures(s) for s in stencil], at)
+        if doubt is None or (_REASONS[doubt[0]] == _RETURNS and h <= _EXAMINED and self.turned):
             # right beside the branch point the multiplier at +1 is known up to its error only
             return None
-        return found[1], _REASONS[found[0]]
+        return doubt[1], _REASONS[doubt[0]]
 
     def _look_for_crossing(self, p: Sample, q: Sample) -> Crossing | None:
         """The branch point between two samples; the step is refused if the orientation changes without one, which it
@@ -428,12 +428,12 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
     change = abs(p.unstable - q.unstable)
-    found = changes(p, q)
-    if change == 0 and not found:
+    kinds = changes(p, q)
+    if change == 0 and not kinds:
         return True
     if _open(p, q):
         return True
-    changed = {kind.name for kind in found}
+    changed = {kind.name for kind in kinds}
     if {"LP", "BP"} <= changed:
         # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
         return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)

@@ -44,7 +44,7 @@ class HiddenDoublings:
 
     def passed(self, samples: list[Sample]) -> list[Stretch]:
         """The stretches that end within the next samples of the curve."""
-        found = []
+        stretches = []
         for sample in samples:
             if not _agree(sample):
                 self._since += [sample] if self._since else []
@@ -52,9 +52,9 @@ class HiddenDoublings:
             if len(self._since) > 1:
                 before, *between = self._since
                 if all(s.half_sign == before.half_sign for s in (*between, sample)):
-                    found.append(Stretch(before, max(between, key=lambda s: s.measures[1, 2]), sample))
+                    stretches.append(Stretch(before, max(between, key=lambda s: s.measures[1, 2]), sample))
             self._since = [sample]
-        return found
+        return stretches
 
 
 def _agree(sample: Sample) -> bool:
@@ -67,10 +67,10 @@ def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Samp
     """
     samples = (stretch.before, stretch.inside, stretch.behind)
     curve = stretch.inside.curve
-    found: list[tuple[Located, Sample, Sample]] = []
+    doublings: list[tuple[Located, Sample, Sample]] = []
     while curve.adaptive is not None:
         present = samples[1].state
-        basis = _wanted(found, curve.adaptive) if found else next_harmonics(present, curve.adaptive)
+        basis = _wanted(doublings, curve.adaptive) if doublings else next_harmonics(present, curve.adaptive)
         if basis.harmonics <= present.basis.harmonics:
             break
         x = present.basis.resized(present.x, basis)
@@ -88,13 +88,13 @@ def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Samp
             continue
         # each between motions of its own: left to itself with still more harmonics, one may run to the other
         pairs = [(a, b, locate(PERIOD_DOUBLING, a, b, newton)) for a, b in ((first, middle), (middle, last))]
-        found = [(item, a, b) for a, b, item in pairs if item is not None]
-    return found
+        doublings = [(item, a, b) for a, b, item in pairs if item is not None]
+    return doublings
 
 
-def _wanted(found: list[tuple[Located, Sample, Sample]], options: AdaptiveHarmonics) -> HarmonicBasis:
+def _wanted(doublings: list[tuple[Located, Sample, Sample]], options: AdaptiveHarmonics) -> HarmonicBasis:
     """The harmonics that located bifurcations are to have."""
-    states = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in found]
+    states = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in doublings]
     bases = (choose_harmonics(state, options, options.event_tolerance) for state in states)
     return max(bases, key=lambda basis: basis.harmonics)
 

@@ -132,20 +132,19 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     half = basis.even_part(x)
     try:
         balance = parent.balance.settle(half, omega, values)
-        found = locate_singular(Guess(balance, half, omega, values, curve.name, curve.span), Kind.HALF)
+        doubling = locate_singular(Guess(balance, half, omega, values, curve.name, curve.span), Kind.HALF)
     except ConvergenceError:
         return None
-    state = found.state
-    value = state.omega if curve.name == "omega" else state.values[curve.name]
-    there = curve.join(parent.balance.basis.resized(state.x, basis), value)
+    state = doubling.state
+    there = curve.transfer(parent.u_of(state), parent)
     place = position(a, b, there)
     beyond = 1e-6 if turned else 2.0 * _VANISHED
-    if place is None or not -1e-6 <= place <= 1.0 + beyond or found.vectors is None:
+    if place is None or not -1e-6 <= place <= 1.0 + beyond or doubling.vectors is None:
         return None
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
-    last, doubt = _last_before(a, b, there, found, newton)
+    last, doubt = _last_before(a, b, there, doubling, newton)
     return Meeting(
-        found,
+        doubling,
         parent.with_balance(state.balance),
         Arrival(last, Ending(EndReason.MET_BRANCH, curve.where(there), reason)),
         doubt,
@@ -159,19 +158,19 @@ def _odd(u: Array, curve: MotionProblem, weights: Array) -> Array:
 
 
 def _last_before(
-    a: CurvePoint, b: CurvePoint, there: Array, found: Singular, newton: NewtonOptions
+    a: CurvePoint, b: CurvePoint, there: Array, doubling: Singular, newton: NewtonOptions
 ) -> tuple[CurvePoint | None, str]:
     """The curve's point right before it meets its parent, None if a neighbour is that; and what remains in doubt."""
     curve = b.curve
     assert isinstance(curve, MotionProblem)
     before = curve.transfer(a.u, a.curve)
     way = length(b.weights * (there - before))
-    direction = emanating(found, curve, b.weights)
+    direction = emanating(doubling, curve, b.weights)
     if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
         direction = -direction
-    assert found.vectors is not None
-    form = normal_form("PD", found.state, found.vectors, curve.name)
-    close = beside(curve, there, direction, b.weights, doubled(found.floquet), newton, curvature_of(form), 0.7 * way)
+    assert doubling.vectors is not None
+    form = normal_form("PD", doubling.state, doubling.vectors, curve.name)
+    close = beside(curve, there, direction, b.weights, doubled(doubling.floquet), newton, curvature_of(form), 0.7 * way)
     if close is None:
         return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
     point = close.point
@@ -180,12 +179,12 @@ def _last_before(
     return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
 
 
-def emanating(found: Singular, curve: MotionProblem, weights: Array) -> Array:
+def emanating(doubling: Singular, curve: MotionProblem, weights: Array) -> Array:
     """The direction in which a curve of twice the period leaves a period doubling, unit length in its weights."""
-    assert found.vectors is not None
-    state, size = found.state, curve.balance.size
-    scale = np.tile(state.balance.scales()[1], len(found.vectors.right) // size)
-    phi = doubled_direction(found.vectors.right * scale, size, curve.balance.basis)
+    assert doubling.vectors is not None
+    state, size = doubling.state, curve.balance.size
+    scale = np.tile(state.balance.scales()[1], len(doubling.vectors.right) // size)
+    phi = doubled_direction(doubling.vectors.right * scale, size, curve.balance.basis)
     direction = curve.join(phi, 0.0)
     return direction / length(weights * direction)
 
@@ -252,9 +251,9 @@ def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
     curve = point.curve
     assert isinstance(curve, MotionProblem)
     x, omega, values = curve.split(point.u)
-    found = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
+    own = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
     expected = np.sort_complex(multipliers)
-    return float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
+    return float((np.abs(own - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
 
 
 def _parabolic(far: tuple[float, CurvePoint], close: tuple[float, CurvePoint], curvature: float | None) -> bool:

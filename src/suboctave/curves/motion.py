@@ -247,6 +247,10 @@ class MotionProblem:
             u[n:-k] = extra
         return u
 
+    def u_of(self, state: BalanceState) -> Array:
+        """The vector u of a motion, where the augmentation brings no unknowns."""
+        return self.join(state.x, np.array([state.omega if n == "omega" else state.values[n] for n in self.names]))
+
     def evaluate(self, u: Array) -> MotionEvaluation:
         """See `Curve.evaluate`."""
         if not math.isfinite(u.dot(u)):

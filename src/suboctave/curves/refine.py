@@ -9,7 +9,7 @@ import numpy as np
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.branching import branching_equation
 from suboctave.continuation import NewtonOptions
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import solved_again
 from suboctave.curves.events.finder import Located, locate, position
 from suboctave.curves.events.layer import (
@@ -78,15 +78,15 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
             contact=beside,
         )
     unit = curve.unit(located.sample.point.weights)
-    found = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
-    return replace(found, tangent=_tangent(a, b, located.fraction, found)) if found.kind == "BP" else found
+    item = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
+    return replace(item, tangent=_tangent(a, b, located.fraction, item)) if item.kind == "BP" else item
 
 
-def _tangent(a: Sample, b: Sample, share: float, found: Bifurcation) -> tuple[float, ...]:
+def _tangent(a: Sample, b: Sample, share: float, item: Bifurcation) -> tuple[float, ...]:
     """The direction of the branch at a bifurcation between two samples, in the harmonics of its motion."""
     curve = b.curve
     t = (1.0 - share) * curve.transfer(a.point.tangent, a.curve) + share * b.point.tangent
-    return tuple(curve.with_balance(found.orbit.balance).transfer(t, curve).tolist())
+    return tuple(curve.with_balance(item.orbit.balance).transfer(t, curve).tolist())
 
 
 def solved_bifurcation(
@@ -156,11 +156,11 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         wide, kind, sample = curve.with_balance(balance), located.kind, located.sample
         try:
             guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, kind.kappa(sample))
-            found = kind.solve(guess)
-            if kind.genuine(found, guess):
-                if _lies_between(found, wide, a, b):
-                    return found
-                beyond = beyond or found
+            solution = kind.solve(guess)
+            if kind.genuine(solution, guess):
+                if _lies_between(solution, wide, a, b):
+                    return solution
+                beyond = beyond or solution
         except ConvergenceError:
             pass
         between = _between(kind, wide, a, b)
@@ -170,12 +170,12 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     return beyond if beyond is not None and _distance(beyond, located.sample) <= size else None
 
 
-def _distance(found: Singular, sample: Sample) -> float:
+def _distance(solution: Singular, sample: Sample) -> float:
     """Scaled distance of a solution from a sample, in the harmonics of the sample."""
     curve = sample.curve
-    wide = curve.with_balance(found.state.balance)
-    there = wide.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
-    return length(sample.point.weights * (curve.transfer(there, wide) - sample.point.u))
+    wide = curve.with_balance(solution.state.balance)
+    there = curve.transfer(wide.u_of(solution.state), wide)
+    return distance(there, sample.point.u, sample.point.weights)
 
 
 def _refined(
@@ -229,18 +229,18 @@ def _refined(
     return solution, coarser
 
 
-def _of_its_own(kind: BifurcationKind, found: Singular, curve: MotionProblem, a: Sample, b: Sample) -> Singular:
+def _of_its_own(kind: BifurcationKind, solution: Singular, curve: MotionProblem, a: Sample, b: Sample) -> Singular:
     """What was solved for with more harmonics, if it still lies between two samples; else what lies between them with
     these harmonics. Beside a young contact Newton's method may run to the next bifurcation of the kind.
     """
-    if a is b or _lies_between(found, curve, a, b):
-        return found
-    return _between(kind, curve, a, b) or found
+    if a is b or _lies_between(solution, curve, a, b):
+        return solution
+    return _between(kind, curve, a, b) or solution
 
 
-def _lies_between(found: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
+def _lies_between(solution: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
     """Whether a solution, one of the motions of `curve`, lies between two samples, but for what harmonics move."""
-    there = curve.join(found.state.x, found.state.omega if curve.name == "omega" else found.state.values[curve.name])
+    there = curve.u_of(solution.state)
     share = position(a.point, b.point, b.curve.transfer(there, curve))
     if share is None or not -_MOVED <= share <= 1.0 + _MOVED:
         # of a short step, only its ends with the same harmonics tell

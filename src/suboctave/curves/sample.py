@@ -156,8 +156,8 @@ class Sample:
     @property
     def vectors(self) -> NullVectors | None:
         """Null vectors of the singular operator, None where there is none."""
-        found = getattr(self.evaluation.equations.own, "bordered", None)
-        return None if found is None else found.vectors
+        border = getattr(self.evaluation.equations.own, "bordered", None)
+        return None if border is None else border.vectors
 
     @lazy
     def bend(self) -> float:
@@ -217,15 +217,15 @@ class Sample:
         if operator is Kind.INTEGER:
             n = state.balance.dimension
             # its columns are in scaled arclength: the weights are those of the DOFs over the size of the motion
-            sign, found = self._plain.sign, self._plain.log_determinant
-            found += n * math.log(float(self.point.weights[0]) / float(state.balance.scales()[0][0]))
+            sign, logarithm = self._plain.sign, self._plain.log_determinant
+            logarithm += n * math.log(float(self.point.weights[0]) / float(state.balance.scales()[0][0]))
             masses = state.balance.logarithm_of_masses(n)
         else:
             n = len(self._half.lu)
-            sign, found = self._half.sign, self._half.log_determinant
+            sign, logarithm = self._half.sign, self._half.log_determinant
             masses = 2.0 * state.balance.logarithm_of_masses(n)
         units = 2.0 * n * math.log(state.rate) + _frequencies(n, size, operator is Kind.INTEGER) + masses
-        return sign, found - units
+        return sign, logarithm - units
 
     @lazy
     def _half(self) -> Factor:

@@ -38,8 +38,8 @@ class Settings:
         self, report: Report | None, bounds: tuple[float, float], located: str = "bifurcation"
     ) -> Settings:
         """The same, reporting how far a curve between bounds of its parameter has come; `located`: what is counted."""
-        told = None if report is None else CurveProgress(report, (min(bounds), max(bounds)), located)
-        return replace(self, report=told)
+        progress = None if report is None else CurveProgress(report, (min(bounds), max(bounds)), located)
+        return replace(self, report=progress)
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     unsettled, notes = _stretches(points, open_ones, name)
     for probe in trace.open:
         stretch = _between(probe, points, known, name)
-        if stretch is not None and not any(_within(stretch, told) for told in (*trace.audit.unsettled, *unsettled)):
+        if stretch is not None and not any(_within(stretch, other) for other in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
     notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]
     notes += _replaced(points, method, name)
@@ -82,19 +82,19 @@ class _Asking:
         self.going_on = whole
         self.interruption: Interruption | None = None
 
-    def settled(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
+    def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
         """The verdict where one is open, with witnesses."""
 
         def question() -> FloquetResult:
-            return in_doubt(self.method.settled(state, found), fold_sign(state), half_sign(state))
+            return in_doubt(self.method.settled(state, result), fold_sign(state), half_sign(state))
 
-        return self._asked(question, found)
+        return self._answer(question, result)
 
-    def along(self, state: BalanceState, found: FloquetResult) -> FloquetResult:
+    def along(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
         """The method's multipliers in place of others."""
-        return self._asked(lambda: self.method.along(state), found)
+        return self._answer(lambda: self.method.along(state), result)
 
-    def _asked(self, question: Callable[[], FloquetResult], known: FloquetResult) -> FloquetResult:
+    def _answer(self, question: Callable[[], FloquetResult], known: FloquetResult) -> FloquetResult:
         if self.going_on:
             try:
                 return question()
@@ -104,17 +104,17 @@ class _Asking:
 
 
 def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -> list[BranchPoint]:
-    told: list[BranchPoint] = []
+    settled: list[BranchPoint] = []
     in_vain = 0
     for number, point in enumerate(points):
-        found = point.floquet
-        if found.decided:
+        result = point.floquet
+        if result.decided:
             in_vain = 0
         elif number not in beside and in_vain < _PATIENCE:
-            found = asking.settled(point.orbit.state(), found)
-            in_vain = 0 if found.decided else in_vain + 1
-        told.append(point if found is point.floquet else replace(point, known=found))
-    return told
+            result = asking.settled(point.orbit.state(), result)
+            in_vain = 0 if result.decided else in_vain + 1
+        settled.append(point if result is point.floquet else replace(point, known=result))
+    return settled
 
 
 def _at_event(item: Bifurcation, asking: _Asking) -> Bifurcation:
@@ -122,16 +122,16 @@ def _at_event(item: Bifurcation, asking: _Asking) -> Bifurcation:
 
     Those of the search are the monodromy matrix's.
     """
-    found = item.floquet
+    result = item.floquet
     monodromy = asking.method.follows_monodromy
     if monodromy and not _others_open(item).any():
         return item
     state = item.orbit.state()
     if not monodromy:
-        found = asking.along(state, found)
-    if _others_open(replace(item, floquet=found)).any():
-        found = asking.settled(state, found)
-    return replace(item, floquet=found)
+        result = asking.along(state, result)
+    if _others_open(replace(item, floquet=result)).any():
+        result = asking.settled(state, result)
+    return replace(item, floquet=result)
 
 
 def _open(result: FloquetResult) -> np.ndarray:

@@ -63,9 +63,9 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": quadratic}, own.g_size)
 
 
-def labelled(form: NormalForm, found: Terms) -> NormalForm:
+def labelled(form: NormalForm, terms: Terms) -> NormalForm:
     """Transcritical or pitchfork, and of the latter whether it is super- or subcritical."""
-    if abs(form["c"]) > _SYMMETRIC * found.sizes["c"]:
+    if abs(form["c"]) > _SYMMETRIC * terms.sizes["c"]:
         kept = {key: form[key] for key in ("a", "b", "c", "g")}
         return replace(form, coefficients=kept, errors={}, shape="transcritical")
     return with_criticality(replace(form, shape="pitchfork"))

@@ -71,8 +71,8 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
     if name not in known:
         raise InputError(f"unknown parameter {name!r}{suggest(name, known)}")
     terms = _TERMS[kind]
-    found = terms(state, vectors, name, kappa)
-    errors = {key: ROUNDING * size for key, size in found.sizes.items()}
+    whole = terms(state, vectors, name, kappa)
+    errors = {key: ROUNDING * size for key, size in whole.sizes.items()}
     # harmonics left out matter like 1 / H where a contact is hard; two numbers, as a single change may vanish by chance
     for high, missing in ((2 * state.basis.harmonics // 3, 2.0), (state.basis.harmonics // 2, 1.0)):
         coarse = _coarser(state, vectors, FORMS[kind], kappa, high)
@@ -80,11 +80,11 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
             continue
         other = terms(*coarse, name, kappa)
         for key in errors:
-            change = found.coefficients[key] - other.coefficients[key] * found.unit / other.unit
+            change = whole.coefficients[key] - other.coefficients[key] * whole.unit / other.unit
             errors[key] = max(errors[key], missing * abs(change))
-    form = NormalForm(kind, name, found.coefficients, errors)
+    form = NormalForm(kind, name, whole.coefficients, errors)
     if kind == "BP":
-        return normal_form_branch.labelled(form, found)
+        return normal_form_branch.labelled(form, whole)
     if kind == "NS":
         return normal_form_torus.labelled(with_criticality(form), kappa / state.rate)
     return form if kind == "LP" else with_criticality(form)
@@ -101,12 +101,12 @@ def _coarser(
     x = basis.resized(state.x, fewer)
     try:
         other = balance.with_basis(fewer).at(x, state.omega, state.values)
-        found = null_vectors(other, kind, kappa)
+        singular = null_vectors(other, kind, kappa)
     except ConvergenceError:
         return None
     short = vectors.resized(fewer, balance.size, kind)
     pair = []
-    for own, given in ((found.right, short.right), (found.left, short.left)):
+    for own, given in ((singular.right, short.right), (singular.left, short.left)):
         turn = np.vdot(own, given)
         pair.append(own * (turn / abs(turn) if turn else 1.0))
     return other, NullVectors(*pair)

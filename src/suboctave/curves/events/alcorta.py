@@ -25,7 +25,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import Factor, distance
 from suboctave.curves.events.locate import Guess, Singular, locate_singular
 from suboctave.curves.kinds.extended import PublishedDoubling
 from suboctave.errors import ConvergenceError
@@ -55,8 +55,8 @@ def locate_doubling(guess: Guess) -> Singular:
     except ConvergenceError as failure:
         raise ConvergenceError(f"no period doubling where the system is nearly solved: {failure}") from None
     problem = beside.problem()
-    here, there = (problem.join(s.x, beside.parameter_at(s)) for s in (state, confirmed.state))
-    if length(problem.weights(here, 0.0) * (there - here)) > _BESIDE:
+    here, there = (beside.vector(s) for s in (state, confirmed.state))
+    if distance(there, here, problem.weights(here, 0.0)) > _BESIDE:
         raise ConvergenceError("no period doubling where the system is nearly solved: J_half is singular elsewhere")
     half = 0.5 * state.rate
     defect = bordered(state, Kind.FREE, null_vectors(state, Kind.FREE, half), half).relative

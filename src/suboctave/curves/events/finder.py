@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import CurvePoint, between, point_between
@@ -72,13 +70,13 @@ def locate(
         nearer = at_low if share < 0.5 else at_high
         if depth % 3 == 0:
             # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
-            found = _try(kind, at_low, at_high, share, nearer)
+            attempt = _try(kind, at_low, at_high, share, nearer)
             # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
             # here
-            if found is not None:
-                place = low + found[1] * (high - low)
+            if attempt is not None:
+                place = low + attempt[1] * (high - low)
                 if -(_BEFORE if begins else _SLACK) <= place <= 1.0 + _SLACK:
-                    return Located(kind, min(1.0, max(place, 0.0)), nearer, found[0], 0.0)
+                    return Located(kind, min(1.0, max(place, 0.0)), nearer, attempt[0], 0.0)
         middle = None
         for part in (0.5, 0.4, 0.65):
             try:
@@ -109,15 +107,15 @@ def _try(
     """A solution between two samples and where, from a start at a share of the way; None if there is none."""
     try:
         guess = Guess.at(between(low.point, high.point, share), high.point, kind.kappa(nearer))
-        found = kind.solve(guess)
+        solution = kind.solve(guess)
     except ConvergenceError:
         return None
-    if not kind.genuine(found, guess):
+    if not kind.genuine(solution, guess):
         return None
-    fraction = position(low.point, high.point, _unknowns(found, guess))
+    fraction = position(low.point, high.point, guess.vector(solution.state))
     if fraction is None or not -0.05 <= fraction <= 1.05:
         return None
-    return found, fraction
+    return solution, fraction
 
 
 def locate_near(
@@ -131,23 +129,18 @@ def locate_near(
     point = sample.point
     try:
         guess = Guess.at(point.u, point, kind.kappa(sample))
-        found = kind.solve(guess)
+        solution = kind.solve(guess)
     except ConvergenceError:
         return None
-    if not kind.genuine(found, guess):
+    if not kind.genuine(solution, guess):
         return None
-    way = point.weights * (_unknowns(found, guess) - point.u)
+    way = point.weights * (guess.vector(solution.state) - point.u)
     along = point.weights * point.tangent
     ahead = float(way @ along) / length(along)
     aside = math.sqrt(max(0.0, float(way @ way) - ahead**2))
     if abs(ahead) > reach or aside > 0.1 * abs(ahead) + 1e-7:
         return None
-    return Located(kind, 0.0, sample, found, 0.0)
-
-
-def _unknowns(found: Singular, guess: Guess) -> Array:
-    value = found.state.omega if guess.name == "omega" else found.state.values[guess.name]
-    return np.append(found.state.unknowns, value)
+    return Located(kind, 0.0, sample, solution, 0.0)
 
 
 def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:

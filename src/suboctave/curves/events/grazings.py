@@ -83,14 +83,14 @@ class Touch(BifurcationKind):
         """See `BifurcationKind.fraction`."""
         return self.share
 
-    def critical(self, found: Singular) -> None:
+    def critical(self, solution: Singular) -> None:
         """No multiplier need be critical."""
         return
 
-    def contact(self, found: Singular, name: str) -> GrazingContact:
+    def contact(self, solution: Singular, name: str) -> GrazingContact:
         """What grazes."""
-        assert isinstance(found, Grazing)
-        state = found.state
+        assert isinstance(solution, Grazing)
+        state = solution.state
         local = state.local(self.element)
         side = contact_side(local, self.index)
         verb = "touch" if self.maximum == (side > 0) else "lift off"
@@ -100,7 +100,7 @@ class Touch(BifurcationKind):
             self.element,
             local.element.label,
             levels(local)[self.index],
-            found.tau / state.rate,
+            solution.tau / state.rate,
             f"{'begins' if begins else 'ceases'} to {verb}",
             state.omega if name == "omega" else state.values[name],
         )
@@ -116,13 +116,14 @@ class Touch(BifurcationKind):
         """
         start = guess.state() if start is None else start
         augmentation = GrazingContactEquations.of(start, self.element, self.index)
-        found, iterations = solve(guess, start, augmentation, np.array([self._nearest(start)]))
-        return Grazing(found.state, None, 0.0, found.error, iterations, float(found.extra[0]) % (2.0 * math.pi))
+        evaluation, iterations = solve(guess, start, augmentation, np.array([self._nearest(start)]))
+        tau = float(evaluation.extra[0]) % (2.0 * math.pi)
+        return Grazing(evaluation.state, None, 0.0, evaluation.error, iterations, tau)
 
-    def rise(self, found: Grazing, name: str) -> Array:
+    def rise(self, solution: Grazing, name: str) -> Array:
         """Gradient of the extremum's height over the gap by coefficients and free parameter, shape (dimension + 1,)."""
-        state = found.state
-        value = basis_rows(state.basis.harmonics, found.tau)[0]
+        state = solution.state
+        value = basis_rows(state.basis.harmonics, solution.tau)[0]
         direction = read_direction(state, self.element)
         by_x = np.multiply.outer(value, direction).ravel()
         return np.append(by_x, -level_rate(state, self.element, self.index, name))
@@ -139,7 +140,7 @@ class Touch(BifurcationKind):
 
 def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:
     """Extrema that pass a gap between two neighbours, and whether they explain the numbers of crossings there."""
-    found, clear = [], True
+    passing, clear = [], True
     for p, q in zip(a.gaps, b.gaps, strict=True):
         pairs, count, before, after = passages(p.tau, p.value, p.curve, p.level, q.tau, q.value, q.curve, q.level)
         if before == after and not count:
@@ -152,9 +153,9 @@ def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:
             first, second = p.value[i] - p.level, q.value[j] - q.level
             share = float(first / (first - second)) if first != second else 0.5
             way = (q.tau[j] - p.tau[i] + math.pi) % (2.0 * math.pi) - math.pi
-            found.append(Touch(p.element, p.index, float(p.tau[i] + share * way), share, maximum, above))
+            passing.append(Touch(p.element, p.index, float(p.tau[i] + share * way), share, maximum, above))
         clear = clear and after - before == explained
-    return found, clear
+    return passing, clear
 
 
 def locate_grazings(
@@ -168,7 +169,7 @@ def locate_grazings(
     """
     if not a.gaps:
         return []
-    return sorted(_search(a, b, 0.0, 1.0, 0, options), key=lambda found: found.fraction)
+    return sorted(_search(a, b, 0.0, 1.0, 0, options), key=lambda item: item.fraction)
 
 
 def _search(
@@ -183,20 +184,20 @@ def _search(
     if not passing and (clear or depth >= _UNCLEAR):
         return []
     solved = [_solved(touch, a, b) for touch in passing]
-    found = [
+    grazings = [
         Located(touch, low + s[1] * (high - low), a if s[1] < 0.5 else b, s[0], 0.0)
         for touch, s in zip(passing, solved, strict=True)
         if s is not None
     ]
-    if clear and len(found) == len(passing) and not _repeated(found):
-        return found
+    if clear and len(grazings) == len(passing) and not _repeated(grazings):
+        return grazings
     middle = None
     if depth < _BISECTIONS:
         with suppress(ConvergenceError):
             middle = b.at(point_between(a.point, b.point, 0.5, options))
     if middle is None:
         width = 0.5 * abs(b.point.parameter - a.point.parameter)
-        return found + [
+        return grazings + [
             Located(touch, 0.5 * (low + high), b, None, width)
             for touch, s in zip(passing, solved, strict=True)
             if s is None
@@ -210,18 +211,17 @@ def _solved(touch: Touch, a: Sample, b: Sample) -> tuple[Grazing, float] | None:
     """The grazing and where between the two neighbours it lies; None if it was not found there."""
     try:
         guess = Guess.at(between(a.point, b.point, touch.share), b.point, 0.0)
-        found = touch.solve(guess)
+        solution = touch.solve(guess)
     except ConvergenceError:
         return None
-    value = found.state.omega if guess.name == "omega" else found.state.values[guess.name]
-    fraction = position(a.point, b.point, np.append(found.state.unknowns, value))
-    return None if fraction is None or not -0.05 <= fraction <= 1.05 else (found, fraction)
+    fraction = position(a.point, b.point, guess.vector(solution.state))
+    return None if fraction is None or not -0.05 <= fraction <= 1.05 else (solution, fraction)
 
 
-def _repeated(found: list[Located]) -> bool:
+def _repeated(located: list[Located]) -> bool:
     """True if two extrema led to the same grazing."""
     seen = []
-    for item in found:
+    for item in located:
         touch, solution = item.kind, item.solution
         assert isinstance(touch, Touch)
         assert isinstance(solution, Grazing)

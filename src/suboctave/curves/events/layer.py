@@ -52,19 +52,19 @@ _NEAR = 0.05
 _REACH = 0.01
 #: the same for one that is bracketed only
 _BRACKETED = 1e-3
-#: ways behind the grazing at which Newton's method starts
-_STARTS = (1e-10, 1e-8, 1e-6, 1e-4)
+#: ways behind the grazing at which Newton's method starts, the last four for layers as thin as rounding
+_STARTS = (1e-10, 1e-8, 1e-6, 1e-4, 1e-11, 3e-11, 5e-11, 2e-10)
 
 
-def layer_of(kind: BifurcationKind, found: Singular, guess: Guess) -> GrazingContact | None:
+def layer_of(kind: BifurcationKind, solution: Singular, guess: Guess) -> GrazingContact | None:
     """The grazing in whose layer a located bifurcation lies, None for a smooth one; `guess`: its start."""
-    if found.vectors is None:
+    if solution.vectors is None:
         return None
     best: GrazingContact | None = None
-    for touch, grazing, distance in _grazings_near(found.state, guess, young=True):
+    for touch, grazing, distance in _grazings_near(solution.state, guess, young=True):
         if best is not None and distance >= best.distance:
             continue
-        if _exponent(kind, found, grazing, guess) < _SQUARE_ROOT:
+        if _exponent(kind, solution, grazing, guess) < _SQUARE_ROOT:
             best = replace(touch.contact(grazing, guess.name), change="", distance=distance)
     return best
 
@@ -83,12 +83,12 @@ def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
     for touch, grazing, _ in _beside(guess, _REACH):
         for start in _starts(touch, grazing, guess):
             try:
-                found = kind.solve(start)
+                solution = kind.solve(start)
             except ConvergenceError:
                 continue
-            way = float(np.linalg.norm(_chord(grazing.state, found.state, guess)))
-            if kind.genuine(found, start) and way <= _REACH:
-                return found
+            way = float(np.linalg.norm(_chord(grazing.state, solution.state, guess)))
+            if kind.genuine(solution, start) and way <= _REACH:
+                return solution
     return None
 
 
@@ -97,10 +97,10 @@ def solve_or_behind(kind: BifurcationKind, guess: Guess) -> Singular:
     try:
         return kind.solve(guess)
     except ConvergenceError:
-        found = behind_grazing(kind, guess)
-        if found is None:
+        behind = behind_grazing(kind, guess)
+        if behind is None:
             raise
-        return found
+        return behind
 
 
 def unresolved(
@@ -123,21 +123,21 @@ def unresolved(
             state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
         except ConvergenceError:
             return abs(guess.parameter - contact.parameter)
-        value = state.omega if guess.name == "omega" else state.values[guess.name]
+        value = float(guess.vector(state)[-1])
     return abs(value - guess.parameter) / (basis.harmonics / fewer - 1.0)
 
 
-def behind_their_grazings(found: list[tuple[float, Bifurcation]]) -> list[Bifurcation]:
+def behind_their_grazings(located: list[tuple[float, Bifurcation]]) -> list[Bifurcation]:
     """What was located in a step, each with its place on the way from 0 to 1, in the order met.
 
     Where a bifurcation and the grazing that brings it about lie too close to tell, the contact tells the side.
     """
     result = []
-    for place, item in found:
+    for place, item in located:
         fraction, contact = place, item.contact
         grazings = [
             (at, other, other.contact)
-            for at, other in found
+            for at, other in located
             if contact is not None and item.kind not in CONTACT_KINDS and other.kind in CONTACT_KINDS
             if other.contact is not None and other.contact.element == contact.element and abs(at - place) < 0.1
         ]
@@ -177,7 +177,7 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     tangent = factor.solve(unit)
     tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
     for way in _STARTS:
-        u = _vector(state, guess) + way * tangent / weights
+        u = guess.vector(state) + way * tangent / weights
         omega, values = at_values(state.values, guess.name, float(u[-1]), state.omega)
         yield replace(guess, balance=state.balance, x=state.balance.shaped(u[:-1]), omega=omega, values=values)
 
@@ -217,26 +217,22 @@ def _weights(state: BalanceState, guess: Guess) -> Array:
     return np.append(weight / max(motion_size(state), np.finfo(float).tiny), 1.0 / guess.span)
 
 
-def _vector(state: BalanceState, guess: Guess) -> Array:
-    return np.append(state.unknowns, state.omega if guess.name == "omega" else state.values[guess.name])
-
-
 def _chord(a: BalanceState, b: BalanceState, guess: Guess) -> Array:
     """From one motion to another, scaled."""
-    return _weights(b, guess) * (_vector(b, guess) - _vector(a, guess))
+    return _weights(b, guess) * (guess.vector(b) - guess.vector(a))
 
 
-def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: Guess) -> float:
+def _exponent(kind: BifurcationKind, solution: Singular, grazing: Grazing, guess: Guess) -> float:
     """Exponent p of `|g - g_0| ~ s^p` between the grazing and the bifurcation, from a point at a quarter of the way."""
-    assert found.vectors is not None
-    chord = _chord(grazing.state, found.state, guess)
+    assert solution.vectors is not None
+    chord = _chord(grazing.state, solution.state, guess)
     length = float(np.linalg.norm(chord))
     if length < 1e-9:
         return 0.5
-    weights = _weights(found.state, guess)
-    start = 0.75 * _vector(grazing.state, guess) + 0.25 * _vector(found.state, guess)
+    weights = _weights(solution.state, guess)
+    start = 0.75 * guess.vector(grazing.state) + 0.25 * guess.vector(solution.state)
 
-    state = found.state
+    state = solution.state
     omega, values = at_values(state.values, guess.name, float(start[-1]), state.omega)
     begin = replace(guess, balance=state.balance, x=state.balance.shaped(start[:-1]), omega=omega, values=values)
     try:
@@ -248,7 +244,7 @@ def _exponent(kind: BifurcationKind, found: Singular, grazing: Grazing, guess: G
         return 0.5
     assert isinstance(solved, MotionEvaluation)
     # at the bifurcation itself g vanishes
-    g = [bordered(s, kind.operator, found.vectors, found.kappa).g for s in (grazing.state, solved.state)]
+    g = [bordered(s, kind.operator, solution.vectors, solution.kappa).g for s in (grazing.state, solved.state)]
     near, far = abs(g[1] - g[0]), abs(g[0])
     if near == 0.0 or far == 0.0:
         return 1.0

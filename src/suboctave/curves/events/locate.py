@@ -70,9 +70,9 @@ class Guess:
         """Value of the free parameter."""
         return self.omega if self.name == "omega" else self.values[self.name]
 
-    def parameter_at(self, state: BalanceState) -> float:
-        """The same at another motion."""
-        return state.omega if self.name == "omega" else state.values[self.name]
+    def vector(self, state: BalanceState) -> Array:
+        """Coefficients and free parameter of a motion, (dimension + 1,)."""
+        return np.append(state.unknowns, state.omega if self.name == "omega" else state.values[self.name])
 
     def problem(self, augmentation: Augmentation = PLAIN, force: float = 0.0) -> MotionProblem:
         """The motions in the free parameter that an augmentation singles out; force: unit of its equations."""
@@ -156,10 +156,10 @@ def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] =
     if vectors is not None:
         vectors = vectors.resized(guess.balance.basis, guess.balance.size, kind)
     own, extra = operator.started(begin, kind, guess.kappa, vectors, (guess.name,))
-    found, iterations = solve(guess, begin, own, extra)
-    equations = found.equations
+    evaluation, iterations = solve(guess, begin, own, extra)
+    equations = evaluation.equations
     assert isinstance(equations, SingularEquations)
-    return Singular(found.state, equations.bordered.vectors, equations.kappa, found.error, iterations)
+    return Singular(evaluation.state, equations.bordered.vectors, equations.kappa, evaluation.error, iterations)
 
 
 def locate_branch_point(guess: Guess) -> Singular:
@@ -172,11 +172,11 @@ def locate_branch_point(guess: Guess) -> Singular:
         point.
     """
     begin = guess.state()
-    found, iterations = solve(guess, begin, BranchPointUnfolded.of(begin, guess.name), np.zeros(1))
-    equations = found.equations
+    evaluation, iterations = solve(guess, begin, BranchPointUnfolded.of(begin, guess.name), np.zeros(1))
+    equations = evaluation.equations
     assert isinstance(equations, BranchPointEquations)
     if abs(equations.beta) > _UNFOLDING:
         raise ConvergenceError(
             f"no branch point: its unfolding is {equations.beta:.1e} (a broken symmetry leaves a ghost here)"
         )
-    return Singular(found.state, equations.bordered.vectors, 0.0, found.error, iterations)
+    return Singular(evaluation.state, equations.bordered.vectors, 0.0, evaluation.error, iterations)

@@ -58,15 +58,15 @@ class BifurcationKind(ABC):
         """Solve the bifurcation's system from a guess."""
         return self.formulation.locate(guess, self.operator)
 
-    def genuine(self, found: Singular, guess: Guess) -> bool:
+    def genuine(self, solution: Singular, guess: Guess) -> bool:
         """Whether a solution of the system really is of this kind."""
         return True
 
-    def critical(self, found: Singular) -> complex | None:
+    def critical(self, solution: Singular) -> complex | None:
         """The multiplier that lies on the unit circle at a solution, None if none need."""
         return {Kind.INTEGER: 1.0 + 0.0j, Kind.HALF: -1.0 + 0.0j}[self.operator]
 
-    def contact(self, found: Singular, name: str) -> GrazingContact | None:
+    def contact(self, solution: Singular, name: str) -> GrazingContact | None:
         """The contact that grazes at a solution, where the kind is that; `name` is the free parameter's."""
         return None
 
@@ -85,10 +85,10 @@ class LimitPoint(BifurcationKind):
         """See `BifurcationKind.fraction`."""
         return _zero(a.slope, b.slope)
 
-    def genuine(self, found: Singular, guess: Guess) -> bool:
+    def genuine(self, solution: Singular, guess: Guess) -> bool:
         """At a branch point R_X is singular, too, but R_p lies in its range."""
-        vectors = found.vectors or null_vectors(found.state, Kind.INTEGER)
-        return transversality(found.state, vectors, guess.name) > _TRANSVERSAL
+        vectors = solution.vectors or null_vectors(solution.state, Kind.INTEGER)
+        return transversality(solution.state, vectors, guess.name) > _TRANSVERSAL
 
 
 class BranchPoint(BifurcationKind):
@@ -168,14 +168,14 @@ class NeimarkSacker(BifurcationKind):
         mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
         return float(np.angle(mu)) * sample.state.rate / (2.0 * np.pi)
 
-    def genuine(self, found: Singular, guess: Guess) -> bool:
+    def genuine(self, solution: Singular, guess: Guess) -> bool:
         """At kappa = 0 or w0/2 every LP and PD solves the system as well: those are none."""
-        share = found.kappa / found.state.rate
+        share = solution.kappa / solution.state.rate
         return 1e-3 < share < 0.5 - 1e-3
 
-    def critical(self, found: Singular) -> complex:
+    def critical(self, solution: Singular) -> complex:
         """`exp(i kappa T)`."""
-        return cmath.exp(2j * cmath.pi * found.kappa / found.state.rate)
+        return cmath.exp(2j * cmath.pi * solution.kappa / solution.state.rate)
 
 
 BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER = (
@@ -203,12 +203,12 @@ def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     # several ask this of the same two
     if b.compared is not None and b.compared[0]() is a:
         return b.compared[1]
-    found: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
+    kinds: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
     # one multiplier passes +1 at a limit point or a branch point, or at both in one
-    accounted = len(found) - (len(found) > 1 and found[1] is LIMIT_POINT)
+    accounted = len(kinds) - (len(kinds) > 1 and kinds[1] is LIMIT_POINT)
     if NEIMARK_SACKER.beyond(a, b, accounted):
-        found.append(NEIMARK_SACKER)
-    b.compared = weakref.ref(a), tuple(found)
+        kinds.append(NEIMARK_SACKER)
+    b.compared = weakref.ref(a), tuple(kinds)
     return b.compared[1]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
-from suboctave.curves.augmentation import Augmentation, Equations, gradient_of
+from suboctave.curves.augmentation import Augmentation, Equations, Gradient, gradient_of
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
@@ -111,7 +111,7 @@ class BranchPointEquations(Equations):
         return np.array([b.g.real, float(b.left @ self._slope)]) / self.of.units
 
     @lazy
-    def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
+    def gradient(self) -> Gradient:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
         return gradient_of(self.bordered, self.names)
 

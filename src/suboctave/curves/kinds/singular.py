@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.bifurcation.tracked import kind_of
-from suboctave.curves.augmentation import Augmentation, Equations, gradient_of
+from suboctave.curves.augmentation import Augmentation, Equations, Gradient, gradient_of
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, rate_by_kappa
@@ -102,6 +102,7 @@ class SingularEquations(Equations):
         self.state = state
         self.kappa = kappa
         self.names = names
+        self._kept: Gradient | None = None
 
     @lazy
     def bordered(self) -> Bordered:
@@ -115,9 +116,9 @@ class SingularEquations(Equations):
         return np.array([g.real, g.imag] if self.of.extras else [g.real])
 
     @lazy
-    def gradient(self) -> tuple[np.ndarray, dict[str, complex], complex]:
+    def gradient(self) -> Gradient:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
-        return gradient_of(self.bordered, self.names)
+        return self._kept or gradient_of(self.bordered, self.names)
 
     def takes_over(self, other: Equations) -> bool:
         """Keep the gradient of a motion a rounding away, but for kappa: whether that vanishes is asked for."""
@@ -126,7 +127,7 @@ class SingularEquations(Equations):
             return False
         by_x, rates, _ = other.gradient
         by_kappa = -rate_by_kappa(self.state, b.kind, b.left, b.right)
-        self.__dict__["gradient"] = by_x, rates, by_kappa
+        self._kept = by_x, rates, by_kappa
         return True
 
     @property

@@ -40,10 +40,10 @@ def beyond_corner(
 
     `before`: the motions up to there, the last first.
     """
-    found = _grazing(last)
-    if found is None:
+    grazing = _grazing(last)
+    if grazing is None:
         return None
-    gap, at, height = found
+    gap, at, height = grazing
     gradient, label = _gradient(last, gap, at), last.state.local(gap.element).element.label
     coming = next((h for h in (_height(orbit, gap, at) for orbit in before) if abs(h) > _CLEAR * _size(last)), height)
     point, curve = last.point, last.curve
@@ -74,13 +74,13 @@ def _size(sample: Sample) -> float:
 
 def _grazing(sample: Sample) -> tuple[GapExtrema, int, float] | None:
     """The extremum nearest to a grazing: its gap, its index there, its height over the gap; None if all are far."""
-    found = []
+    near = []
     for gap in gap_extrema(sample.state):
         heights = gap.value - gap.level
         if len(heights):
             at = int(np.abs(heights).argmin())
-            found.append((gap, at, float(heights[at])))
-    nearest = min(found, key=lambda item: abs(item[2]), default=None)
+            near.append((gap, at, float(heights[at])))
+    nearest = min(near, key=lambda item: abs(item[2]), default=None)
     return nearest if nearest is not None and abs(nearest[2]) <= _GRAZES * _size(sample) else None
 
 

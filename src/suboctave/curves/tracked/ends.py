@@ -33,7 +33,7 @@ from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.subharmonic_part import NOTHING_LEFT, doubled_size, subharmonic_share
-from suboctave.curves.tracked.events import Found
+from suboctave.curves.tracked.events import LocatedEvent
 from suboctave.curves.tracked.nearest import nearest_point, zero_along
 from suboctave.curves.tracked.tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.errors import ConvergenceError
@@ -75,7 +75,7 @@ class End:
     """Why a curve ends, the event there where it was located, and whether the motion there is the curve's last."""
 
     reason: str
-    event: Found | None = None
+    event: LocatedEvent | None = None
     last: bool = False
 
     def way(self, a: Sample) -> float:
@@ -180,7 +180,7 @@ def _lead(a: Sample, b: Sample) -> Array | None:
     return result
 
 
-def _in_the_parent(parent: Found) -> End:
+def _in_the_parent(parent: LocatedEvent) -> End:
     where = parent.sample.where
     reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
     return End(reason, parent, last=True)
@@ -280,17 +280,17 @@ def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
     for augmentation in singled_out:
         try:
             curve = replace(a.curve, augmentation=augmentation())
-            found = _zero_beside(a, curve, a.state.x, DoubleMultiplier(order), newton, _AROUND)
+            event = _zero_beside(a, curve, a.state.x, DoubleMultiplier(order), newton, _AROUND)
             break
         except ConvergenceError as failure:
             failures.append(str(failure))
     else:
         return End(f"the curve ends in a {words} resonance beyond {a.where} ({failures[0]})")
-    where = found.sample.where
-    return End(f"the curve ends in a {words} resonance at {where}", found, last=True)
+    where = event.sample.where
+    return End(f"the curve ends in a {words} resonance at {where}", event, last=True)
 
 
-def _on_the_parent(a: Sample, newton: NewtonOptions) -> Found | None:
+def _on_the_parent(a: Sample, newton: NewtonOptions) -> LocatedEvent | None:
     """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
     basis = a.curve.balance.basis
     if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
@@ -307,15 +307,15 @@ def _on_the_parent(a: Sample, newton: NewtonOptions) -> Found | None:
 
 def _zero_beside(
     a: Sample, curve: MotionProblem, x: Array, test: CurveTest, newton: NewtonOptions, reach: float
-) -> Found:
+) -> LocatedEvent:
     """Where a test vanishes on the curve of another bifurcation beside a point; raises ConvergenceError."""
     u = curve.join(x, a.point.u[-len(curve.names) :], np.zeros(curve.augmentation.extras))
     start = nearest_point(curve, u, curve.weights(u, curve.size(u)), newton)
     *wider, last = _NEARER
     for share in wider:
         with suppress(ConvergenceError):
-            return Found(test, zero_along(start, test.value, newton, share * reach))
-    return Found(test, zero_along(start, test.value, newton, last * reach))
+            return LocatedEvent(test, zero_along(start, test.value, newton, share * reach))
+    return LocatedEvent(test, zero_along(start, test.value, newton, last * reach))
 
 
 def rebased(orbit: PeriodicOrbit, a: Sample) -> PeriodicOrbit:
@@ -338,7 +338,7 @@ def points_before(end: End, a: Sample, newton: NewtonOptions) -> list[Sample]:
     """
     if end.event is None or a.curve.augmentation.turning:
         return []
-    found: list[Sample] = []
+    points: list[Sample] = []
     last = end.event.sample.point.u[-2:]
     for _ in range(_APPROACHES):
         point, curve = a.point, a.curve
@@ -358,9 +358,9 @@ def points_before(end: End, a: Sample, newton: NewtonOptions) -> list[Sample]:
             break
         if not abs(_remaining(curve, b.point.u)) < abs(here) or resonant_between(a, b) is not None:
             break
-        found.append(b)
+        points.append(b)
         a = b
-    return found
+    return points
 
 
 def _remaining(curve: MotionProblem, u: Array) -> float:

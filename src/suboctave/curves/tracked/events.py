@@ -47,7 +47,7 @@ _LARGE = 30.0
 
 
 @dataclass(frozen=True)
-class Found:
+class LocatedEvent:
     """An event between two neighbours.
 
     test, sample, extreme
@@ -68,25 +68,25 @@ class Found:
 
 def events_between(
     a: Sample, b: Sample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
-) -> list[Found]:
+) -> list[LocatedEvent]:
     """Every event between two neighbours, in the order met.
 
     The first one's tests count in the discretisation it was found in, as on the step before: what changes sign there
     is not lost, nor found twice, if that of the second one's moves it across.
     """
-    found: list[Found] = []
+    events: list[LocatedEvent] = []
     for test in tests:
         try:
             both = [located(test, low, high, newton) for low, high in brackets(test, a, b, newton)]
-            found += [item for item in both if item is not None]
+            events += [item for item in both if item is not None]
         except ConvergenceError as failure:
             warnings.append(f"{test.kind} near {b.where}: {failure}")
     if b.curve.augmentation.turning:
-        found = _without_consequences(found, b.curve, SAME * (b.point.arclength - a.point.arclength))
-    return sorted(found, key=lambda item: item.sample.point.arclength)
+        events = _without_consequences(events, b.curve, SAME * (b.point.arclength - a.point.arclength))
+    return sorted(events, key=lambda item: item.sample.point.arclength)
 
 
-def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -> Found | None:
+def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -> LocatedEvent | None:
     """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
     own = test.within(low, high)
     same = same_discretisation(low, high, newton)
@@ -97,7 +97,7 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
         way = high.point.arclength - low.point.arclength
         slope = (stretch.values[1.0] - stretch.values[0.0]) / way
         sample = zero_along(same.point, own.value, newton, way, slope)
-        return Found(own, sample, extreme_of(own, -slope, sample), None, slope) if own.genuine(sample) else None
+        return LocatedEvent(own, sample, extreme_of(own, -slope, sample), None, slope) if own.genuine(sample) else None
     # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
     close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
     sample, slope = stretch.about(_ROUGH if close else 0.0)
@@ -107,10 +107,10 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
     sample = sample if finer else stretch.zero_from(sample, slope)
-    return Found(own, sample, extreme_of(own, before, sample), stretch if finer else None, slope)
+    return LocatedEvent(own, sample, extreme_of(own, before, sample), stretch if finer else None, slope)
 
 
-def _without_consequences(found: list[Found], curve: MotionProblem, near: float) -> list[Found]:
+def _without_consequences(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
     """Events along a curve of extrema without those that others bring about.
 
     Where the third parameter turns the extreme one does so too: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M.
@@ -118,14 +118,14 @@ def _without_consequences(found: list[Found], curve: MotionProblem, near: float)
     """
     extreme, last = curve.augmentation.turning, curve.names[-1]
 
-    def beside(item: Found, others: list[Found]) -> bool:
+    def beside(item: LocatedEvent, others: list[LocatedEvent]) -> bool:
         return any(abs(item.sample.point.arclength - o.sample.point.arclength) <= near for o in others)
 
-    turns = {name: [i for i in found if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
-    cusps = [item for item in found if isinstance(item.test, Cusp)]
+    turns = {name: [i for i in events if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
+    cusps = [item for item in events if isinstance(item.test, Cusp)]
     both = [item for item in turns[extreme] if beside(item, turns[last])]
     dropped = both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
-    return [item for item in found if not any(item is d for d in dropped)]
+    return [item for item in events if not any(item is d for d in dropped)]
 
 
 def brackets(test: CurveTest, a: Sample, b: Sample, newton: NewtonOptions) -> list[tuple[Sample, Sample]]:
@@ -275,13 +275,13 @@ class _Stretch:
         """Where the test vanishes, from a point beside, by secants; by Brent's method where these leave the way."""
         low, high = self.a.point.arclength, self.b.point.arclength
         try:
-            found = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
+            zero = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
         except ConvergenceError:
-            found = None
+            zero = None
         # tangents at the ends may be those of points a rounding away
         slack = _ROUGH * (high - low)
-        if found is not None and low - slack <= found.point.arclength <= high + slack:
-            return found
+        if zero is not None and low - slack <= zero.point.arclength <= high + slack:
+            return zero
         return self.zero(_RESOLVED)
 
     def zero(self, resolved: float) -> Sample:
@@ -304,8 +304,8 @@ class _Stretch:
             scaled = _even(first, last)
 
             def value(share: float, scaled: Callable[[float], float] = scaled) -> float:
-                found = self.value(share)
-                return 0.0 if abs(found) <= little else scaled(found)
+                here = self.value(share)
+                return 0.0 if abs(here) <= little else scaled(here)
 
             return float(scipy.optimize.brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
         raise ConvergenceError("the test does not change sign")
@@ -340,9 +340,9 @@ def extreme_of(test: CurveTest, before: float, at: Sample) -> str:
     return test.extreme(before, at) if isinstance(test, Extremum) else ""
 
 
-def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
+def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> LocatedEvent:
     """An event located again with the harmonics that events ask for."""
-    sample = found.sample
+    sample = event.sample
     for _ in range(6):
         curve, basis = sample.curve, _finer(sample)
         if basis is None:
@@ -360,31 +360,31 @@ def refined(found: Found, newton: NewtonOptions, warnings: list[str]) -> Found:
             start = nearest_point(finer, u, weights, newton, along, BEGINNING)
             start = replace(start, arclength=sample.point.arclength)
             near = Sample(start)
-            test = found.test.within(near, near)
-            sample = zero_along(start, test.value, newton, _BESIDE, found.slope, factor=start.factor)
+            test = event.test.within(near, near)
+            sample = zero_along(start, test.value, newton, _BESIDE, event.slope, factor=start.factor)
         except ConvergenceError as failure:
             words = (
-                f"{found.test.kind} near {curve.where(sample.point.u)} was located with "
+                f"{event.test.kind} near {curve.where(sample.point.u)} was located with "
                 f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
-            if sample is found.sample and found.rough is not None:
+            if sample is event.sample and event.rough is not None:
                 try:
-                    sample = found.rough.zero_from(sample, found.slope)
+                    sample = event.rough.zero_from(sample, event.slope)
                 except ConvergenceError as again:
                     words += f", nor more closely without these ({again})"
-                    found = replace(found, off=_ROUGH * found.rough.way)
+                    event = replace(event, off=_ROUGH * event.rough.way)
             warnings.append(words)
             break
-    return found if sample is found.sample else replace(found, sample=sample)
+    return event if sample is event.sample else replace(event, sample=sample)
 
 
-def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEvent:
+def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> TrackedEvent:
     """An event as users get it; `observe`: the DOF whose amplitude is reported."""
-    sample = found.sample
+    sample = event.sample
     curve, orbit = sample.curve, sample.orbit
-    name = getattr(found.test, "name", curve.names[1])
+    name = getattr(event.test, "name", curve.names[1])
     return TrackedEvent(
-        found.test.kind,
+        event.test.kind,
         orbit,
         method.along(sample.state),
         orbit.residual,
@@ -394,12 +394,12 @@ def as_event(found: Found, method: StabilityMethod, observe: int) -> TrackedEven
         sample.kappa,
         arclength=sample.point.arclength,
         # a parameter changes by no more than its range along a unit of arclength
-        uncertainty=found.off * curve.spans[curve.names.index(name)],
+        uncertainty=event.off * curve.spans[curve.names.index(name)],
         curve=curve.augmentation.name,
         names=curve.names,
-        extreme=found.extreme,
+        extreme=event.extreme,
         contact=_contact(sample),
-        isola=_isola(found),
+        isola=_isola(event),
         turning=curve.augmentation.turning,
     )
 
@@ -416,22 +416,22 @@ def _contact(sample: Sample) -> GrazingContact | None:
     return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
 
 
-def _isola(found: Found) -> str:
+def _isola(event: LocatedEvent) -> str:
     """What happens to branches at an extremum along a curve of limit points."""
-    curve, sample = found.sample.curve, found.sample
-    if not isinstance(found.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
+    curve, sample = event.sample.curve, event.sample
+    if not isinstance(event.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
         return ""
-    (beside,) = set(curve.names) - {found.test.name}
+    (beside,) = set(curve.names) - {event.test.name}
     base = curve.augmentation
     assert isinstance(base, SingularOperator)
-    extremal = LimitPointExtremal(base, beside, 1.0, found.test.name)
+    extremal = LimitPointExtremal(base, beside, 1.0, event.test.name)
     equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
     return equations.isola
 
 
 __all__ = [
     "SAME",
-    "Found",
+    "LocatedEvent",
     "as_event",
     "brackets",
     "events_between",

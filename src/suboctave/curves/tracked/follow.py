@@ -22,7 +22,7 @@ from suboctave.curves.subharmonic_part import keeps_subharmonics
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.corners import beyond_corner
 from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
-from suboctave.curves.tracked.events import Found, as_event, events_between, extreme_of, refined
+from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, extreme_of, refined
 from suboctave.curves.tracked.hidden import HiddenPairs, PairWatch
 from suboctave.curves.tracked.start import Box
 from suboctave.curves.tracked.tests import CurveTest, Extremum, PairCrossing, tests_of
@@ -62,7 +62,7 @@ class _Tracker(Driver):
         self.pairs = PairWatch(pairs, settings.newton)
         self.corners = 0
         #: how many points have known multipliers, and where none of these is the critical one
-        self.looked = 0
+        self.compared = 0
         self.doubtful: list[str] = []
         #: how many of the last of these in succession, with others that are large
         self.untold = 0
@@ -102,10 +102,10 @@ class _Tracker(Driver):
             return None
         self.corners += 1
         before = (p.orbit for p in reversed(self.trace.points))
-        found = beyond_corner(last, before, self.settings.newton)
-        if found is None:
+        corner = beyond_corner(last, before, self.settings.newton)
+        if corner is None:
             return None
-        point, note = found
+        point, note = corner
         if note not in self.trace.warnings:
             self.trace.warnings.append(note)
         if point is None or not self._inside(Sample(point)):
@@ -126,8 +126,8 @@ class _Tracker(Driver):
                 continue
             i = last.curve.index(test.name)
             if last.point.tangent[i] * beyond.tangent[i] < 0.0:
-                found = Found(test, last, extreme_of(test, test.value(last), last))
-                event = as_event(found, self.settings.stability, self.settings.observe)
+                turn = LocatedEvent(test, last, extreme_of(test, test.value(last), last))
+                event = as_event(turn, self.settings.stability, self.settings.observe)
                 width = abs(float(beyond.u[i] - last.point.u[i]))
                 events.append(replace(event, isola="", uncertainty=width, arclength=middle))
 
@@ -177,8 +177,8 @@ class _Tracker(Driver):
             return Ending(EndReason.LEFT_RANGE, a.where)
         new = self._smooth(a, left or new)
         warnings = self.trace.warnings
-        found = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
-        self._take(found + events_between(a, new, self.tests, settings.newton, warnings))
+        events = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
+        self._take(events + events_between(a, new, self.tests, settings.newton, warnings))
         self._add(new)
         self.previous = new
         self._report(point)
@@ -190,9 +190,9 @@ class _Tracker(Driver):
         self._take_end(new, ahead)
         return Ending(EndReason.MOTIONS_END, detail=ahead.reason)
 
-    def _take(self, found: list[Found]) -> None:
+    def _take(self, events: list[LocatedEvent]) -> None:
         settings, warnings = self.settings, self.trace.warnings
-        for item in found:
+        for item in events:
             better = refined(item, settings.newton, warnings)
             if not better.test.confirmed(better.sample):
                 where = better.sample.where
@@ -214,7 +214,7 @@ class _Tracker(Driver):
         evaluation = sample.evaluation
         known = evaluation.known_floquet is not None or sample.curve.steps % CRITICAL_EVERY == 0
         if known and evaluation.critical is not None:
-            self.looked += 1
+            self.compared += 1
             doubtful = evaluation.doubt > _DOUBTFUL
             if doubtful:
                 self.doubtful.append(sample.where)
@@ -224,9 +224,9 @@ class _Tracker(Driver):
     def _say_doubts(self) -> None:
         if self.doubtful:
             self.trace.warnings.append(
-                f"at {len(self.doubtful)} of {self.looked} points whose multipliers were computed the critical one is "
-                f"missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, or "
-                "the motion is so unstable that its multipliers cannot be told"
+                f"at {len(self.doubtful)} of {self.compared} points whose multipliers were computed the critical one "
+                f"is missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, "
+                "or the motion is so unstable that its multipliers cannot be told"
             )
 
     def _take_end(self, a: Sample, end: End) -> None:
@@ -237,13 +237,13 @@ class _Tracker(Driver):
             a = b
         arclength = a.point.arclength + end.way(a)
         if end.event is not None:
-            found = refined(end.event, settings.newton, self.trace.warnings)
-            item = as_event(found, settings.stability, settings.observe)
+            event = refined(end.event, settings.newton, self.trace.warnings)
+            item = as_event(event, settings.stability, settings.observe)
             curve = a.curve.augmentation.name
             self.trace.bifurcations.append(replace(item, arclength=arclength, curve=curve))
             if end.last:
                 orbit = rebased(item.orbit, a)
-                kappa = 0.5 * orbit.omega / orbit.basis.nu if found.test.kind == "R2" else 0.0
+                kappa = 0.5 * orbit.omega / orbit.basis.nu if event.test.kind == "R2" else 0.0
                 self.trace.points.append(TrackedPoint(orbit, None, arclength, 0, settings.stability, kappa))
 
     def _closing(self, a: Sample, back: Sample) -> Sample:
@@ -274,9 +274,9 @@ class _Tracker(Driver):
         """The first point between two neighbours at which the curve leaves the range of a parameter but the last, None
         if it stays in them; raises ConvergenceError where it leaves one but no solution is found on its bound.
         """
-        newton, found = self.settings.newton, None
+        newton, leaving = self.settings.newton, None
         for bounds in self.others:
-            end = b if found is None else found
+            end = b if leaving is None else leaving
             bound = bounds.passed(a.point, end.point)
             if bound is None:
                 landed = bounds.turned_beyond(a.point, end.point, newton)
@@ -287,8 +287,8 @@ class _Tracker(Driver):
                 if landed is None:
                     raise ConvergenceError(f"left the range after {a.where}; no solution was found exactly on its end")
             if landed is not None:
-                found = end if landed is end.point else Sample(landed)
-        return found
+                leaving = end if landed is end.point else Sample(landed)
+        return leaving
 
 
 def _other_bounds(curve: MotionProblem, box: Box) -> list[Bounds]:

@@ -21,7 +21,7 @@ from suboctave.continuation import NewtonOptions
 from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import SAME, Found, brackets, located, slowest_between
+from suboctave.curves.tracked.events import SAME, LocatedEvent, brackets, located, slowest_between
 from suboctave.curves.tracked.nearest import same_discretisation
 from suboctave.curves.tracked.tests import CurveTest, Extremum, PairCrossing
 from suboctave.errors import ConvergenceError
@@ -45,24 +45,24 @@ class HiddenPairs:
         #: the last points, with sign and logarithm of every test's function
         self._known: list[tuple[Sample, list[tuple[float, float]]]] = []
 
-    def passed(self, sample: Sample, warnings: list[str]) -> list[Found]:
+    def passed(self, sample: Sample, warnings: list[str]) -> list[LocatedEvent]:
         """Take in the next point; the pairs found in the step before the last."""
         if not self.tests:
             return []
         self._known = [*self._known[-3:], (sample, [test.smooth(sample) for test in self.tests])]
         return self._look(len(self._known) - 3, warnings)
 
-    def rest(self, warnings: list[str]) -> list[Found]:
+    def rest(self, warnings: list[str]) -> list[LocatedEvent]:
         """The pairs found in the last step: nothing comes after it."""
-        found = self._look(len(self._known) - 2, warnings) if self.tests else []
+        events = self._look(len(self._known) - 2, warnings) if self.tests else []
         self._known = []
-        return found
+        return events
 
-    def _look(self, at: int, warnings: list[str]) -> list[Found]:
+    def _look(self, at: int, warnings: list[str]) -> list[LocatedEvent]:
         """Pairs between the known points `at` and `at + 1`."""
         if at < 0 or len(self._known) < 3:
             return []
-        found: list[Found] = []
+        events: list[LocatedEvent] = []
         near = self._known
         samples = [sample for sample, _ in near]
         places = [sample.point.arclength for sample in samples]
@@ -71,16 +71,16 @@ class HiddenPairs:
         for i, test in enumerate(self.tests):
             functions = [known[i] for _, known in near]
             share = falling(places, _values(functions), at)
-            if share is None or self._told(test, samples, at):
+            if share is None or self._settled(test, samples, at):
                 continue
             try:
-                found += self._pair(test, samples, functions, at)
+                events += self._pair(test, samples, functions, at)
             except ConvergenceError as failure:
                 where = samples[at].curve.where(samples[at].point.u)
                 warnings.append(f"whether two {test.kind} lie after {where} could not be told: {failure}")
-        return found
+        return events
 
-    def _told(self, test: CurveTest, samples: list[Sample], at: int) -> bool:
+    def _settled(self, test: CurveTest, samples: list[Sample], at: int) -> bool:
         """Whether a parameter does not turn twice in a step for all that is known, or was seen to do so already."""
         if not isinstance(test, Extremum):
             return False
@@ -91,14 +91,14 @@ class HiddenPairs:
 
     def _pair(
         self, test: CurveTest, samples: list[Sample], functions: list[tuple[float, float]], at: int
-    ) -> list[Found]:
+    ) -> list[LocatedEvent]:
         """The two events of one test in a step that may hide them."""
         a, b = same_discretisation(samples[at], samples[at + 1], self.newton), samples[at + 1]
         places = [sample.point.arclength for sample in samples]
         start, way = places[at], places[at + 1] - places[at]
         inside, known, low = [a, b], list(functions), at
         for _ in range(_PROBES):
-            found = next(
+            suspect = next(
                 (
                     (i, share)
                     for i in range(low, low + len(inside) - 1)
@@ -106,9 +106,9 @@ class HiddenPairs:
                 ),
                 None,
             )
-            if found is None:
+            if suspect is None:
                 break
-            i, share = found
+            i, share = suspect
             place = places[i] + share * (places[i + 1] - places[i])
             middle = Sample(point_between(a.point, b.point, (place - start) / way, self.newton))
             before, after = inside[i - low], inside[i - low + 1]
@@ -122,9 +122,9 @@ class HiddenPairs:
         return []
 
 
-def _coincide(found: list[Found], way: float) -> bool:
+def _coincide(events: list[LocatedEvent], way: float) -> bool:
     """Whether two events are one place of a step: slopes jump at a corner, and may seem to turn to and fro in it."""
-    places = [item.sample.point.arclength for item in found]
+    places = [item.sample.point.arclength for item in events]
     return len(places) > 1 and max(places) - min(places) <= SAME * way
 
 
@@ -197,7 +197,7 @@ class PairWatch:
         self._waiting: list[Sample] = []
         self._stride = 1
 
-    def passed(self, sample: Sample, warnings: list[str]) -> list[Found]:
+    def passed(self, sample: Sample, warnings: list[str]) -> list[LocatedEvent]:
         """Take in the next point; pairs found before it."""
         if self.test is None:
             return []
@@ -206,14 +206,14 @@ class PairWatch:
             return self._hidden.passed(sample, warnings)
         return self._look(warnings) if len(self._waiting) > self._stride else []
 
-    def rest(self, warnings: list[str]) -> list[Found]:
+    def rest(self, warnings: list[str]) -> list[LocatedEvent]:
         """Pairs found before the last point."""
-        found = self._look(warnings) if len(self._waiting) > 1 else []
-        found += self._hidden.rest(warnings)
+        events = self._look(warnings) if len(self._waiting) > 1 else []
+        events += self._hidden.rest(warnings)
         self._waiting, self._stride = [], 1
-        return found
+        return events
 
-    def _look(self, warnings: list[str]) -> list[Found]:
+    def _look(self, warnings: list[str]) -> list[LocatedEvent]:
         """Pairs between the points that wait."""
         assert self.test is not None
         first, last = self._waiting[0], self._waiting[-1]
@@ -221,20 +221,20 @@ class PairWatch:
         least, most = sorted(_margin(sample) for sample in (first, last))
         same = self.test.smooth(first)[0] == self.test.smooth(last)[0]
         slow = same and most <= _SLOWLY * least and not self.test.changed(first, last)
-        looked = [last] if slow else self._waiting[1:]
-        found: list[Found] = []
-        for a, b in itertools.pairwise([first, *looked]):
-            found += self._hidden.passed(b, warnings)
+        chosen = [last] if slow else self._waiting[1:]
+        events: list[LocatedEvent] = []
+        for a, b in itertools.pairwise([first, *chosen]):
+            events += self._hidden.passed(b, warnings)
             if self.test.changed(a, b):
                 try:
                     item = located(self.test, a, b, self.newton)
                 except ConvergenceError as failure:
                     warnings.append(f"{self.test.kind} near {b.where}: {failure}")
                     continue
-                found += [] if item is None else [item]
+                events += [] if item is None else [item]
         self._stride = min(_STRIDE, 2 * steps) if slow else 1
         self._waiting = [last]
-        return found
+        return events
 
 
 def _margin(sample: Sample) -> float:

@@ -78,11 +78,11 @@ def null_row(curve: MotionProblem, u: np.ndarray, weights: np.ndarray) -> np.nda
     row = last
     for _ in range(2):
         factor = Factor.of(np.vstack((jacobian, row)))
-        found = factor.solve(last) if not factor.singular else None
-        if found is None or not np.isfinite(found).all():
+        direction = factor.solve(last) if not factor.singular else None
+        if direction is None or not np.isfinite(direction).all():
             break
-        size = length(found)
-        row = found / size
+        size = length(direction)
+        row = direction / size
         if size < _STEEP:
             return row
         # the second time the row is the direction itself, so that the matrix is as regular as can be
@@ -147,9 +147,9 @@ def zero_along(
         if abs(change) < _AT_ZERO:
             return sample
         if abs(change) < _STRAIGHT and abs(change * (s - old)) < _SURE:
-            found = _beside(last, -change, newton)
-            if found is not None:
-                return found
+            beside = _beside(last, -change, newton)
+            if beside is not None:
+                return beside
         # on the straight line through the last two, in the plane that belongs to the next
         guess = solved.u - change * (solved.u - before) / (s - old)
         s, old, value_old, before = s - change, s, value, solved.u

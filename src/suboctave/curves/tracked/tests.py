@@ -288,16 +288,16 @@ class PairCrossing(CurveTest):
             kappa -= change.real
             if abs(kappa - start) > _STRAYED * rate:
                 return growth
-        found = float(change.imag) * 2.0 * np.pi / rate
+        exponent = float(change.imag) * 2.0 * np.pi / rate
         # other multipliers, the critical one among them, have zeros of g as well
-        return found if abs(found - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
+        return exponent if abs(exponent - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
 
     def confirmed(self, sample: Sample) -> bool:
         """See `CurveTest.confirmed`."""
         assert self.target is not None
-        found, error = sample.evaluation.floquet, 0.0
-        if found.errors.size:
-            error = float(found.errors[np.abs(found.multipliers - self.target).argmin()])
+        result, error = sample.evaluation.floquet, 0.0
+        if result.errors.size:
+            error = float(result.errors[np.abs(result.multipliers - self.target).argmin()])
         pairs = sample.others[sample.others.imag > 0.0]
         return bool(pairs.size) and math.log(abs(_nearest_pair(sample, self.target))) ** 2 < (_ON_IT + error) ** 2
 
