@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import scipy
+
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import CurvePoint, point_between
 from suboctave.errors import ConvergenceError, InputError
@@ -40,33 +42,25 @@ def locate_zero(
     newton: NewtonOptions,
     tolerance: float = 1e-12,
 ) -> CurvePoint:
-    """The point between two neighbours at which a function that changes sign vanishes (Illinois false position).
+    """The point between two neighbours at which a function that changes sign vanishes (Brent's method).
 
     Raises
     ------
     ConvergenceError
         If a point in between cannot be solved for.
     """
-    if value_a == 0.0:
-        return a
-    if value_b == 0.0:
-        return b
-    low, high, f_low, f_high = 0.0, 1.0, value_a, value_b
-    best, kept = b, 0
-    for iteration in range(100):
-        share = f_low / (f_low - f_high)
-        # a guard against creeping: now and then halve the bracket
-        fraction = 0.5 * (low + high) if iteration % 8 == 7 else low + share * (high - low)
-        best = point_between(a, b, fraction, newton)
-        value = function(best)
-        if value == 0.0 or high - low < tolerance or abs(value) < 1e-14 * (abs(value_a) + abs(value_b)):
-            return best
-        if (value > 0.0) == (f_low > 0.0):
-            low, f_low = fraction, value
-            f_high, kept = (0.5 * f_high if kept == 1 else f_high), 1
-        else:
-            high, f_high = fraction, value
-            f_low, kept = (0.5 * f_low if kept == -1 else f_low), -1
-    if high - low < 1e-6:
-        return best
-    raise ConvergenceError(f"the zero between {a.curve.where(a.u)} and {b.curve.where(b.u)} could not be located")
+    points = {0.0: a, 1.0: b}
+    little = 1e-14 * (abs(value_a) + abs(value_b))
+    values = {0.0: value_a, 1.0: value_b}
+
+    def value(share: float) -> float:
+        if share not in points:
+            points[share] = point_between(a, b, share, newton)
+            values[share] = function(points[share])
+        return 0.0 if abs(values[share]) < little else values[share]
+
+    share, result = scipy.optimize.brentq(value, 0.0, 1.0, xtol=tolerance, full_output=True, disp=False)
+    if not result.converged:
+        raise ConvergenceError(f"the zero between {a.curve.where(a.u)} and {b.curve.where(b.u)} could not be located")
+    value(share)
+    return points[share]
