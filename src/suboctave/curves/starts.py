@@ -17,7 +17,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
@@ -27,7 +27,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.march import March
 from suboctave.continuation.newton import NewtonOptions, Solved, correct
 from suboctave.continuation.point import CurvePoint, make_point, solve_at
-from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.continuation.problem import Array
 from suboctave.continuation.stepping import SteppingOptions
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError, InputError
@@ -269,34 +269,43 @@ class _HeldEvaluation(MotionEvaluation):
         return size / max(self.state.force_scale(), np.finfo(float).tiny)
 
 
-class _Held:
+@dataclass(eq=False, repr=False)
+class _Held(MotionProblem):
     """Motions of a system that a heavily damped linear structure holds, less and less: share 0 to 1 of its own forces.
 
-    B is `omega^2 (1 + i k / nu) m` at the multiple k omega / nu, m the masses that the DOFs show.
+    B is `omega^2 (1 + i k / nu) m` at the multiple k omega / nu, m the masses that the DOFs show. The share is the free
+    parameter, in place of the curve's own, which keeps its `value`.
     """
 
-    def __init__(self, curve: MotionProblem, value: float) -> None:
-        self.curve = curve
-        self.value = value
-        balance = curve.balance
-        x, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
-        self.rest = balance.at(x, omega, values)
-        if self.rest.compliance is None:
-            multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
-            blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
-            blocks[:] = np.diag(omega**2 * balance.scales()[0] ** 2)
-            self.hold = self.rest.block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None])
-        else:
-            # a condensed structure is known by its compliance alone
-            self.hold = self.rest.linear_jacobian
+    value: float = 0.0
 
-    @property
-    def parameter(self) -> int:
-        return self.curve.parameter
+    @classmethod
+    def of(cls, curve: MotionProblem, value: float) -> _Held:
+        """The held motions of a response curve, at a value of its parameter."""
+        return cls(**{**{f.name: getattr(curve, f.name) for f in fields(curve)}, "spans": (1.0,), "value": value})
+
+    @lazy
+    def rest(self) -> BalanceState:
+        """The system at rest."""
+        zero = np.zeros((self.balance.basis.size, self.balance.size))
+        x, omega, values = self.split(self.join(zero, self.value))
+        return self.balance.at(x, omega, values)
+
+    @lazy
+    def hold(self) -> Array:
+        """B."""
+        balance, rest = self.balance, self.rest
+        if rest.compliance is not None:
+            # a condensed structure is known by its compliance alone
+            return rest.linear_jacobian
+        multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
+        blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
+        blocks[:] = np.diag(rest.omega**2 * balance.scales()[0] ** 2)
+        return rest.block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None])
 
     def first(self) -> Array:
         """The held motion without a share of its own: linear."""
-        load = -self.evaluate(self.curve.join(self.rest.x, 0.0)).residual
+        load = -self.evaluate(self.join(self.rest.x, 0.0)).residual
         try:
             return np.append(np.linalg.solve(self.hold, load), 0.0)
         except np.linalg.LinAlgError:
@@ -306,38 +315,15 @@ class _Held:
         """u as one of the response curve."""
         return np.append(u[:-1], self.value)
 
-    def evaluate(self, u: Array) -> Evaluation:
-        x, omega, values = self.curve.split(self.motion(u))
-        state = self.curve.balance.at(x, omega, values)
-        return _HeldEvaluation(self.curve, state, float(u[-1]), self.hold)
-
-    def size(self, u: Array) -> float:
-        return self.curve.size(u)
-
-    def weights(self, u: Array, largest: float) -> Array:
-        weights = self.curve.weights(u, largest)
-        weights[-1] = 1.0
-        return weights
-
-    def adapted(self, u: Array, evaluation: Evaluation) -> Curve:
-        adapted = self.curve.adapted(self.motion(u), evaluation)
-        if adapted is self.curve:
-            return self
-        assert isinstance(adapted, MotionProblem)
-        return _Held(adapted, self.value)
-
-    def transfer(self, u: Array, origin: Curve) -> Array:
-        assert isinstance(origin, _Held)
-        return self.curve.transfer(u, origin.curve)
+    def evaluate(self, u: Array) -> _HeldEvaluation:
+        x, omega, values = self.split(self.motion(u))
+        return _HeldEvaluation(self, self.balance.at(x, omega, values), float(u[-1]), self.hold)
 
     def images(self, u: Array) -> list[Array]:
         return [u]
 
-    def unwrapped(self, u: Array, near: Array) -> Array:
-        return u
-
     def where(self, u: Array) -> str:
-        return f"{u[-1]:.1%} of the system's own forces at {self.curve.name} = {self.value:.6g}"
+        return f"{u[-1]:.1%} of the system's own forces at {self.name} = {self.value:.6g}"
 
 
 def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tuple[MotionProblem, Array]:
@@ -348,10 +334,10 @@ def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tupl
     ConvergenceError
         If the path does not lead to the system itself.
     """
-    problem = _Held(curve, value)
+    problem = _Held.of(curve, value)
     u = problem.first()
     # the size of this motion, not of a linear response that a free body or a resonance makes large
-    problem = _Held(_like(curve, curve.adaptive, curve.size(u)), value)
+    problem = _Held.of(_like(curve, curve.adaptive, curve.size(u)), value)
     point = make_point(solve_at(problem, u, 0.0, newton), problem, None, 0.0)
     # where the orientation changes a step may have gone over to another path
     march = March(point, 1.0, (0.0, 1.0), newton, _STEPPING, lambda a, b: a.orientation == b.orientation)
@@ -359,7 +345,7 @@ def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tupl
     (last,) = deque(march, maxlen=1)
     assert isinstance(last.curve, _Held)
     if abs(last.parameter - 1.0) <= 1e-12:
-        return last.curve.curve, last.curve.motion(last.u)
+        return curve.with_balance(last.curve.balance), last.curve.motion(last.u)
     if last.curve.size(last.u) > _UNBOUNDED * curve.size(u):
         raise ConvergenceError(
             f"the motion grows without bound at {last.curve.where(last.u)}: neither damping nor restoring forces hold "
