@@ -103,7 +103,6 @@ class MotionEvaluation:
         return out
 
     def takes_over(self, other: Evaluation) -> bool:
-        """See `Evaluation`."""
         assert isinstance(other, MotionEvaluation)
         return self.equations.takes_over(other.equations)
 
@@ -252,7 +251,6 @@ class MotionProblem:
         return self.join(state.x, np.array([state.omega if n == "omega" else state.values[n] for n in self.names]))
 
     def evaluate(self, u: Array) -> MotionEvaluation:
-        """See `Curve.evaluate`."""
         if not math.isfinite(u.dot(u)):
             raise ConvergenceError("the iteration left the range of numbers")
         x, omega, values = self.split(u)
@@ -265,7 +263,6 @@ class MotionProblem:
         return length(self._weight * u[: self.balance.dimension])
 
     def weights(self, u: Array, largest: float) -> Array:
-        """See `Curve.weights`."""
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
         weights, n = np.empty(len(u)), self.balance.dimension
         np.divide(self._weight, size, out=weights[:n])
@@ -328,7 +325,6 @@ class MotionProblem:
         return self if basis == self.balance.basis else self.with_balance(self._in_basis(basis))
 
     def transfer(self, u: Array, origin: Curve) -> Array:
-        """See `Curve.transfer`."""
         if origin is self:
             return u
         assert isinstance(origin, MotionProblem)
@@ -355,7 +351,6 @@ class MotionProblem:
         return shifted
 
     def unwrapped(self, u: Array, near: Array) -> Array:
-        """See `Curve.unwrapped`."""
         if not self.augmentation.extras:
             return u
         own = slice(self.balance.dimension, -len(self.names))

@@ -75,7 +75,6 @@ class ExtendedSystem(Formulation):
     name: ClassVar[str] = "extended"
 
     def operator(self, kind: Kind) -> type[SingularOperator]:
-        """See `Formulation.operator`."""
         return ExtendedOperator
 
 
@@ -102,18 +101,15 @@ class Alcorta2019(Formulation):
             raise InputError(f"unknown test function {self.test!r}{suggest(str(self.test), DOUBLING_TESTS)}")
 
     def operator(self, kind: Kind) -> type[SingularOperator]:
-        """See `Formulation.operator`."""
         if kind is Kind.HALF:
             return PublishedDoubling
         return ExtendedOperator if kind is Kind.INTEGER else SingularOperator
 
     def locate(self, guess: Guess, kind: Kind) -> Singular:
-        """See `Formulation.locate`."""
         return locate_doubling(guess) if kind is Kind.HALF else super().locate(guess, kind)
 
     @property
     def doubling_test(self) -> str | None:
-        """See `Formulation.doubling_test`."""
         return self.test
 
 

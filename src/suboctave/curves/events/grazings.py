@@ -74,13 +74,11 @@ class Touch(BifurcationKind):
         self.above = above
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """See `BifurcationKind.changed`."""
         return any(
             (t.element, t.index, t.maximum) == (self.element, self.index, self.maximum) for t in touches(a, b)[0]
         )
 
     def fraction(self, a: Sample, b: Sample) -> float:
-        """See `BifurcationKind.fraction`."""
         return self.share
 
     def critical(self, solution: Singular) -> None:

@@ -78,11 +78,9 @@ class LimitPoint(BifurcationKind):
     operator = Kind.INTEGER
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """See `BifurcationKind.changed`."""
         return (a.slope > 0.0) != (b.slope > 0.0)
 
     def fraction(self, a: Sample, b: Sample) -> float:
-        """See `BifurcationKind.fraction`."""
         return _zero(a.slope, b.slope)
 
     def genuine(self, solution: Singular, guess: Guess) -> bool:
@@ -98,15 +96,12 @@ class BranchPoint(BifurcationKind):
     operator = Kind.INTEGER
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """See `BifurcationKind.changed`."""
         return (a.point.orientation > 0.0) != (b.point.orientation > 0.0)
 
     def fraction(self, a: Sample, b: Sample) -> float:
-        """See `BifurcationKind.fraction`."""
         return _zero(_nearest(a, 1.0), _nearest(b, 1.0))
 
     def solve(self, guess: Guess) -> Singular:
-        """See `BifurcationKind.solve`."""
         return locate_branch_point(guess)
 
 
@@ -117,11 +112,9 @@ class PeriodDoubling(BifurcationKind):
     operator = Kind.HALF
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """See `BifurcationKind.changed`."""
         return (a.half_sign > 0.0) != (b.half_sign > 0.0)
 
     def fraction(self, a: Sample, b: Sample) -> float:
-        """See `BifurcationKind.fraction`."""
         return _zero(_nearest(a, -1.0), _nearest(b, -1.0))
 
 
@@ -156,7 +149,6 @@ class NeimarkSacker(BifurcationKind):
         return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))
 
     def fraction(self, a: Sample, b: Sample) -> float:
-        """See `BifurcationKind.fraction`."""
         pair = self._pair(a, b)
         return 0.5 if pair is None else _zero(abs(pair[0]) - 1.0, abs(pair[1]) - 1.0)
 

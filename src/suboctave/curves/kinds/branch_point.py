@@ -51,7 +51,6 @@ class BranchPointUnfolded(Augmentation):
     def through(
         cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]
     ) -> tuple[BranchPointUnfolded, Array]:
-        """See `Augmentation.through`."""
         return cls.of(state, names[0]), np.zeros(1)
 
     def renewed(self, state: BalanceState, borders: NullVectors) -> BranchPointUnfolded:
@@ -63,15 +62,12 @@ class BranchPointUnfolded(Augmentation):
     extras = 1
 
     def multiplier(self, rate: float, extra: Array) -> complex:
-        """See `Augmentation.multiplier`."""
         return 1.0 + 0.0j
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> BranchPointEquations:
-        """See `Augmentation.at`."""
         return BranchPointEquations(self, state, float(extra[0]), names)
 
     def resized(self, basis: HarmonicBasis, size: int) -> BranchPointUnfolded:
-        """See `Augmentation.resized`."""
         return replace(self, borders=self.borders.resized(basis, size, Kind.INTEGER))
 
 
@@ -106,7 +102,6 @@ class BranchPointEquations(Equations):
 
     @lazy
     def values(self) -> Array:
-        """See `Equations.values`."""
         b = self.bordered
         return np.array([b.g.real, float(b.left @ self._slope)]) / self.of.units
 
@@ -129,7 +124,6 @@ class BranchPointEquations(Equations):
         return np.array([top / self.of.units[0], below / self.of.units[1]])
 
     def renewed(self) -> BranchPointUnfolded:
-        """See `Equations.renewed`."""
         return self.of.renewed(self.state, self.bordered.vectors)
 
 

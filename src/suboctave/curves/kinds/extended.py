@@ -70,30 +70,25 @@ class ExtendedOperator(SingularOperator):
         return vector
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> ExtendedEquations:
-        """See `Augmentation.at`."""
         return ExtendedEquations(self, state, extra, names)
 
     def spans(self, rate: float) -> Array:
-        """See `Augmentation.spans`."""
         spans = np.full(self.extras, _SPAN)
         if self.kind is Kind.FREE:
             spans[0] = rate
         return spans
 
     def resized(self, basis: HarmonicBasis, size: int) -> ExtendedOperator:
-        """See `Augmentation.resized`."""
         borders = self.borders.resized(basis, size, self.kind)
         return replace(self, borders=borders, rows=len(borders.right))
 
     def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
-        """See `Augmentation.carried`."""
         phi = self.phi(extra)
         vectors = NullVectors(phi, phi).resized(basis, size, self.kind)
         kappa = float(extra[0]) if self.kind is Kind.FREE else 0.0
         return replace(self, rows=len(vectors.right)).packed(vectors.right * np.linalg.norm(phi), kappa)
 
     def shifted(self, extra: Array, angle: float) -> Array:
-        """See `Augmentation.shifted`."""
         if angle == 0.0:
             return extra
         kappa, phi = float(extra[0]), self.phi(extra).reshape(-1, self.size)
@@ -128,7 +123,6 @@ class ExtendedEquations(SingularEquations):
 
     @lazy
     def values(self) -> Array:
-        """See `Equations.values`."""
         product = self._operator[0] @ self.phi
         length = 0.5 * (float(np.vdot(self.phi, self.phi).real) - 1.0)
         if not self._complex:
@@ -138,7 +132,6 @@ class ExtendedEquations(SingularEquations):
 
     @property
     def rows(self) -> Array:
-        """See `Equations.rows`."""
         state, kind = self.state, self.of.kind
         matrix, scale = self._operator
         n, m = state.balance.dimension, len(self.phi)
@@ -166,7 +159,6 @@ class ExtendedEquations(SingularEquations):
         return out
 
     def renewed(self) -> ExtendedOperator:
-        """See `Equations.renewed`."""
         unit = self.phi / np.linalg.norm(self.phi)
         # the left vector serves the tests along the curve
         return replace(self.of, borders=NullVectors(unit, self.bordered.vectors.left), unit=self.state.omega**2)
@@ -189,17 +181,14 @@ class PublishedDoubling(SingularOperator):
         vectors: NullVectors | None = None,
         names: tuple[str, ...] = ("omega",),
     ) -> tuple[PublishedDoubling, Array]:
-        """See `SingularOperator.started`."""
         waves = null_vectors(state, Kind.FREE, 0.5 * state.rate)
         borders = null_vectors(state, Kind.HALF) if vectors is None else vectors
         return cls(Kind.HALF, borders, state.omega**2, waves), np.zeros(0)
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> PublishedEquations:
-        """See `Augmentation.at`."""
         return PublishedEquations(self, state, 0.0, names)
 
     def resized(self, basis: HarmonicBasis, size: int) -> PublishedDoubling:
-        """See `Augmentation.resized`."""
         assert self.waves is not None
         waves = self.waves.resized(basis, size, Kind.FREE)
         return replace(self, borders=self.borders.resized(basis, size, self.kind), waves=waves)
@@ -223,19 +212,16 @@ class PublishedEquations(SingularEquations):
 
     @lazy
     def values(self) -> Array:
-        """See `Equations.values`."""
         return np.array([(self.turn.conjugate() * self.published.g).real / self.of.unit])
 
     @property
     def rows(self) -> Array:
-        """See `Equations.rows`."""
         by_x, rates = _slopes(self.published, self.names)
         whole = np.concatenate((by_x, [rates[name] for name in self.names]))
         row: Array = (self.turn.conjugate() * whole).real / self.of.unit
         return row[None, :]
 
     def renewed(self) -> PublishedDoubling:
-        """See `Equations.renewed`."""
         state, waves = self.state, self.published.vectors
         turn = _turn(bordered(state, Kind.FREE, waves, 0.5 * state.rate), self.names[0])
         return replace(self.of, borders=self.bordered.vectors, unit=state.omega**2, waves=waves, turn=turn)

@@ -62,23 +62,18 @@ class Extremal(Augmentation):
 
     @property
     def own(self) -> Augmentation:
-        """See `Augmentation.own`."""
         return self.base
 
     def multiplier(self, rate: float, extra: Array) -> complex | None:
-        """See `Augmentation.multiplier`."""
         return self.base.multiplier(rate, extra)
 
     def spans(self, rate: float) -> Array:
-        """See `Augmentation.spans`."""
         return self.base.spans(rate)
 
     def shifted(self, extra: Array, angle: float) -> Array:
-        """See `Augmentation.shifted`."""
         return self.base.shifted(extra, angle)
 
     def unwrapped(self, extra: Array, near: Array) -> Array:
-        """See `Augmentation.unwrapped`."""
         return self.base.unwrapped(extra, near)
 
     @abstractmethod
@@ -99,7 +94,6 @@ class ExtremalEquations(Equations):
 
     @property
     def own(self) -> Equations:
-        """See `Equations.own`."""
         return self.base
 
     @property
@@ -123,17 +117,13 @@ class LimitPointExtremal(Extremal):
     turning: str = ""
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> LimitPointExtremalEquations:
-        """See `Augmentation.at`."""
         return LimitPointExtremalEquations(self, state, extra, names)
 
     def resized(self, basis: HarmonicBasis, size: int) -> LimitPointExtremal:
-        """See `Augmentation.resized`."""
         return replace(self, base=self.base.resized(basis, size))
 
 
 class LimitPointExtremalEquations(ExtremalEquations):
-    """See `LimitPointExtremal`."""
-
     of: LimitPointExtremal
     base: SingularEquations
 
@@ -146,12 +136,10 @@ class LimitPointExtremalEquations(ExtremalEquations):
 
     @property
     def values(self) -> Array:
-        """See `Equations.values`."""
         return self._both.values
 
     @lazy
     def rows(self) -> Array:
-        """See `Equations.rows`."""
         return np.delete(self._both.rows, self.state.balance.dimension, axis=1)
 
     @lazy
@@ -171,12 +159,10 @@ class LimitPointExtremalEquations(ExtremalEquations):
 
     @property
     def isola(self) -> str:
-        """See `isola_type`."""
         return isola_type(self.form)
 
     @property
     def curvature(self) -> float:
-        """See `ExtremalEquations.curvature`."""
         (c, b), (_, a) = self.form
         # along the curve, with t = b phi - c v: there psi.R''[t, phi] = 0
         bent = c * (a * c - b * b)
@@ -184,7 +170,6 @@ class LimitPointExtremalEquations(ExtremalEquations):
         return -bent * slope
 
     def renewed(self) -> LimitPointExtremal:
-        """See `Equations.renewed`."""
         unit = self.of.unit * self.state.omega**2 / self.of.base.unit
         return replace(self.of, base=self.base.renewed(), unit=unit)
 

@@ -66,11 +66,9 @@ class BorderedExtremal(Extremal):
         return replace(own, right=vt[-1], left=u[:, -1])
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> BorderedExtremalEquations:
-        """See `Augmentation.at`."""
         return BorderedExtremalEquations(self, state, extra, names)
 
     def resized(self, basis: HarmonicBasis, size: int) -> BorderedExtremal:
-        """See `Augmentation.resized`."""
         rest = self.base.extras + 1
         vectors = (_with_harmonics(v, basis.size * size, rest) for v in (self.right, self.left))
         right, left = (v / length(v) for v in vectors)
@@ -86,8 +84,6 @@ def _with_harmonics(vector: Array, count: int, rest: int) -> Array:
 
 
 class BorderedExtremalEquations(ExtremalEquations):
-    """See `BorderedExtremal`."""
-
     of: BorderedExtremal
 
     @lazy
@@ -146,7 +142,6 @@ class BorderedExtremalEquations(ExtremalEquations):
 
     @lazy
     def values(self) -> Array:
-        """See `Equations.values`."""
         q, r = self._directions
         m = len(r)
         top = self.state.residual if self.addition is None else self.state.residual + self.addition
@@ -183,7 +178,6 @@ class BorderedExtremalEquations(ExtremalEquations):
 
     @property
     def curvature(self) -> float:
-        """See `ExtremalEquations.curvature`."""
         v, _, w = self._solved
         n = len(v) - 1
         names = n + np.arange(len(self.names))
@@ -193,7 +187,6 @@ class BorderedExtremalEquations(ExtremalEquations):
         return along * float(w @ self._whole[:, names[self.names.index(self.of.turning)]])
 
     def renewed(self) -> BorderedExtremal:
-        """See `Equations.renewed`."""
         v, _, w = self._solved
         state = self.state
         weight = state.balance.per_unknown(state.balance.scales()[0])

@@ -50,7 +50,6 @@ class GrazingContactEquations(Augmentation):
     extras = 1
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> GrazingEquations:
-        """See `Augmentation.at`."""
         return GrazingEquations(self, state, float(extra[0]), names)
 
     def spans(self, rate: float) -> Array:
@@ -58,7 +57,6 @@ class GrazingContactEquations(Augmentation):
         return np.array([2.0 * math.pi])
 
     def shifted(self, extra: Array, angle: float) -> Array:
-        """See `Augmentation.shifted`."""
         return extra - angle
 
     def unwrapped(self, extra: Array, near: Array) -> Array:
@@ -90,14 +88,12 @@ class GrazingEquations(Equations):
 
     @lazy
     def values(self) -> Array:
-        """See `Equations.values`."""
         gap = levels(self.state.local(self.of.element))[self.of.index]
         value, slope, _ = self.derivatives
         return np.array([value - gap, slope]) / self.of.unit
 
     @property
     def rows(self) -> Array:
-        """See `Equations.rows`."""
         direction, first, second, _ = self._rows
         _, slope, curve = self.derivatives
         gap = [-level_rate(self.state, self.of.element, self.of.index, name) for name in self.names]
@@ -106,7 +102,6 @@ class GrazingEquations(Equations):
         return np.array([above, level]) / self.of.unit
 
     def renewed(self) -> GrazingContactEquations:
-        """See `Equations.renewed`."""
         return GrazingContactEquations.of(self.state, self.of.element, self.of.index)
 
 

@@ -42,7 +42,6 @@ class PhaseResonance(Augmentation):
         return cls(Fraction(order, nu), item.context["observe"], driven).at(state, extra, names).renewed(), extra
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> PhaseEquations:
-        """See `Augmentation.at`."""
         return PhaseEquations(self, state, names)
 
 
@@ -64,17 +63,14 @@ class PhaseEquations(Equations):
 
     @property
     def values(self) -> Array:
-        """See `Equations.values`."""
         return np.array([self.product.real / self.of.unit])
 
     @property
     def rows(self) -> Array:
-        """See `Equations.rows`."""
         by_x = np.zeros_like(self.state.x)
         by_x[self.at : self.at + 2] = np.outer((self.by_z.real, self.by_z.imag), self.reads)
         along = [(self.by_f * self._conjugate(self.state.load_by(name))).real for name in self.names]
         return np.append(by_x.ravel(), along)[None] / self.of.unit
 
     def renewed(self) -> PhaseResonance:
-        """See `Equations.renewed`."""
         return replace(self.of, unit=abs(self.product) or 1.0)

@@ -18,7 +18,6 @@ class Plain(Augmentation):
     name = "response"
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> NoEquations:
-        """See `Augmentation.at`."""
         return NoEquations(state, self)
 
 
@@ -35,7 +34,6 @@ class NoEquations(Equations):
         self.of = of
 
     def renewed(self) -> Plain:
-        """See `Equations.renewed`."""
         return self.of
 
 

@@ -59,7 +59,6 @@ class SingularOperator(Augmentation):
 
     @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[SingularOperator, Array]:
-        """See `Augmentation.through`."""
         kind, kappa = OPERATORS[kind_of(item)], 0.0
         if kind is Kind.FREE:
             kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
@@ -76,11 +75,9 @@ class SingularOperator(Augmentation):
         return 1 if self.kind is Kind.FREE else 0
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> SingularEquations:
-        """See `Augmentation.at`."""
         return SingularEquations(self, state, float(extra[0]) if self.extras else 0.0, names)
 
     def multiplier(self, rate: float, extra: Array) -> complex:
-        """See `Augmentation.multiplier`."""
         if self.kind is Kind.FREE:
             return cmath.exp(2j * cmath.pi * float(extra[0]) / rate)
         return 1.0 + 0.0j if self.kind is Kind.INTEGER else -1.0 + 0.0j
@@ -90,7 +87,6 @@ class SingularOperator(Augmentation):
         return np.full(self.extras, rate)
 
     def resized(self, basis: HarmonicBasis, size: int) -> SingularOperator:
-        """See `Augmentation.resized`."""
         return replace(self, borders=self.borders.resized(basis, size, self.kind))
 
 
@@ -111,7 +107,6 @@ class SingularEquations(Equations):
 
     @lazy
     def values(self) -> Array:
-        """See `Equations.values`."""
         g = self.bordered.g / self.of.unit
         return np.array([g.real, g.imag] if self.of.extras else [g.real])
 
@@ -132,7 +127,6 @@ class SingularEquations(Equations):
 
     @property
     def rows(self) -> Array:
-        """See `Equations.rows`."""
         by_x, rates, by_kappa = self.gradient
         if not self.of.extras:
             return np.append(by_x.real, [rates[name].real for name in self.names])[None] / self.of.unit
@@ -140,7 +134,6 @@ class SingularEquations(Equations):
         return np.array([whole.real, whole.imag])
 
     def renewed(self) -> SingularOperator:
-        """See `Equations.renewed`."""
         return SingularOperator(self.of.kind, self.bordered.vectors, self.state.omega**2)
 
 

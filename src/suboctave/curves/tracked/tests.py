@@ -94,7 +94,6 @@ class Extremum(CurveTest):
     kind = "extremum"
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`."""
         slope = sample.slopes[self.name]
         return slope / sample.bend if self._beside_cusps(sample) else slope
 
@@ -127,7 +126,6 @@ class Cusp(CurveTest):
     kind = "CP"
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`."""
         return sample.bend
 
 
@@ -138,12 +136,10 @@ class GeneralisedDoubling(CurveTest):
     kind = "GPD"
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`."""
         # at a fold-flip c3 passes through infinity, and det J_0 through zero
         return sample.cubic * sample.sign(Kind.INTEGER)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        """See `CurveTest.smooth`."""
         sign, size = super().smooth(sample)
         return sign, size + sample.determinant(Kind.INTEGER)[1]
 
@@ -160,7 +156,6 @@ class DoubleMultiplier(CurveTest):
         return f"R{self.order}"
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`."""
         return sample.twist
 
     def genuine(self, sample: Sample) -> bool:
@@ -187,7 +182,6 @@ class Resonance(CurveTest):
         return f"R{self.order}"
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`."""
         share = sample.kappa / sample.state.rate
         # beyond w0/2 the other one of the pair has the smaller kappa
         return min(share, 1.0 - share) - 1.0 / self.order
@@ -209,17 +203,14 @@ class RealCrossing(CurveTest):
         return self.label
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`."""
         if self.borders is None:
             return sample.sign(self.operator)
         return float(bordered(sample.state, self.operator, self.borders).g.real)
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
-        """See `CurveTest.within`."""
         return replace(self, borders=null_vectors(b.state, self.operator))
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        """See `CurveTest.smooth`."""
         return sample.determinant(self.operator)
 
     def genuine(self, sample: Sample) -> bool:
@@ -238,7 +229,6 @@ class LimitOrBranchPoint(RealCrossing):
     """LP or BP of the motions that a curve consists of: the latter where no free parameter moves the multiplier."""
 
     def genuine(self, sample: Sample) -> bool:
-        """See `CurveTest.genuine`."""
         vectors = null_vectors(sample.state, Kind.INTEGER)
         forced = all(transversality(sample.state, vectors, name) <= _TRANSVERSAL for name in sample.curve.names)
         return forced == (self.label == "BP")
@@ -263,7 +253,6 @@ class PairCrossing(CurveTest):
         return self.label
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """See `CurveTest.changed`."""
         return _passing(a.others, b.others) is not None
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
@@ -293,7 +282,6 @@ class PairCrossing(CurveTest):
         return exponent if abs(exponent - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
 
     def confirmed(self, sample: Sample) -> bool:
-        """See `CurveTest.confirmed`."""
         assert self.target is not None
         result, error = sample.evaluation.floquet, 0.0
         if result.errors.size:
