@@ -103,10 +103,9 @@ def script():
     )
 
 
-@pytest.fixture(scope="module", autouse=True)
+@pytest.fixture(scope="module")
 def by_script():
-    """The same by a script; computed twice, since kernels that are not compiled yet differ in the last bits."""
-    script()
+    """The same by a script."""
     return script()
 
 
@@ -130,17 +129,21 @@ def ran(by_script, tmp_path_factory):
     return run_study(read_study(path)), path.parent / "study_results"
 
 
+@pytest.fixture(scope="module")
+def results(ran):
+    """What the study wrote, read back."""
+    return so.load(ran[1] / "results.nc")
+
+
 @pytest.mark.parametrize(("name", "harmonic"), [("mean", 0), ("half", 0.5), ("quarter", 0.25)])
-def test_components_are_drawn_as_by_a_script(ran, tmp_path, name, harmonic):
-    folder = ran[1]
-    so.plot(so.load(folder / "results.nc")["diagram"], tmp_path / "figure.svg", harmonic=harmonic)
-    assert (folder / f"{name}.svg").read_bytes() == (tmp_path / "figure.svg").read_bytes()
+def test_components_are_drawn_as_by_a_script(ran, results, tmp_path, name, harmonic):
+    so.plot(results["diagram"], tmp_path / "figure.svg", harmonic=harmonic)
+    assert (ran[1] / f"{name}.svg").read_bytes() == (tmp_path / "figure.svg").read_bytes()
 
 
-def test_a_study_gives_what_a_script_gives_bit_for_bit(ran, by_script):
-    outcome, folder = ran
+def test_a_study_gives_what_a_script_gives_bit_for_bit(ran, results, by_script):
+    outcome, _ = ran
     assert not outcome.failed, [item.failure for item in outcome.failed]
-    results = so.load(folder / "results.nc")
     assert list(results) == ["diagram", "other end", "along p", "witness", "multipliers"]
     for item, expected, read in zip(outcome.finished, by_script, results.values(), strict=False):
         same(item.result, expected)

@@ -36,10 +36,9 @@ def script():
     return response, so.continue_branch(response.bifurcations["LP"][0], "F", (0.25, 0.4), max_step=0.2)
 
 
-@pytest.fixture(scope="module", autouse=True)
+@pytest.fixture(scope="module")
 def by_script():
-    """The same by a script; computed twice, since kernels that are not compiled yet differ in the last bits."""
-    script()
+    """The same by a script."""
     return script()
 
 
