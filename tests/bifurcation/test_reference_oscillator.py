@@ -33,8 +33,16 @@ def test_exact_law(oscillator_curve, reference, same_events, harmonics, toleranc
     same_events(curve.bifurcations, reference["reference_oscillator"]["exact_p0.55_j0"], omega=tolerance)
 
 
+@pytest.fixture(scope="module")
+def doublings_near_grazing(oscillator_curve):
+    """Those of the exact law below omega = 1.3, by shooting from the default curve."""
+    curve = oscillator_curve(0.55, omega=(4.5, 1.2))
+    starts = [shoot(curve.system, b.orbit.start(), b.omega * (1.0 + 1e-4)) for b in curve.bifurcations["PD"][2:]]
+    return [locate_by_shooting(curve.system, "PD", start.state, start.omega) for start in starts]
+
+
 @pytest.mark.parametrize("max_step", [None, 0.01], ids=["default", "small-steps"])
-def test_exact_law_near_grazing_by_shooting(oscillator_curve, reference, max_step):
+def test_exact_law_near_grazing_by_shooting(oscillator_curve, reference, doublings_near_grazing, max_step):
     """Just before the left stop is left for good the exact law has two more period doublings, close together.
 
     With default steps both lie within one: the pair of multipliers meets at -1 and parts again.
@@ -43,9 +51,7 @@ def test_exact_law_near_grazing_by_shooting(oscillator_curve, reference, max_ste
     curve = oscillator_curve(0.55, omega=(4.5, 1.2), max_step=max_step)
     found = [b for b in curve.bifurcations["PD"] if b.omega < 1.3]
     assert [b.omega for b in found] == pytest.approx([e[1] for e in expected], abs=1e-6)
-    for b, (_, omega, _) in zip(found, expected, strict=True):
-        start = shoot(curve.system, b.orbit.start(), b.omega * (1.0 + 1e-4))
-        witness = locate_by_shooting(curve.system, "PD", start.state, start.omega)
+    for b, (_, omega, _), witness in zip(found, expected, doublings_near_grazing, strict=True):
         assert witness.omega == pytest.approx(omega, abs=1e-9)
         assert b.omega == pytest.approx(witness.omega, abs=3e-7)
         assert b.amplitude == pytest.approx(witness.amplitude, abs=1e-5)
