@@ -31,7 +31,9 @@ def reference_extremum(sharpness):
 
 
 @pytest.mark.parametrize("sharpness", [3000.0, None])
-@pytest.mark.parametrize("stiffness", STIFFNESSES)
+@pytest.mark.parametrize(
+    "stiffness", [*STIFFNESSES[:2], *(pytest.param(value, marks=pytest.mark.slow) for value in STIFFNESSES[2:])]
+)
 def test_extrema_of_period_doublings_over_the_stops(sharpness, stiffness):
     extremum = reference_extremum(sharpness)
     curve = so.track(extremum, "Kc", (4.7, stiffness))

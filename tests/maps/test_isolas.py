@@ -165,7 +165,9 @@ def damped_ends():
     return [(w, load(w, a)) for w, a in roots]
 
 
-@pytest.mark.parametrize("bounds", [(0.005, 0.06), (0.02, 0.06), (0.005, 0.03), (0.02, 0.03)])
+@pytest.mark.parametrize(
+    "bounds", [(0.005, 0.06), (0.02, 0.06), pytest.param((0.005, 0.03), marks=pytest.mark.slow), (0.02, 0.03)]
+)
 def test_an_isola_of_nonlinear_damping(damped, bounds):
     """Also where it meets no other branch within the bounds: stronger loads lead to it."""
     (isola,) = so.find_isolas(damped, (0.3, 2.0), "F", bounds, harmonics=1)
@@ -333,7 +335,7 @@ def between_stops():
         (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 10.0), 9),
         (chain(), (0.4, 2.5), (0.5, 8.0), 5),
         pytest.param(between_stops(), (0.4, 2.5), (0.5, 6.0), "adaptive", marks=pytest.mark.slow),
-        (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 30.0), "adaptive"),
+        pytest.param(so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 30.0), "adaptive", marks=pytest.mark.slow),
     ],
 )
 def test_a_loop_between_pitchforks_of_the_response_is_no_isola(system, omega, bounds, harmonics):
