@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.batch_form import Tangent
 from suboctave.timedomain.adaptive_control import SCALARS, VECTORS
+from suboctave.timedomain.batch import Batch, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
 from suboctave.timedomain.law_code import LawCode
 from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
@@ -79,12 +80,14 @@ def adaptive_functions(layout: Layout, lanes: int, count: int) -> list[str]:
     return [_AdaptiveCode(layout, rows, count).begin(), _AdaptiveCode(layout, rows, count).attempt(), driver]
 
 
-class AdaptiveMethod:
-    """The compiled integrator of a layout, with `count` tangent vectors for each trajectory; `lanes` run side by side.
+class AdaptiveMethod(Method):
+    """The compiled integrator of a layout, with `count` tangent vectors for each trajectory.
 
     `transition`: the vectors begin as unit vectors and are left as they are: columns of the state-transition matrix.
     Otherwise they begin as orthonormal ones in no special direction, and are kept orthonormal.
     """
+
+    effort = 20
 
     def __init__(
         self,
@@ -107,7 +110,7 @@ class AdaptiveMethod:
         self.first = (np.eye(size) if transition else generic)[:, :count]
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
-        """The rows of the code for every set of parameters, (P, rows) each."""
+        """See `Method.numbers`."""
         inverse = np.linalg.inv(numbers.mass)
         outputs = inverse @ self.layout.outputs.T
         weight, omega = np.sqrt(np.diagonal(numbers.mass, axis1=1, axis2=2)), numbers.omega[:, None]
@@ -127,82 +130,58 @@ class AdaptiveMethod:
             flat["trace"] = -np.trace(inverse @ numbers.damping, axis1=1, axis2=2)
         return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
+    def group(self, batch: Batch, members: NDArray[np.int_], alive: int) -> AdaptiveGroup:
+        """See `Method.group`."""
+        return AdaptiveGroup(self, batch, members, alive)
 
-class AdaptiveGroup:
-    """`lanes` trajectories on their way."""
 
-    def __init__(
-        self,
-        method: AdaptiveMethod,
-        numbers: dict[str, Array],
-        states: Array,
-        which: NDArray[np.int_],
-        sizes: Array,
-        total: int,
-        address: int,
-        alive: int,
-    ) -> None:
-        """`states` (lanes, 2n), `sizes` (lanes, n), `which` (lanes,) the set of parameters; `total` samples are due.
+class AdaptiveGroup(Group):
+    """`lanes` trajectories on their way, of which only the first `alive` move."""
 
-        Only the first `alive` lanes move.
-        """
-        self.method, self.address, self.fresh = method, address, True
-        lanes, rows = method.lanes, self._rows
-        self.z = np.zeros(method.rows.size * lanes)
-        for name, value in numbers.items():
-            rows(name)[:] = value[which].T
+    def __init__(self, method: AdaptiveMethod, batch: Batch, members: NDArray[np.int_], alive: int) -> None:
+        super().__init__(method, batch, members)
+        self.method, rows = method, self.row
+        states, sizes = batch.states[members], batch.sizes[members]
         rows("y")[:] = states.T
-        weight = numbers["weight"][which]
-        largest = np.max(sizes * weight, axis=1, keepdims=True)
+        weight, period = rows("weight"), rows("period")[0]
         rows("past")[:] = sizes.T
-        rows("floor")[:] = np.maximum(1e-3 * largest / weight, 1e-300).T
-        period = numbers["period"][which, 0]
+        rows("floor")[:] = np.maximum(1e-3 * np.max(sizes.T * weight, axis=0) / weight, 1e-300)
         rows("h")[:] = rows("next")[:] = np.minimum(_FIRST_STEP, 1.0 / method.samples) * period
-        rows("left")[:, :alive] = total
+        rows("left")[:, :alive] = batch.total
         rows("h")[:, alive:] = 0.0
         rows("plain")[:] = float(method.transition)
         # tangent vectors are orthonormal in the metric of the parameters
-        metric = np.ones((states.shape[1], lanes)) if method.transition else numbers["metric"][which].T
-        rows("w")[:] = (method.first.T[:, :, None] / metric).reshape(-1, lanes)
+        metric = np.ones((states.shape[1], method.lanes)) if method.transition else rows("metric")
+        rows("w")[:] = (method.first.T[:, :, None] / metric).reshape(-1, method.lanes)
+        kept = batch.total - batch.skip if method.count else 0
         #: what the tangent vectors and the volume grew by, (samples kept, count + 1, lanes)
-        self.growth = np.full((0, method.count + 1, lanes), np.nan)
+        self.growth = np.full((kept, method.count + 1, method.lanes), np.nan)
+        if batch.first is not None:
+            rows("sample")[0] = batch.first[members]
+            rows("t")[0] = batch.first[members] / method.samples * period
 
-    def begin_at(self, first: Array) -> None:
-        """Let every lane begin at a sample of the period, (lanes,), instead of at phase 0."""
-        self._rows("sample")[0] = first
-        self._rows("t")[0] = first / self.method.samples * self._rows("period")[0]
-
-    def _rows(self, name: str) -> Array:
-        rows = self.method.rows
-        begin, count = rows.begin[name], int(np.prod(rows.shapes[name]))
-        return self.z[begin * rows.lanes : (begin + count) * rows.lanes].reshape(count, rows.lanes)
-
-    def advance(self, budget: int, skip: int, out: Array, peaks: Array | None) -> bool:
-        """Try `budget` steps of each; samples after the first `skip` go to `out`. Whether all are there."""
-        method = self.method
+    def advance(self, effort: int, out: Array, peaks: Array | None) -> bool:
+        """See `Group.advance`; so many steps of each are tried."""
+        method, measured = self.method, np.zeros((0, 0, 0)) if peaks is None else peaks
         done = method.function(
-            self.z, method.begins, budget, self.fresh, method.samples, skip, method.tolerance, self.address, out,
-            peaks if peaks is not None else np.zeros((0, 0, 0)), peaks is not None, self.growth,
+            self.z, method.begins, effort, self.fresh, method.samples, self.batch.skip, method.tolerance,
+            self.batch.address, out, measured, peaks is not None, self.growth,
         )  # fmt: skip
         self.fresh = False
         return bool(done)
 
     def left(self) -> float:
-        """Samples that are still due, of all together."""
-        return float(self._rows("left").sum())
+        """See `Group.left`."""
+        return float(self.row("left").sum())
 
-    def states(self) -> Array:
-        """Where they are, (lanes, 2n)."""
-        return self._rows("y").T.copy()
-
-    def failed(self) -> NDArray[np.bool_]:
-        """Which of them came to an end: their steps became too short, or their numbers too large."""
-        return self._rows("failed")[0] > 0.0
-
-    def tangents(self) -> Array:
-        """The tangent vectors as columns, (lanes, 2n, count)."""
+    def results(self) -> dict[str, Any]:
+        """See `Group.results`; failed are those whose steps became too short, or their numbers too large."""
         size, count = 2 * self.method.layout.n, self.method.count
-        return self._rows("w").reshape(count, size, -1).transpose(2, 1, 0).copy()
+        known = {"end": self.row("y").T, "failed": self.row("failed")[0] > 0.0}
+        if count:
+            known["growth"] = self.growth.transpose(2, 0, 1)
+            known["tangents"] = self.row("w").reshape(count, size, -1).transpose(2, 1, 0)
+        return known
 
 
 class _AdaptiveCode(LawCode):

@@ -121,36 +121,12 @@ def _turn(c, at, n, i, h):
 
 
 @kernel(error_model="numpy")
-def _error(c, at, n):
-    """The error of the step over what is allowed, in units of the tolerance."""
-    e3 = e5 = 0.0
-    omega = c[_OMEGA]
-    for i in range(2 * n):
-        dof = i if i < n else i - n
-        size = max(c[at[_NOW] + dof], c[at[_PAST] + dof], c[at[_FLOOR] + dof])
-        trial = abs(c[at[_TRIAL] + i])
-        if i >= n:
-            size *= omega
-        size = max(size, trial)
-        e3 += (c[at[_E3] + i] / size) ** 2
-        e5 += (c[at[_E5] + i] / size) ** 2
-    if e3 == 0.0 and e5 == 0.0:
-        return 0.0
-    return abs(c[_H]) * e5 / math.sqrt((e5 + 0.01 * e3) * 2 * n)
+def _cut(c, at, n, corners, h, period, measure):
+    """The corner at which the trial step has landed, -1 if none; -2 if a shorter step must be tried.
 
-
-@kernel(error_model="numpy")
-def _fail(c, at, n):
-    c[_FAILED] = 1.0
-    c[_LEFT] = 0.0
-    c[_H] = 0.0
-    for i in range(2 * n):
-        c[at[_Y] + i] = np.nan
-
-
-@kernel(error_model="numpy")
-def _corner(c, at, corners, h, period):
-    """The corner at which the trial step has landed, -1 if none; -2 if the step must be tried again."""
+    A step is cut at the first corner that it passes, and with `measure` where a displacement is largest: that is read
+    at the ends of steps.
+    """
     first, which, landed = 2.0, -1, -1
     for i in range(corners):
         sign = 2.0 * c[at[_ON] + i] - 1.0
@@ -165,7 +141,6 @@ def _corner(c, at, corners, h, period):
         if x >= 0.0 and x < first:
             first, which = x, i
     if which >= 0 and c[_STUCK] <= 2.0 * corners + 2.0:
-        tries = c[_TRIES]
         if first == 0.0:
             # over the corner at once: its flag was on the wrong side
             c[at[_ON] + which] = 1.0 - c[at[_ON] + which]
@@ -174,41 +149,34 @@ def _corner(c, at, corners, h, period):
             return -2
         # a little beyond: the margin is judged by its sign, and a step that stops short is accepted
         share = first * (1.0 + 1e-12)
-        if share < 0.999999 and tries < _TRIALS:
+        if share < 0.999999 and c[_TRIES] < _TRIALS:
             c[_H] = max(h * share, _SHORTEST * period)
-            c[_TRIES] = tries + 1.0
+            c[_TRIES] += 1.0
             return -2
         if c[at[_G1] + which] * (2.0 * c[at[_ON] + which] - 1.0) < 0.0:
             landed = which
+    if measure and c[_TURNING] == 0.0:
+        share = 1.0
+        for i in range(n):
+            if c[at[_Y] + n + i] * c[at[_TRIAL] + n + i] < 0.0:
+                x, top = _turn(c, at, n, i, h)
+                if top >= max(c[at[_PEAK] + i], _HIGH * c[at[_CREST] + i]) and 0.001 < x < share:
+                    share = x
+        if share < 0.999:
+            c[_H] = h * share
+            c[_TURNING] = 1.0
+            return -2
     return landed
 
 
 @kernel(error_model="numpy")
-def _crest(c, at, n, h):
-    """Whether the step is cut where a displacement is largest: that is read at the ends of steps."""
-    share = 1.0
-    for i in range(n):
-        v0, v1 = c[at[_Y] + n + i], c[at[_TRIAL] + n + i]
-        if v0 * v1 < 0.0:
-            x, top = _turn(c, at, n, i, h)
-            high = max(c[at[_PEAK] + i], _HIGH * c[at[_CREST] + i])
-            if top >= high and 0.001 < x < share:
-                share = x
-    if share < 0.999:
-        c[_H] = h * share
-        c[_TURNING] = 1.0
-        return True
-    return False
+def _accept(c, l, at, n, corners, samples, skip, h, landed, out, peaks, measure):
+    """Take the trial step, write the state at a sample, and limit the next step to the next sample.
 
-
-@kernel(error_model="numpy")
-def _accept(c, at, n, corners, h, landed, measure):
-    """Take the trial step; the corner that it landed at and all that lie behind are turned."""
+    The corner that it landed at and all that lie behind are turned. Returns 1 after the last sample.
+    """
     c[_ACCEPTED] = 1.0
-    c[_TURNING] = 0.0
-    c[_TRIES] = 0.0
-    c[_STUCK] = 0.0
-    omega = c[_OMEGA]
+    c[_TURNING] = c[_TRIES] = c[_STUCK] = 0.0
     for i in range(n):
         x1, v1 = c[at[_TRIAL] + i], c[at[_TRIAL] + n + i]
         if measure:
@@ -216,47 +184,37 @@ def _accept(c, at, n, corners, h, landed, measure):
             if c[at[_Y] + n + i] * v1 < 0.0:
                 top = max(top, _turn(c, at, n, i, h)[1])
             c[at[_PEAK] + i] = max(c[at[_PEAK] + i], top)
-        c[at[_NOW] + i] = max(c[at[_NOW] + i], abs(x1), abs(v1) / omega)
+        c[at[_NOW] + i] = max(c[at[_NOW] + i], abs(x1), abs(v1) / c[_OMEGA])
     for i in range(2 * n):
         c[at[_Y] + i] = c[at[_TRIAL] + i]
         c[at[_K] + i] = c[at[_K] + 24 * n + i]
     for i in range(corners):
         c[at[_G] + i] = c[at[_G1] + i]
         c[at[_DG] + i] = c[at[_DG1] + i]
-    for i in range(corners):
         if i == landed or (2.0 * c[at[_ON] + i] - 1.0) * c[at[_G] + i] < 0.0:
             c[at[_ON] + i] = 1.0 - c[at[_ON] + i]
             c[_STALE] = 1.0
-
-
-@kernel(error_model="numpy")
-def _arrive(c, l, at, n, samples, skip, h, out, peaks, measure):
-    """Move on by h, write the state at a sample; the length of the next step. Returns 1 after the last sample."""
-    following = c[_NEXT]
-    t, period, sample = c[_T], c[_PERIOD], c[_SAMPLE]
-    target = period * (sample + 1.0) / samples
-    t += h
-    if target - t <= 1e-12 * period:
-        t = target
-        sample += 1.0
-        left = c[_LEFT] - 1.0
-        c[_LEFT] = left
+    period = c[_PERIOD]
+    target = period * (c[_SAMPLE] + 1.0) / samples
+    c[_T] += h
+    if target - c[_T] <= 1e-12 * period:
+        c[_T] = target
+        c[_SAMPLE] += 1.0
+        c[_LEFT] -= 1.0
         c[_SPENT] = 0.0
-        slot = int(c[_SLOT])
-        c[_SLOT] = slot + 1.0
-        if slot >= skip:
+        slot = int(c[_SLOT]) - skip
+        c[_SLOT] += 1.0
+        if slot >= 0:
             for i in range(2 * n):
-                out[slot - skip, i, l] = c[at[_Y] + i]
-            if measure:
-                for i in range(n):
-                    peaks[slot - skip, i, l] = c[at[_PEAK] + i]
+                out[slot, i, l] = c[at[_Y] + i]
         if measure:
             for i in range(n):
+                if slot >= 0:
+                    peaks[slot, i, l] = c[at[_PEAK] + i]
                 c[at[_CREST] + i] = c[at[_PEAK] + i]
                 c[at[_PEAK] + i] = 0.0
-        if sample >= samples:
-            sample = 0.0
-            t = 0.0
+        if c[_SAMPLE] >= samples:
+            c[_SAMPLE] = c[_T] = 0.0
             # lengths for the tolerance of the next period
             largest = 0.0
             for i in range(n):
@@ -265,14 +223,11 @@ def _arrive(c, l, at, n, samples, skip, h, out, peaks, measure):
                 largest = max(largest, c[at[_PAST] + i] * c[at[_WEIGHT] + i])
             for i in range(n):
                 c[at[_FLOOR] + i] = max(_SMALLEST_SHARE * largest / c[at[_WEIGHT] + i], 1e-300)
-        c[_SAMPLE] = sample
-        target = period * (sample + 1.0) / samples
-        if left <= 0.0:
-            c[_T] = t
+        if c[_LEFT] <= 0.0:
             c[_H] = 0.0
             return 1
-    c[_T] = t
-    remaining = target - t
+        target = period * (c[_SAMPLE] + 1.0) / samples
+    following, remaining = c[_NEXT], target - c[_T]
     if following >= remaining:
         following = remaining
     elif following > 0.5 * remaining:
@@ -298,40 +253,55 @@ def control(z, l, at, n, corners, samples, skip, tolerance, out, peaks, measure)
     if c[_LEFT] <= 0.0:
         return 1
     h, period = c[_H], c[_PERIOD]
+    # the error of the step over what is allowed, in units of the tolerance
+    e3 = e5 = 0.0
+    for i in range(2 * n):
+        dof = i if i < n else i - n
+        size = max(c[at[_NOW] + dof], c[at[_PAST] + dof], c[at[_FLOOR] + dof])
+        if i >= n:
+            size *= c[_OMEGA]
+        size = max(size, abs(c[at[_TRIAL] + i]))
+        e3 += (c[at[_E3] + i] / size) ** 2
+        e5 += (c[at[_E5] + i] / size) ** 2
+    error = 0.0 if e3 == 0.0 and e5 == 0.0 else abs(h) * e5 / math.sqrt((e5 + 0.01 * e3) * 2 * n)
+    error = max(error, c[_EXTRA]) / tolerance
+    rejected = not error <= 1.0
+    if rejected:
+        h *= _SHRINK if not error < 1e30 else max(_SHRINK, _SAFETY * error**-0.125)
     c[_SPENT] += 1.0
-    if c[_SPENT] > _MOST:
-        _fail(c, at, n)
+    if c[_SPENT] > _MOST or (rejected and h < _SHORTEST * period):
+        c[_FAILED] = 1.0
+        c[_LEFT] = c[_H] = 0.0
+        c[at[_Y] : at[_Y] + 2 * n] = np.nan
         return 1
-    error = max(_error(c, at, n), c[_EXTRA]) / tolerance
-    if not error <= 1.0:
-        share = _SHRINK if not error < 1e30 else max(_SHRINK, _SAFETY * error**-0.125)
-        h *= share
-        if h < _SHORTEST * period:
-            _fail(c, at, n)
-            return 1
-        c[_H] = h
-        c[_NEXT] = h
-        c[_CALM] = 0.0
-        c[_TRIES] = 0.0
+    if rejected:
+        c[_H] = c[_NEXT] = h
+        c[_CALM] = c[_TRIES] = 0.0
         return 0
-    landed = _corner(c, at, corners, h, period)
-    if landed == -2 or (measure and c[_TURNING] == 0.0 and _crest(c, at, n, h)):
+    landed = _cut(c, at, n, corners, h, period, measure)
+    if landed == -2:
         return 0
-    _accept(c, at, n, corners, h, landed, measure)
     grow = _GROW if error < 1e-7 else min(_GROW, _SAFETY * error**-0.125)
     if c[_CALM] == 0.0:
         grow = min(grow, 1.0)
     c[_CALM] = 1.0
     # a step that was cut short says little about the length that the method could take
     c[_NEXT] = max(h * grow, c[_NEXT]) if h < c[_NEXT] else h * grow
-    return _arrive(c, l, at, n, samples, skip, h, out, peaks, measure)
+    return _accept(c, l, at, n, corners, samples, skip, h, landed, out, peaks, measure)
 
 
 @kernel(error_model="numpy")
-def _orthonormal(c, at, size, count):
-    """Gram and Schmidt's method in the metric of the motion; the logarithms of lost lengths are summed."""
-    metric = at[_METRIC]
-    for j in range(count):
+def follow(z, l, at, n, count, skip, growth):
+    """Take over the `count` tangent vectors of lane l if its step was accepted; at a sample write their `growth`."""
+    c = z[:, l]
+    if c[_ACCEPTED] == 0.0:
+        return
+    size, metric = 2 * n, at[_METRIC]
+    for i in range(size * count):
+        c[at[_W] + i] = c[at[_GOAL] + i]
+    c[_VOLUME] += c[_USED] * c[_VOLUME_RATE]
+    # Gram and Schmidt's method in the metric of the motion; the logarithms of lost lengths are summed
+    for j in range(count if c[_PLAIN] == 0.0 else 0):
         vector = at[_W] + j * size
         for other in range(at[_W], vector, size):
             dot = 0.0
@@ -346,27 +316,13 @@ def _orthonormal(c, at, size, count):
         c[at[_LOG] + j] += math.log(length)
         for i in range(size):
             c[vector + i] /= length
-
-
-@kernel(error_model="numpy")
-def follow(z, l, at, n, count, skip, growth):
-    """Take over the `count` tangent vectors of lane l if its step was accepted; at a sample write their `growth`."""
-    c = z[:, l]
-    if c[_ACCEPTED] == 0.0:
-        return
-    size = 2 * n
-    for i in range(size * count):
-        c[at[_W] + i] = c[at[_GOAL] + i]
-    c[_VOLUME] += c[_USED] * c[_VOLUME_RATE]
-    if c[_PLAIN] == 0.0:
-        _orthonormal(c, at, size, count)
     slot = int(c[_SLOT])
     if slot > c[_SEEN]:
         c[_SEEN] = slot
-        if slot > skip:
-            for j in range(count):
-                growth[slot - 1 - skip, j, l] = c[at[_LOG] + j]
-            growth[slot - 1 - skip, count, l] = c[_VOLUME]
         for j in range(count):
+            if slot > skip:
+                growth[slot - 1 - skip, j, l] = c[at[_LOG] + j]
             c[at[_LOG] + j] = 0.0
+        if slot > skip:
+            growth[slot - 1 - skip, count, l] = c[_VOLUME]
         c[_VOLUME] = 0.0

@@ -14,7 +14,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -24,9 +24,10 @@ from suboctave.errors import ConvergenceError, InputError, check_numbers, shorte
 from suboctave.interruption import Interruption, check_time
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
-from suboctave.timedomain.adaptive import AdaptiveGroup, AdaptiveMethod
-from suboctave.timedomain.layout import Layout, Numbers
-from suboctave.timedomain.newmark import NewmarkGroup, NewmarkMethod
+from suboctave.timedomain.adaptive import AdaptiveMethod
+from suboctave.timedomain.batch import Batch, Method
+from suboctave.timedomain.layout import Layout
+from suboctave.timedomain.newmark import NewmarkMethod
 from suboctave.timedomain.python_callbacks import PythonCallbacks
 
 __all__ = ["METHODS", "Flow", "Motions", "Report", "check_count", "check_extent", "check_motions"]
@@ -125,11 +126,11 @@ class Flow:
             raise InputError(f"steps_per_period={steps} must be at least 4 and a multiple of samples={samples}")
         self.system, self.method, self.samples = system, method, samples
         self.layout = Layout(system)
-        self.integrator: NewmarkMethod | AdaptiveMethod
+        self.integrator: Method
         if tangents and (method != "accurate" or not 0 < tangents <= 2 * system.n):
             raise InputError(f'tangents={tangents}: from 1 to {2 * system.n} of them, with method="accurate"')
         if method == "newmark":
-            self.integrator = NewmarkMethod(self.layout, steps, tolerance, lanes)
+            self.integrator = NewmarkMethod(self.layout, samples, steps, tolerance, lanes)
         else:
             self.integrator = AdaptiveMethod(self.layout, samples, tolerance, lanes, tangents, transition)
 
@@ -173,9 +174,7 @@ class Flow:
         total = periods * self.samples
         skip = min(max(int(skip), 0), total)
         check_extent(len(x), periods, len(x) * (total - skip) * 2 * self.layout.n)
-        which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
-        numbers = self.layout.numbers(w, varied)
-        return _Run(self, numbers, x, which, total, skip, measure).go(workers, report)
+        return _Run(self, self._batch(x, w, varied, total, skip), measure).go(workers, report)
 
     def onward(
         self,
@@ -193,11 +192,22 @@ class Flow:
         if self.method != "accurate":
             raise InputError('pieces of a period are followed with method="accurate"')
         x, w, varied = self._broadcast(states, omega, parameters or {})
-        which = np.arange(len(x)) if len(w) > 1 else np.zeros(len(x), dtype=int)
-        numbers = self.layout.numbers(w, varied)
-        run = _Run(self, numbers, x, which, 1, 0, False)
-        run.first = np.broadcast_to(np.asarray(first) % self.samples, (len(x),)).astype(float)
-        return run.go(workers, None)
+        at = np.broadcast_to(np.asarray(first) % self.samples, (len(x),)).astype(float)
+        return _Run(self, self._batch(x, w, varied, 1, 0, at), False).go(workers, None)
+
+    def _batch(
+        self,
+        states: Array,
+        omega: Array,
+        varied: Mapping[str, Array],
+        total: int,
+        skip: int,
+        first: Array | None = None,
+    ) -> Batch:
+        which = np.arange(len(states)) if len(omega) > 1 else np.zeros(len(states), dtype=int)
+        numbers = self.layout.numbers(omega, varied)
+        sizes, address = self.layout.sizes(numbers, states, which), 0
+        return Batch(self.integrator.numbers(numbers), which, states, sizes, total, skip, first, address)
 
     def _broadcast(
         self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
@@ -240,35 +250,32 @@ class Flow:
 class _Run:
     """One batch on its way: groups of trajectories, each followed by one thread in chunks."""
 
-    def __init__(
-        self, flow: Flow, numbers: Numbers, states: Array, which: NDArray[np.int_], total: int, skip: int, measure: bool
-    ) -> None:
-        self.flow, self.numbers, self.states, self.which = flow, numbers, states, which
-        self.total, self.skip, self.measure = total, skip, measure
-        self.first: Array | None = None
-        self.rows = flow.integrator.numbers(numbers)
+    def __init__(self, flow: Flow, batch: Batch, measure: bool) -> None:
+        self.flow, self.measure = flow, measure
         self.callbacks = PythonCallbacks(flow.layout.called_back)
-        n, count = flow.layout.n, len(states)
-        self.out = np.full((count, total - skip, 2 * n), np.nan)
-        self.peaks = np.full((count, total - skip, n), np.nan) if measure else None
-        self.end = np.full((count, 2 * n), np.nan)
-        self.failed = np.zeros(count, dtype=bool)
-        self.unsettled = np.zeros(count)
-        self.finished = np.zeros(count, dtype=bool)
-        self.growth = self.tangents = None
-        tangents = flow.integrator.count if isinstance(flow.integrator, AdaptiveMethod) else 0
+        self.batch = replace(batch, address=self.callbacks.address)
+        n, count, kept = flow.layout.n, len(batch.states), batch.total - batch.skip
+        self.motions = Motions(
+            states=np.full((count, kept, 2 * n), np.nan),
+            peaks=np.full((count, kept, n), np.nan) if measure else None,
+            end=np.full((count, 2 * n), np.nan),
+            failed=np.zeros(count, dtype=bool),
+            unsettled=np.zeros(count),
+            finished=np.zeros(count, dtype=bool),
+        )
+        tangents = flow.integrator.count
         if tangents:
-            self.growth = np.full((count, total - skip, tangents + 1), np.nan)
-            self.tangents = np.full((count, 2 * n, tangents), np.nan)
+            growth, vectors = np.full((count, kept, tangents + 1), np.nan), np.full((count, 2 * n, tangents), np.nan)
+            self.motions = replace(self.motions, growth=growth, tangents=vectors)
         lanes = flow.integrator.lanes
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
         self.stop = threading.Event()
-        self.interruption: Interruption | None = None
 
     def go(self, workers: int | None, report: Report | None) -> Motions:
         """Follow all of them."""
         many = min(_processors() if workers is None else check_count("workers", workers), len(self.groups))
+        interruption: Interruption | None = None
         try:
             if many <= 1:
                 for g in range(len(self.groups)):
@@ -277,14 +284,12 @@ class _Run:
                 self._together(many, report)
         except KeyboardInterrupt as cause:
             self.stop.set()
-            self.interruption = Interruption.of(cause)
+            interruption = Interruption.of(cause)
         if self.callbacks.failure is not None:
             raise self.callbacks.failure
-        self.failed |= self.finished & ~np.isfinite(self.end).all(axis=1)
-        return Motions(
-            self.out, self.peaks, self.end, self.failed, self.unsettled, self.finished, self.growth, self.tangents,
-            self.interruption,
-        )  # fmt: skip
+        motions = self.motions
+        motions.failed[motions.finished & ~np.isfinite(motions.end).all(axis=1)] = True
+        return replace(motions, interruption=interruption)
 
     def _together(self, many: int, report: Report | None) -> None:
         self._compile()
@@ -306,82 +311,40 @@ class _Run:
         check_time()
         if report is not None:
             share = sum(self.done) / len(self.done)
-            report(share, f"{share * len(self.states):.0f} of {len(self.states)} trajectories")
+            count = len(self.batch.states)
+            report(share, f"{share * count:.0f} of {count} trajectories")
 
     def _compile(self) -> None:
         """Once, before the threads."""
-        group = self._group(np.zeros(self.flow.integrator.lanes, dtype=int))
-        empty = np.empty((0, 2 * self.flow.layout.n, self.flow.integrator.lanes))
-        if isinstance(group, NewmarkGroup):
-            group.advance(0, 0, 1, 0, empty, None)
-        else:
-            group.advance(0, 0, empty, None)
-
-    def _group(self, members: NDArray[np.int_], alive: int = 0) -> NewmarkGroup | AdaptiveGroup:
-        integrator, states, which = self.flow.integrator, self.states[members], self.which[members]
-        if isinstance(integrator, NewmarkMethod):
-            return NewmarkGroup(integrator, self.rows, states, which, self.callbacks.address)
-        sizes = self.flow.layout.sizes(self.numbers, states, which)
-        group = AdaptiveGroup(integrator, self.rows, states, which, sizes, self.total, self.callbacks.address, alive)
-        if self.first is not None:
-            group.begin_at(self.first[members])
-        return group
+        integrator = self.flow.integrator
+        nobody = np.zeros(integrator.lanes, dtype=int)
+        integrator.group(self.batch, nobody, 0).advance(
+            0, np.empty((0, 2 * self.flow.layout.n, integrator.lanes)), None
+        )
 
     def _follow(self, g: int, report: Report | None) -> None:
-        members = self.groups[g]
-        lanes, n = self.flow.integrator.lanes, self.flow.layout.n
+        members, integrator, batch = self.groups[g], self.flow.integrator, self.batch
+        lanes, n = integrator.lanes, self.flow.layout.n
         # what is missing from the last group is made up by its first one, but stands still where it may
         filled = np.array([members[i] if i < len(members) else members[0] for i in range(lanes)])
-        group = self._group(filled, len(members))
-        kept = self.total - self.skip
+        group = integrator.group(batch, filled, len(members))
+        kept = batch.total - batch.skip
         out = np.full((kept, 2 * n, lanes), np.nan)
         peaks = np.full((kept, n, lanes), np.nan) if self.measure else None
-        if isinstance(group, NewmarkGroup):
-            self._by_steps(group, g, out, peaks, report)
-        else:
-            if self.growth is not None:
-                group.growth = np.full((kept, self.growth.shape[2], lanes), np.nan)
-            self._by_trials(group, g, out, peaks, report)
-        if self.stop.is_set():
-            return
-        if isinstance(group, AdaptiveGroup) and group.left() > 0.0:
-            return
-        here, own = slice(members.start, members.stop), slice(0, len(members))
-        self.out[here] = out.transpose(2, 0, 1)[own]
-        if self.peaks is not None and peaks is not None:
-            self.peaks[here] = peaks.transpose(2, 0, 1)[own]
-        self.end[here] = group.states()[own]
-        if isinstance(group, NewmarkGroup):
-            self.unsettled[here] = group.unsettled()[own]
-        else:
-            self.failed[here] = group.failed()[own]
-            if self.growth is not None and self.tangents is not None:
-                self.growth[here] = group.growth.transpose(2, 0, 1)[own]
-                self.tangents[here] = group.tangents()[own]
-        self.finished[here] = True
-
-    def _by_steps(self, group: NewmarkGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
-        steps = group.method.steps
-        stride = steps // self.flow.samples
-        begin, end, used, chunk = 0, self.total * stride, 0, steps
-        while begin < end and not self._stopped():
-            to, started = min(begin + chunk, end), perf_counter()
-            used += group.advance(
-                begin, to, stride, self.skip * stride, out[used:], None if peaks is None else peaks[used:]
-            )
-            chunk = _next_chunk(to - begin, perf_counter() - started)
-            begin = to
-            self.done[g] = begin / end
-            self._report(report)
-
-    def _by_trials(self, group: AdaptiveGroup, g: int, out: Array, peaks: Array | None, report: Report | None) -> None:
-        budget, finished = 20, False
-        while not finished and not self._stopped():
+        effort, arrived = integrator.effort, False
+        while not arrived and not self._stopped():
             started = perf_counter()
-            finished = group.advance(budget, self.skip, out, peaks)
-            budget = _next_chunk(budget, perf_counter() - started)
-            self.done[g] = 1.0 - group.left() / (self.total * len(self.groups[g]))
+            arrived = group.advance(effort, out, peaks)
+            effort = _next_chunk(effort, perf_counter() - started)
+            self.done[g] = 1.0 - min(1.0, group.left() / (batch.total * len(members)))
             self._report(report)
+        if not arrived or self.stop.is_set():
+            return
+        known = {"states": out.transpose(2, 0, 1), "finished": np.ones(lanes, dtype=bool), **group.results()}
+        if peaks is not None:
+            known["peaks"] = peaks.transpose(2, 0, 1)
+        for name, values in known.items():
+            getattr(self.motions, name)[members.start : members.stop] = values[: len(members)]
 
     def _stopped(self) -> bool:
         return self.stop.is_set() or self.callbacks.failure is not None

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.batch_form import Tangent
+from suboctave.timedomain.batch import Batch, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
 from suboctave.timedomain.law_code import LawCode
 from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
@@ -53,11 +54,12 @@ def newmark_rows(layout: Layout, lanes: int) -> Rows:
     return Rows(lanes, shapes)
 
 
-class NewmarkMethod:
-    """The compiled integrator of a layout; `lanes` trajectories run side by side."""
+class NewmarkMethod(Method):
+    """The compiled integrator of a layout."""
 
-    def __init__(self, layout: Layout, steps: int, tolerance: float, lanes: int | None = None) -> None:
+    def __init__(self, layout: Layout, samples: int, steps: int, tolerance: float, lanes: int | None = None) -> None:
         self.layout, self.steps, self.tolerance = layout, steps, tolerance
+        self.stride, self.effort = steps // samples, steps
         rows = newmark_rows(layout, 1).size
         self.lanes = lanes or next((lanes for lanes in (32, 16) if lanes * rows <= _ROOM), 8)
         self.function: Any = module_of(newmark_function(layout, self.lanes)).newmark
@@ -65,7 +67,7 @@ class NewmarkMethod:
         self.rows = newmark_rows(layout, self.lanes)
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
-        """The rows of the code for every set of parameters, (P, rows) each."""
+        """See `Method.numbers`."""
         h = 2.0 * np.pi / (numbers.omega * self.steps)
         h1 = h[:, None, None]
         inverse = np.linalg.inv(4.0 / h1**2 * numbers.mass + 2.0 / h1 * numbers.damping + numbers.stiffness)
@@ -83,43 +85,39 @@ class NewmarkMethod:
         }
         return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
+    def group(self, batch: Batch, members: NDArray[np.int_], alive: int) -> NewmarkGroup:
+        """See `Method.group`."""
+        return NewmarkGroup(self, batch, members)
 
-class NewmarkGroup:
+
+class NewmarkGroup(Group):
     """`lanes` trajectories on their way."""
 
-    def __init__(
-        self, method: NewmarkMethod, numbers: dict[str, Array], states: Array, which: NDArray[np.int_], address: int
-    ) -> None:
-        """`states` (lanes, 2n); `which` (lanes,) the set of parameters of each."""
-        self.method, self.address, self.fresh = method, address, True
-        n, lanes = method.layout.n, method.lanes
-        self.z = np.zeros(method.rows.size * lanes)
-        for name, value in {**numbers, "x": states[:, :n], "v": states[:, n:]}.items():
-            self._rows(name, value.shape[1])[:] = (value[which] if name in numbers else value).T
+    def __init__(self, method: NewmarkMethod, batch: Batch, members: NDArray[np.int_]) -> None:
+        super().__init__(method, batch, members)
+        self.method, self.step, self.used = method, 0, 0
+        self.end = batch.total * method.stride
+        n = method.layout.n
+        self.row("x")[:], self.row("v")[:] = batch.states[members, :n].T, batch.states[members, n:].T
 
-    def _rows(self, name: str, count: int) -> Array:
-        begin, lanes = self.method.rows.begin[name], self.method.lanes
-        return self.z[begin * lanes : (begin + count) * lanes].reshape(count, lanes)
-
-    def advance(self, begin: int, end: int, stride: int, skip: int, out: Array, peaks: Array | None) -> int:
-        """Steps `begin` to `end`; every `stride`-th state after step `skip` goes to `out`: how many did."""
-        method = self.method
-        measure = peaks is not None
-        used = method.function(
-            self.z, method.waves, begin, end, stride, skip, measure, self.fresh, method.tolerance, self.address, out,
-            peaks if peaks is not None else np.zeros((0, 0, 0)),
+    def advance(self, effort: int, out: Array, peaks: Array | None) -> bool:
+        """See `Group.advance`."""
+        method, to = self.method, min(self.step + effort, self.end)
+        measured = np.zeros((0, 0, 0)) if peaks is None else peaks[self.used :]
+        self.used += method.function(
+            self.z, method.waves, self.step, to, method.stride, self.batch.skip * method.stride, peaks is not None,
+            self.fresh, method.tolerance, self.batch.address, out[self.used :], measured,
         )  # fmt: skip
-        self.fresh = False
-        return int(used)
+        self.fresh, self.step = False, to
+        return to == self.end
 
-    def states(self) -> Array:
-        """Where they are, (lanes, 2n)."""
-        n = self.method.layout.n
-        return np.concatenate([self._rows("x", n), self._rows("v", n)]).T.copy()
+    def left(self) -> float:
+        """See `Group.left`."""
+        return (self.end - self.step) / self.method.stride * self.method.lanes
 
-    def unsettled(self) -> Array:
-        """Steps of each whose equations were not solved to the tolerance."""
-        return self._rows("bad", 1)[0].copy()
+    def results(self) -> dict[str, Any]:
+        """See `Group.results`; of each the steps whose equations were not solved to the tolerance."""
+        return {"end": np.concatenate([self.row("x"), self.row("v")]).T, "unsettled": self.row("bad")[0]}
 
 
 def newmark_function(layout: Layout, lanes: int) -> str:
