@@ -11,7 +11,7 @@ import math
 
 from suboctave.compiled import kernel
 from suboctave.curves.sample import Sample
-from suboctave.harmonic.trigonometric import pass_by
+from suboctave.harmonic.trigonometric import passages
 
 #: excursions across a gap, in units of the largest relative displacement, that may end soon
 YOUNG = 0.05
@@ -42,7 +42,10 @@ def contacts_between(p: Sample, q: Sample) -> int:
 @kernel()
 def _between(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
     """`contacts_between` for one gap."""
-    if pass_by(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
+    _, count, crossed, other_crossed = passages(
+        tau, value, curve, level, other_tau, other_value, other_curve, other_level
+    )
+    if count > 0 or crossed != other_crossed:
         return 3
     for end in range(2):
         # whether an excursion of one motion is a small part of the same excursion of the other

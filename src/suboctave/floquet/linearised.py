@@ -34,7 +34,7 @@ from suboctave.floquet.time_mesh import (
     split,
 )
 from suboctave.harmonic.aft.channel import Channel, Group
-from suboctave.harmonic.aft.general import GeneralLaw
+from suboctave.harmonic.aft.general import GeneralLaw, Smoothness
 from suboctave.harmonic.aft.law import LawAlong
 from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -42,13 +42,6 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.quadrature import FEWEST, search_grid, singular_instants
 from suboctave.model.elements.base import Element
-from suboctave.model.elements.smoothness import (
-    AdaptiveSampling,
-    CornerSampling,
-    PolynomialSampling,
-    Sampling,
-    SharpVelocitySampling,
-)
 
 #: longest panel in units of the fastest time scale: there collocation is exact to rounding
 _LONGEST = 0.8
@@ -242,31 +235,6 @@ def _in_modes(linear: LinearPart, groups: tuple[Group, ...]) -> _Modes:
     return _Modes(k, c, l, r, active, rates)
 
 
-class _Smoothness(NamedTuple):
-    """How smooth a law is: corners in displacement and velocity, and whether powers of a half begin there; places and
-    widths of its singularities in velocity; its degree, if it is a polynomial, or 0; whether it is smooth only between
-    corners; whether all that is unknown.
-    """
-
-    points: tuple[float, ...] = ()
-    velocities: tuple[float, ...] = ()
-    rough: bool = False
-    sharp: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
-    degree: int = 0
-    cornered: bool = False
-    unknown: bool = False
-
-
-def _smoothness(kind: Sampling) -> _Smoothness:
-    if isinstance(kind, CornerSampling):
-        return _Smoothness(kind.points, kind.velocities, kind.rough, cornered=True)
-    if isinstance(kind, SharpVelocitySampling):
-        return _Smoothness(sharp=(kind.velocities, kind.widths))
-    if isinstance(kind, PolynomialSampling):
-        return _Smoothness(degree=kind.degree)
-    return _Smoothness(unknown=isinstance(kind, AdaptiveSampling))
-
-
 class Channels:
     """The channels of all elements with nodes of their own, after those of the `first` groups.
 
@@ -313,7 +281,7 @@ class Channels:
 
     def _add(self, nodal: LawAlong, own: Channel) -> None:
         assert isinstance(nodal, GeneralLaw)
-        along, law = nodal.along, _smoothness(nodal.kind)
+        along, law = nodal.along, nodal.smoothness
         scale = np.ones(own.count)
         begin = len(self.motions)
         for i, (d, motion) in enumerate(zip(own.ins, along.motions, strict=True)):
@@ -378,7 +346,7 @@ class Channels:
             q, theta = self._state(nodal, begin, path)
             rows = change[begin : begin + nodal.count]
             d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.along.moving else rows[:, 0]
-            if _smoothness(nodal.kind).sharp[0]:
+            if nodal.smoothness.sharp[0]:
                 new = f_q + np.einsum("rsn,sn->rn", nodal.law.curvature(q, theta, nodal.c), d)
             else:
                 new = nodal.law.tangent(_moved(nodal, q, d), theta, nodal.c)[1]
@@ -422,7 +390,7 @@ class Channels:
 
 def _moved(nodal: GeneralLaw, q: Array, d: Array) -> Array:
     """The states `q + d`, which stay on their sides of all corners."""
-    moved, law = q + d, _smoothness(nodal.kind)
+    moved, law = q + d, nodal.smoothness
     for row, levels in ((0, law.points), (nodal.count, law.velocities)):
         for level in levels:
             near = _SLICE * max(float(np.abs(q[row]).max()), np.finfo(float).tiny)
@@ -431,7 +399,7 @@ def _moved(nodal: GeneralLaw, q: Array, d: Array) -> Array:
     return moved
 
 
-def _grading(law: _Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> tuple[Array, Array]:
+def _grading(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> tuple[Array, Array]:
     """Where panels are graded towards corners, as towards a law that is sharp there."""
     if not law.rough or not levels:
         return _NONE, _NONE

@@ -118,6 +118,11 @@ class Equations:
             np.concatenate([np.zeros(0)] + [entries for _, entries in packed]),
         )
 
+    @lazy
+    def acting(self) -> Array:
+        """Where the forces of all channels act, (C, size)."""
+        return np.array([group.direction for group in self.all_groups]).reshape(-1, self.size)
+
     @property
     def steady(self) -> bool:
         """Whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X."""

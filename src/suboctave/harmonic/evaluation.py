@@ -375,11 +375,9 @@ class BalanceState:
 
         To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
         """
-        k = np.arange(self.basis.harmonics + 1, self.balance.top + 1)
-        force = np.zeros((len(k), self.balance.size), dtype=complex)
-        for channel, spectrum in zip(self.channels, self.force_spectra, strict=True):
-            force += np.multiply.outer(2.0 * spectrum[k[0] :], channel.out)
-        frequency = k / self.basis.nu * self.omega
+        lowest = self.basis.harmonics + 1
+        force = 2.0 * self.force_spectra[:, lowest:].T @ self.balance.acting
+        frequency = np.asarray(np.arange(lowest, self.balance.top + 1) * self.rate, dtype=float)
         compliance = self.linear.compliance(frequency)
         if compliance is not None:
             force = np.einsum("kij,kj->ki", compliance, force)
@@ -392,8 +390,14 @@ class BalanceState:
     @lazy
     def tails(self) -> tuple[Array, float]:
         """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
-        tail = np.empty(2 * self.basis.harmonics + 2)
-        return tail, float(add_tails(self.x, self.neglected, self.balance.scales()[0], tail))
+        weight = self.balance.scales()[0]
+        rows = ((self.x * weight) ** 2).sum(axis=1)
+        beyond = (np.abs(self.neglected * weight) ** 2).sum(axis=1)
+        squares = np.concatenate((rows[:1], rows[1::2] + rows[2::2], beyond))
+        size, tail = math.sqrt(rows.sum()), np.zeros(len(squares))
+        if size > 0.0:
+            tail[:-1] = np.sqrt(np.cumsum(squares[:0:-1])[::-1]) / size
+        return tail, size
 
     @lazy
     def completed(self) -> BalanceState:
@@ -502,32 +506,3 @@ def along_directions(x, starts, dofs, shape, motions):
                     re += shape[s] * x[2 * h - 1, dofs[s]]
                     im -= shape[s] * x[2 * h, dofs[s]]
             motions[g, h] = complex(re, im)
-
-
-@kernel()
-def add_tails(x, neglected, weight, out):
-    """Size of all harmonics above k relative to the motion, into `out` for k = 0 .. 2 H + 1; returns the motion's size.
-
-    x (2 H + 1, n): coefficients; `neglected` (H + 1, n) complex amplitudes from H + 1 on; sizes are weighted per DOF.
-    """
-    rows, n = x.shape
-    high = rows // 2
-    squares = np.zeros(2 * high + 2)
-    for i in range(n):
-        w = weight[i] * weight[i]
-        squares[0] += w * x[0, i] * x[0, i]
-        for h in range(1, high + 1):
-            a, b = x[2 * h - 1, i], x[2 * h, i]
-            squares[h] += w * (a * a + b * b)
-        for h in range(high + 1):
-            a, b = neglected[h, i].real, neglected[h, i].imag
-            squares[high + 1 + h] += w * (a * a + b * b)
-    size = 0.0
-    for h in range(high + 1):
-        size += squares[h]
-    size = math.sqrt(size)
-    out[2 * high + 1] = total = 0.0
-    for h in range(2 * high, -1, -1):
-        total += squares[h + 1]
-        out[h] = math.sqrt(total) / size if size > 0.0 else 0.0
-    return size

@@ -141,7 +141,7 @@ class PeriodicOrbit:
         return math.sqrt(c[0].real ** 2 + 0.5 * float(np.sum(np.abs(c[1:]) ** 2)))
 
     def _peak(self, c: ComplexArray) -> float:
-        return float(peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0])
+        return peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0]
 
     def start(self) -> Array:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""

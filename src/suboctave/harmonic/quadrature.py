@@ -26,7 +26,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.trigonometric import FAST, displacement, jet, slope
+from suboctave.harmonic.trigonometric import FAST, displacement, jet, motion, slope
 
 #: fewest and most uniform samples per period of laws of unknown smoothness
 FEWEST, MOST = 32, 1 << 15
@@ -129,17 +129,6 @@ def rule_tables() -> tuple[Array, Array]:
 
 
 @kernel()
-def _jets(c, zr, zi):
-    """Value, first and second derivative of the motion at the points z, shape (3, N)."""
-    out = np.empty((3, zr.shape[0]))
-    first = slope(c, 1.0)
-    displacement(c, zr, zi, out[0])
-    displacement(first, zr, zi, out[1])
-    displacement(slope(first, 1.0), zr, zi, out[2])
-    return out
-
-
-@kernel()
 def _roots(x, d, s, point, width):
     """Both complex offsets at which the parabola (x, d, s) equals point + i width: real and imaginary parts.
 
@@ -176,11 +165,12 @@ def singular_instants(c, points, widths, reach, zr, zi):
     """
     n = zr.shape[0]
     cell = 2.0 * math.pi / n
-    found = np.empty((2, 8 * n))
+    instants = np.empty((2, 8 * n))
     count = 0
-    jets = _jets(c, zr, zi)
+    values, bends = motion(c, zr, zi), np.empty(n)
+    displacement(slope(slope(c, 1.0), 1.0), zr, zi, bends)
     for j in range(n):
-        x, d, s = jets[0, j], jets[1, j], jets[2, j]
+        x, d, s = values[0, j], values[1, j], bends[j]
         most = abs(d) * 1.5 * reach + abs(s) * reach * reach
         for m in range(points.shape[0]):
             if abs(x - points[m]) > most + abs(d) * cell + widths[m]:
@@ -213,26 +203,26 @@ def singular_instants(c, points, widths, reach, zr, zi):
                 distance = max(distance, 1e-13)
                 known = False
                 for k in range(count):
-                    gap = abs(found[0, k] - at)
+                    gap = abs(instants[0, k] - at)
                     gap = min(gap, 2.0 * math.pi - gap)
-                    if gap < 0.3 * min(distance, found[1, k]) + 1e-13:
-                        found[1, k] = min(found[1, k], distance)
+                    if gap < 0.3 * min(distance, instants[1, k]) + 1e-13:
+                        instants[1, k] = min(instants[1, k], distance)
                         known = True
                         break
-                if not known and count < found.shape[1]:
-                    found[0, count] = at
-                    found[1, count] = distance
+                if not known and count < instants.shape[1]:
+                    instants[0, count] = at
+                    instants[1, count] = distance
                     count += 1
     out = np.empty((2, count))
     for k in range(count):
         # by insertion: there are few
         i = k
-        while i > 0 and out[0, i - 1] > found[0, k]:
+        while i > 0 and out[0, i - 1] > instants[0, k]:
             out[0, i] = out[0, i - 1]
             out[1, i] = out[1, i - 1]
             i -= 1
-        out[0, i] = found[0, k]
-        out[1, i] = found[1, k]
+        out[0, i] = instants[0, k]
+        out[1, i] = instants[1, k]
     return out
 
 
@@ -286,20 +276,6 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
         at_r[j] = cr * co - ci * si
         at_i[j] = cr * si + ci * co
     return count + orders
-
-
-@kernel()
-def _with_motion(c, zr, zi, w, moving):
-    """The result of `sharp_nodes`: one array, since handing arrays over costs more than filling them."""
-    out = np.empty((5 if moving else 4, zr.shape[0]))
-    for j in range(zr.shape[0]):
-        out[0, j] = zr[j]
-        out[1, j] = zi[j]
-        out[2, j] = w[j]
-    displacement(c, zr, zi, out[3])
-    if moving:
-        displacement(slope(c, 1.0), zr, zi, out[4])
-    return out
 
 
 @kernel()
@@ -368,4 +344,10 @@ def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
                 offset,
             )
             done += piece
-    return _with_motion(c, out_r[:count], out_i[:count], w[:count], moving)
+    # one array, since handing arrays over costs more than filling them
+    out = np.empty((5 if moving else 4, count))
+    out[0], out[1], out[2] = out_r[:count], out_i[:count], w[:count]
+    displacement(c, out[0], out[1], out[3])
+    if moving:
+        displacement(slope(c, 1.0), out[0], out[1], out[4])
+    return out

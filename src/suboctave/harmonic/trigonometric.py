@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.harmonic.basis import Array, ComplexArray
 
 #: flags under which the compiler may reorder sums, for loops in vector registers
 FAST = {"reassoc", "contract", "nsz"}
@@ -198,13 +199,13 @@ def _refine(c, lo, hi, flo, level):
 
 
 @kernel()
-def _search(c, level, lo, hi, f0, d0, f1, d1, found, count):
+def _search(c, level, lo, hi, f0, d0, f1, d1, roots, count):
     """Append the crossings of `level` in (lo, hi), an interval with one extremum at most; returns the new count.
 
     f, d: the motion minus level and its derivative at both ends.
     """
     if (f0 > 0.0) != (f1 > 0.0):
-        found[count] = _refine(c, lo, hi, f0, level)
+        roots[count] = _refine(c, lo, hi, f0, level)
         return count + 1
     if not ((f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0)):
         return count
@@ -229,8 +230,8 @@ def _search(c, level, lo, hi, f0, d0, f1, d1, found, count):
         tau = new
     x, d, s = jet(c, math.cos(tau), math.sin(tau))
     if (x - level > 0.0) != (f0 > 0.0):
-        found[count] = _refine(c, first, tau, f0, level)
-        found[count + 1] = _refine(c, tau, last, x - level, level)
+        roots[count] = _refine(c, first, tau, f0, level)
+        roots[count + 1] = _refine(c, tau, last, x - level, level)
         count += 2
     return count
 
@@ -240,7 +241,7 @@ def crossings_of(c, level, values):
     """`crossings`, from value and derivative of the motion (2, N) on a uniform grid that starts at tau = 0."""
     n = values.shape[1]
     h = 2.0 * math.pi / n
-    found = np.empty(4 * n)
+    roots = np.empty(4 * n)
     # not a literal, for which the search would be compiled twice
     count = np.int64(0)
     for j in range(n):
@@ -264,75 +265,36 @@ def crossings_of(c, level, values):
                     tau = new
                     x, d, s = jet(c, math.cos(tau), math.sin(tau))
                 if d * d0 < 0.0:
-                    count = _search(c, level, lo, tau, f0, d0, x - level, d, found, count)
-                    count = _search(c, level, tau, hi, x - level, d, f1, d1, found, count)
+                    count = _search(c, level, lo, tau, f0, d0, x - level, d, roots, count)
+                    count = _search(c, level, tau, hi, x - level, d, f1, d1, roots, count)
                     continue
         if (f0 > 0.0) != (f1 > 0.0) or (near and d0 * d1 < 0.0):
-            count = _search(c, level, j * h, (j + 1) * h, f0, d0, f1, d1, found, count)
-    return found[:count], values[0, 0] - level > 0.0
+            count = _search(c, level, j * h, (j + 1) * h, f0, d0, f1, d1, roots, count)
+    return roots[:count], values[0, 0] - level > 0.0
 
 
-@kernel()
-def crossings(c, level, zr, zi):
+def crossings(c: ComplexArray, level: float, zr: Array, zi: Array) -> tuple[Array, bool]:
     """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
 
     Sampled on the uniform grid z; a pair hidden between two samples is looked for at every extremum near the level
     (whose parabola comes within half its own rise of it), and two extrema between two samples where the cubic through
     them slows down. Exact up to rounding.
     """
-    return crossings_of(c, level, motion(c, zr, zi))
+    result: tuple[Array, bool] = crossings_of(c, level, motion(c, zr, zi))
+    return result
 
 
-@kernel()
-def peak(c, samples):
+def peak(c: ComplexArray, samples: int) -> tuple[float, float, float]:
     """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
 
-    Every sample interval that may hold an extremum large enough is searched by Newton's method on the derivative.
+    `samples`: equidistant instants from which extrema are looked for.
     """
-    n = samples
-    h = 2.0 * math.pi / n
-    zr, zi = np.empty(n), np.empty(n)
-    for j in range(n):
-        zr[j], zi[j] = math.cos(j * h), math.sin(j * h)
-    values = motion(c, zr, zi)
-    x, d = values[0], values[1]
-    best = -1.0
-    for j in range(n):
-        if abs(x[j]) > best:
-            best = abs(x[j])
-            where = j * h
-            value = x[j]
-    floor = best
-    for j in range(n):
-        m = (j + 1) % n
-        if (d[j] > 0.0) == (d[m] > 0.0):
-            continue
-        # within the interval x rises at most by h |d| above its ends
-        if max(abs(x[j]), abs(x[m])) + h * (abs(d[j]) + abs(d[m])) < floor:
-            continue
-        lo = j * h
-        hi = (j + 1) * h
-        sign = d[j] > 0.0
-        tau = lo + h * d[j] / (d[j] - d[m])
-        for _ in range(60):
-            v, g, b = jet(c, math.cos(tau), math.sin(tau))
-            if (g > 0.0) == sign:
-                lo = tau
-            else:
-                hi = tau
-            new = tau - g / b if b != 0.0 else 0.5 * (lo + hi)
-            if not (lo <= new <= hi):
-                new = 0.5 * (lo + hi)
-            done = abs(new - tau) < 1e-13
-            tau = new
-            if done:
-                break
-        v, g, b = jet(c, math.cos(tau), math.sin(tau))
-        if abs(v) > best:
-            best = abs(v)
-            where = tau
-            value = v
-    return best, where, value
+    angle = 2.0 * math.pi * np.arange(samples) / samples
+    tau, value, _ = extrema(c, np.cos(angle), np.sin(angle))
+    if not len(tau):
+        return abs(float(c[0].real)), 0.0, float(c[0].real)
+    i = int(np.argmax(np.abs(value)))
+    return abs(float(value[i])), float(tau[i]), float(value[i])
 
 
 @kernel()
@@ -369,8 +331,8 @@ def extrema(c, zr, zi):
     n = zr.shape[0]
     h = 2.0 * math.pi / n
     values = motion(c, zr, zi)
-    found = np.empty((3, 2 * n))
-    tau, value, curve = found[0], found[1], found[2]
+    turns = np.empty((3, 2 * n))
+    tau, value, curve = turns[0], turns[1], turns[2]
     count = 0
     for j in range(n):
         d0 = values[1, j]
@@ -397,17 +359,7 @@ def extrema(c, zr, zi):
             for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
                 tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
                 count += 1
-    return found[:, :count].copy()
-
-
-@kernel()
-def _level_count(x, level):
-    """How often the motion crosses a level, from its extrema."""
-    crossed = 0
-    for i in range(x.shape[0]):
-        if (x[i] > level) != (x[(i + 1) % x.shape[0]] > level):
-            crossed += 1
-    return crossed
+    return turns[:, :count].copy()
 
 
 @kernel()
@@ -445,13 +397,16 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     pairs of indices, shape (m, 2), the number m of them that count, and how often each motion crosses its level. If the
     crossings differ by other than what the pairs explain, extrema have come or gone as well.
     """
-    crossed_a = _level_count(xa, level_a)
-    crossed_b = _level_count(xb, level_b)
+    crossed_a = crossed_b = 0
+    for i in range(xa.shape[0]):
+        crossed_a += (xa[i] > level_a) != (xa[(i + 1) % xa.shape[0]] > level_a)
+    for i in range(xb.shape[0]):
+        crossed_b += (xb[i] > level_b) != (xb[(i + 1) % xb.shape[0]] > level_b)
     wanted = min(xa.shape[0], xb.shape[0])
-    found = np.empty((wanted, 2), dtype=np.int64)
+    pairs = np.empty((wanted, 2), dtype=np.int64)
     count = 0
     if wanted == 0:
-        return found, count, crossed_a, crossed_b
+        return pairs, count, crossed_a, crossed_b
     ia = _smoothed(xa, wanted)
     ib = _smoothed(xb, wanted)
     # maxima to maxima
@@ -470,14 +425,7 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
         p = ia[i]
         q = ib[(i + best) % wanted]
         if (xa[p] > level_a) != (xb[q] > level_b):
-            found[count, 0] = p
-            found[count, 1] = q
+            pairs[count, 0] = p
+            pairs[count, 1] = q
             count += 1
-    return found, count, crossed_a, crossed_b
-
-
-@kernel()
-def pass_by(ta, xa, sa, level_a, tb, xb, sb, level_b):
-    """Whether `passages` finds anything: extrema that pass a level, or a level crossed more or less often."""
-    _, count, crossed_a, crossed_b = passages(ta, xa, sa, level_a, tb, xb, sb, level_b)
-    return count > 0 or crossed_a != crossed_b
+    return pairs, count, crossed_a, crossed_b

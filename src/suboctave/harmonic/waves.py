@@ -113,10 +113,10 @@ def fourier(values: np.ndarray, weights: Array, zr: Array, zi: Array, top: int) 
 def along_basis(values: np.ndarray, weights: Array, zr: Array, zi: Array, high: int) -> np.ndarray:
     """`mean(g phi_k)` for phi_k = 1, cos tau, sin tau, .. up to H of functions (R, N) at instants: (R, 2 H + 1)."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
-    found = []
+    columns = []
     for part in parts:
         s = spectra(np.ascontiguousarray(part), weights, zr, zi, high)
         rows = np.empty((len(part), 2 * high + 1))
         rows[:, 0], rows[:, 1::2], rows[:, 2::2] = s[:, 0].real, s[:, 1:].real, -s[:, 1:].imag
-        found.append(rows)
-    return found[0] + 1j * found[1] if len(found) > 1 else found[0]
+        columns.append(rows)
+    return columns[0] + 1j * columns[1] if len(columns) > 1 else columns[0]

@@ -48,7 +48,7 @@ from suboctave.model.elements.smoothness import (
     SharpVelocitySampling,
 )
 
-__all__ = ["Corner", "GeneralLaw"]
+__all__ = ["Corner", "GeneralLaw", "Smoothness"]
 
 _NO_INSTANTS = np.zeros(0)
 #: how far on either side of a corner its jump is looked at, in units of the motion
@@ -77,6 +77,21 @@ class _Comb(NamedTuple):
     weights: Array
 
 
+class Smoothness(NamedTuple):
+    """How smooth a law is: corners in displacement and velocity, and whether powers of a half begin there; places and
+    widths of its singularities in velocity; its degree, if it is a polynomial, or 0; whether it is smooth only between
+    corners; whether all that is unknown.
+    """
+
+    points: tuple[float, ...] = ()
+    velocities: tuple[float, ...] = ()
+    rough: bool = False
+    sharp: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    degree: int = 0
+    cornered: bool = False
+    unknown: bool = False
+
+
 class GeneralLaw(LawAlong):
     """One element along a motion."""
 
@@ -87,6 +102,18 @@ class GeneralLaw(LawAlong):
         self.law = as_coupled(self.element)
         self.count = len(along.motions)
         self.harmonic = self.law.time_harmonic
+
+    @property
+    def smoothness(self) -> Smoothness:
+        """How smooth the law is, in numbers."""
+        kind = self.kind
+        if isinstance(kind, CornerSampling):
+            return Smoothness(kind.points, kind.velocities, kind.rough, cornered=True)
+        if isinstance(kind, SharpVelocitySampling):
+            return Smoothness(sharp=(kind.velocities, kind.widths))
+        if isinstance(kind, PolynomialSampling):
+            return Smoothness(degree=kind.degree)
+        return Smoothness(unknown=isinstance(kind, AdaptiveSampling))
 
     def state_at(self, zr: Array, zi: Array) -> tuple[Array, Array]:
         """q (Q, N) and theta (N,) at instants."""
@@ -130,7 +157,7 @@ class GeneralLaw(LawAlong):
         if not isinstance(kind, CornerSampling):
             return []
         grid = search_grid(self.along.high)
-        found: list[Corner] = []
+        corners: list[Corner] = []
         for row, series, levels in (
             (0, self.along.motion, kind.points),
             (self.count, self._velocity, kind.velocities),
@@ -139,8 +166,8 @@ class GeneralLaw(LawAlong):
                 # a velocity that is zero throughout rests in its corner
                 resting = not series[1:].any()
                 at = _NO_INSTANTS if resting else crossings(series, float(level), grid.zr, grid.zi)[0]
-                found.append(Corner(len(found), row, float(level), np.asarray(at)))
-        return found
+                corners.append(Corner(len(corners), row, float(level), np.asarray(at)))
+        return corners
 
     @lazy
     def path(self) -> tuple[Array, Array]:
@@ -151,8 +178,8 @@ class GeneralLaw(LawAlong):
         """Fourier coefficients (..., top + 1) of functions given at the nodes (..., N)."""
         nodes, top = self.nodes, self.along.top
         flat = np.ascontiguousarray(np.reshape(values, (-1, len(nodes.weights))), dtype=float)
-        found: ComplexArray = spectra(flat, nodes.weights, nodes.zr, nodes.zi, top)
-        return found.reshape(np.shape(values)[:-1] + (top + 1,))
+        coefficients: ComplexArray = spectra(flat, nodes.weights, nodes.zr, nodes.zi, top)
+        return coefficients.reshape(np.shape(values)[:-1] + (top + 1,))
 
     @lazy
     def spectra(self) -> ComplexArray:
@@ -161,13 +188,13 @@ class GeneralLaw(LawAlong):
         f, f_q = self.law.tangent(q, theta, self.c)
         if np.shape(f) != theta.shape or np.shape(f_q) != q.shape:
             raise InputError(f"{self.element.label}: tangent must return arrays of shape {theta.shape} and {q.shape}")
-        found = self.project(np.concatenate((f[None], f_q)))
-        if not np.isfinite(found).all():
+        rows = self.project(np.concatenate((f[None], f_q)))
+        if not np.isfinite(rows).all():
             raise ConvergenceError(
                 f"{self.element.label} returned a force that is not finite (largest displacement "
                 f"{np.abs(q[: self.count]).max():.3g})"
             )
-        return found
+        return rows
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
@@ -182,21 +209,21 @@ class GeneralLaw(LawAlong):
         q, theta = self.path
         f_c, f_qc = self.law.coefficient_tangent(q, theta, self.c)
         f_cc = self.law.coefficient_curvature(q, theta, self.c)
-        found = CoefficientSpectra(self.project(f_c), self.project(f_qc), self.project(f_cc))
+        derivatives = CoefficientSpectra(self.project(f_c), self.project(f_qc), self.project(f_cc))
         rates = self.element.level_rates(self.c) if self._combs else _NO_INSTANTS
         for comb in self._combs:
             # a corner that moves with a coefficient takes its Dirac function along
             ones = np.ones((1, len(comb.zr)))
             spectrum = spectra(ones, comb.weights, comb.zr, comb.zi, self.along.top)[0]
             by = rates[comb.corner.number]
-            found.tangent[:, comb.corner.row] -= np.multiply.outer(by, spectrum)
-            found.curvature[:] += np.multiply.outer(np.multiply.outer(by, by), spectrum)
-        return found
+            derivatives.tangent[:, comb.corner.row] -= np.multiply.outer(by, spectrum)
+            derivatives.curvature[:] += np.multiply.outer(np.multiply.outer(by, by), spectrum)
+        return derivatives
 
     @lazy
     def _combs(self) -> list[_Comb]:
         """The jumps of the force's slope at every corner, as Dirac functions along the motion."""
-        found = []
+        combs = []
         for corner in self.corners:
             if not len(corner.at):
                 continue
@@ -206,8 +233,8 @@ class GeneralLaw(LawAlong):
             # the rate is kept from zero where the motion only touches the corner
             least = 1e-12 * self.size(corner.row)
             weights = self.jump(corner, there, phase) / np.maximum(np.abs(rates), least)
-            found.append(_Comb(corner, zr, zi, weights))
-        return found
+            combs.append(_Comb(corner, zr, zi, weights))
+        return combs
 
     def size(self, row: int) -> float:
         """Largest value that a row of q takes along the motion."""
@@ -253,13 +280,13 @@ class GeneralLaw(LawAlong):
         nodes = self.nodes
         q, theta = self.path
         weights = nodes.weights * np.asarray(self.law.third(q, theta, self.c))
-        found = [Third(nodes.zr, nodes.zi, weights, None)]
+        parts = [Third(nodes.zr, nodes.zi, weights, None)]
         for corner in self.corners:
             if len(corner.at):
-                found.append(_at_corner(self, corner))
+                parts.append(_at_corner(self, corner))
                 if self.rough:
-                    found.append(_finite_part(self, corner))
-        return found
+                    parts.append(_finite_part(self, corner))
+        return parts
 
     def settled_samples(self) -> int | None:
         """Number of nodes with which force and tangent have settled; None where the smoothness decides.

@@ -180,11 +180,11 @@ def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
     touching = False
     for p in range(pieces.shape[0]):
         k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-        found, above = crossings_of(c, gap, values)
-        if found.shape[0] == 0 and above != (side > 0):
+        crossed, above = crossings_of(c, gap, values)
+        if crossed.shape[0] == 0 and above != (side > 0):
             continue
         touching = True
-        chi = contact_spectrum(found, above, side, top + high)
+        chi = contact_spectrum(crossed, above, side, top + high)
         for q in range(top + high + 1):
             slope[q] += k * chi[q]
         for q in range(top + 1):
@@ -210,10 +210,10 @@ def add_changed_pieces(c, pieces, grid_r, grid_i, force, stiffness):
         largest = max(largest, abs(c[h]))
     for p in range(pieces.shape[0]):
         k, gap, side, by_stiffness, by_gap = pieces[p]
-        found, above = crossings_of(c, gap, values)
-        if found.shape[0] == 0 and above != (side > 0):
+        crossed, above = crossings_of(c, gap, values)
+        if crossed.shape[0] == 0 and above != (side > 0):
             continue
-        chi = contact_spectrum(found, above, side, top + high)
+        chi = contact_spectrum(crossed, above, side, top + high)
         for q in range(top + 1):
             force[q] -= k * by_gap * chi[q]
             stiffness[q] += by_stiffness * chi[q]
@@ -223,8 +223,8 @@ def add_changed_pieces(c, pieces, grid_r, grid_i, force, stiffness):
                 force[q] += by_stiffness * product[q]
         if by_gap == 0.0:
             continue
-        for i in range(found.shape[0]):
-            zr, zi = math.cos(found[i]), math.sin(found[i])
+        for i in range(crossed.shape[0]):
+            zr, zi = math.cos(crossed[i]), math.sin(crossed[i])
             _value, speed, _bend = jet(c, zr, zi)
             # kept from zero where the motion grazes: the derivative does not exist there
             weight = side * k * by_gap / (2.0 * math.pi * max(abs(speed), 1e-12 * largest))
@@ -246,9 +246,9 @@ def corner_weights(c, pieces, grid_r, grid_i):
     out = np.empty((5, 4 * grid_r.shape[0] * max(1, pieces.shape[0])))
     count = 0
     for p in range(pieces.shape[0]):
-        found, _above = crossings_of(c, pieces[p, 1], values)
-        for i in range(found.shape[0]):
-            zr, zi = math.cos(found[i]), math.sin(found[i])
+        crossed, _above = crossings_of(c, pieces[p, 1], values)
+        for i in range(crossed.shape[0]):
+            zr, zi = math.cos(crossed[i]), math.sin(crossed[i])
             _value, speed, bend = jet(c, zr, zi)
             if abs(speed) < 1e-12 * largest:
                 speed = 1e-12 * largest

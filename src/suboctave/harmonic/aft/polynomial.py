@@ -36,11 +36,14 @@ class Polynomial(Sampled):
         u, slope = motion(self.along.motion, nodes.zr, nodes.zi)
         return nodes.zr, nodes.zi, nodes.weights, u, slope
 
-    def _derivative(self, order: int) -> Array:
-        """Weights of the polynomial's derivative of that order at the nodes."""
-        derived = np.polynomial.polynomial.polyder(self.coefficients, order)
-        values: Array = self.nodes.weights * np.polynomial.polynomial.polyval(self.path[3], derived)
-        return self.along.in_displacement(values, order)
+    @lazy
+    def _bends(self) -> Array:
+        """Weights of the second and third derivatives at the nodes, (2, N)."""
+        powers = np.arange(2, len(self.coefficients))
+        bends = np.zeros((2, len(self.nodes.zr)))
+        add_values(self.coefficients[2:] * powers * (powers - 1), self.path[3], bends[0], bends[1])
+        weighted: Array = self.nodes.weights * bends
+        return weighted
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
@@ -49,11 +52,11 @@ class Polynomial(Sampled):
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
-        return [Second(self.nodes.zr, self.nodes.zi, self._derivative(2))]
+        return [Second(self.nodes.zr, self.nodes.zi, self.along.in_displacement(self._bends[0], 2))]
 
     def third(self) -> list[Third]:
         """See `LawAlong.third`."""
-        return [Third(self.nodes.zr, self.nodes.zi, self._derivative(3), None)]
+        return [Third(self.nodes.zr, self.nodes.zi, self.along.in_displacement(self._bends[1], 3), None)]
 
 
 def polynomial_nodes(degree: int, high: int, top: int) -> Nodes:

@@ -109,8 +109,8 @@ class Sampled(LawAlong):
         """Fourier coefficients (..., top + 1) of functions given at the nodes (..., N)."""
         zr, zi, w, _, _ = self.path
         flat = np.ascontiguousarray(np.reshape(values, (-1, len(w))), dtype=float)
-        found: ComplexArray = spectra(flat, w, zr, zi, self.along.top)
-        return found.reshape(np.shape(values)[:-1] + (self.along.top + 1,))
+        coefficients: ComplexArray = spectra(flat, w, zr, zi, self.along.top)
+        return coefficients.reshape(np.shape(values)[:-1] + (self.along.top + 1,))
 
 
 class UniformLaw(Sampled):

@@ -60,4 +60,4 @@ def of_harmonic(amplitudes: ComplexArray, k: float, nu: int) -> float:
 
 def largest(amplitudes: ComplexArray) -> float:
     """Largest modulus over a period."""
-    return float(peak(np.ascontiguousarray(amplitudes), 8 * len(amplitudes))[0])
+    return peak(np.ascontiguousarray(amplitudes), 8 * len(amplitudes))[0]
