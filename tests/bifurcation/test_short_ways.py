@@ -6,8 +6,7 @@ import pytest
 import suboctave as so
 from suboctave import CubicSpring, ElasticStop, HarmonicLoad, System
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.bifurcation.normal_form import cubic
-from suboctave.bifurcation.normal_form.real import Expansion
+from suboctave.bifurcation.normal_form.real import Expansion, cubic_coefficient
 from suboctave.continuation import march
 from suboctave.continuation.linear import Factor, LeadingBlock
 from suboctave.curves.kinds.singular import SingularOperator
@@ -46,7 +45,7 @@ def test_the_short_ways_are_the_general_one(state):
     expected, size = general.cubic(solve(-0.5 * general.squared()))
     weights = np.linspace(1.0, 2.0, len(state.jacobian))
     block = LeadingBlock(Factor.of(state.jacobian / weights), len(weights))
-    found = cubic.cubic_coefficient(state, b.right, b.left, by_motion, block, weights)
+    found = cubic_coefficient(state, b.right, b.left, by_motion, block, weights)
     assert found == pytest.approx(expected, abs=1e-12 * size)
 
 

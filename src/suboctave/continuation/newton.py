@@ -176,11 +176,9 @@ def correct(
         if iteration == 0:
             first = size
         else:
-            rate = contraction
-            contraction = size / previous if previous > 0.0 else 0.0
+            rate, contraction = contraction, size / previous if previous > 0.0 else 0.0
             if row is None:
-                # far from a curve, and where two solutions are about to merge, the first corrections tell little
-                lost = size > _FAR or (iteration > _TELLING and contraction > 0.5 and previous > SHORT**2)
+                lost = _leads_away(iteration, size, contraction, previous)
             else:
                 lost = (contraction > 2.0 and size > first) or min(rate, contraction) > STALLED
             if lost and not options.damped and nearest is None:
@@ -192,6 +190,13 @@ def correct(
         f"Newton's method did not converge near {curve.where(guess)} "
         f"(residual {error:.1e} after {iteration} iterations)"
     )
+
+
+def _leads_away(iteration: int, size: float, contraction: float, previous: float) -> bool:
+    """Whether corrections of a square system come to nothing: far from a curve, and where two solutions are about to
+    merge, the first tell little.
+    """
+    return size > _FAR or (iteration > _TELLING and contraction > 0.5 and previous > SHORT**2)
 
 
 def _decrease(curve: Problem, u: Array, step: Array, error: float) -> float:

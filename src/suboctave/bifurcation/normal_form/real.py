@@ -8,7 +8,7 @@ import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.normal_form.terms import ROUNDING, Terms, unweighted
-from suboctave.continuation.linear import Factor
+from suboctave.continuation.linear import Factor, LeadingBlock
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.derivatives import Multilinear
 from suboctave.harmonic.evaluation import BalanceState
@@ -88,6 +88,24 @@ def doubled(own: Expansion, name: str) -> tuple[float, float, float, Array]:
     d = own.by_parameter + float((own.by_motion * along).sum())
     c3, size = own.cubic(second)
     return c3, d, size, second
+
+
+def cubic_coefficient(
+    state: BalanceState, phi: Array, psi: Array, by_motion: Array, block: LeadingBlock, weights: Array
+) -> float:
+    """c3 of a period doubling along curves of them, where `psi.R''[phi, .]` is known: it is the gradient of g.
+
+    Parameters
+    ----------
+    phi, psi
+        Right and left null vectors of J_half, in the coefficients' own units.
+    by_motion
+        Gradient of `psi.J_half phi` by the motion, shape (2 H + 1, size).
+    block, weights
+        J_0, its columns divided by the weights, one for every coefficient.
+    """
+    own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
+    return own.cubic(block.solve(-0.5 * own.squared()) / weights)[0]
 
 
 @dataclass(frozen=True)

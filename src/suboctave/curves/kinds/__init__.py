@@ -18,5 +18,5 @@ __all__ = ["equations_of"]
 def equations_of(kind: str) -> type[Augmentation]:
     """The equations of a kind that can be followed, as its row in the table of kinds names them."""
     module, _, name = KINDS[kind].equations.partition(":")
-    found: type[Augmentation] = getattr(import_module(f"{__name__}.{module}"), name)
-    return found
+    equations: type[Augmentation] = getattr(import_module(f"{__name__}.{module}"), name)
+    return equations
