@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from suboctave.interruption import Interruption
 from suboctave.model.system import System
 from suboctave.store.arrays import flat
 from suboctave.store.registry import Stored
@@ -36,14 +35,10 @@ class Layout:
 
 
 class TimeResult(Stored, ABC):
-    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
-
-    `interruption`: what stopped it before its end, Ctrl-C or a time limit (`seconds`); None if nothing did.
-    """
+    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications."""
 
     layout: ClassVar[Layout]
     system: System
-    interruption: Interruption | None = None
 
     @abstractmethod
     def to_xarray(self) -> xarray.Dataset:

@@ -19,6 +19,7 @@ from suboctave.results.files.branch import branch_from_dataset, branch_to_datase
 from suboctave.store.arrays import flat
 from suboctave.store.columns import parameter_column
 from suboctave.store.plain import from_json, to_json
+from suboctave.store.registry import parts_of
 from suboctave.store.systems import system_arrays, written_system
 
 if TYPE_CHECKING:
@@ -89,12 +90,9 @@ def opened(
     plural = words.endswith("s")
     try:
         head = groups[""]
-        names = str(head.attrs["parts"]).splitlines()
-        missing = [name for name in names if name not in groups]
-        if missing:
-            raise InputError(f"{missing[0]} of the {words if plural else 'map'} is missing")
+        datasets = parts_of(groups, str(head.attrs["parts"]).splitlines(), words if plural else "map")
         record = from_json(str(head["record"].item()), {**CLASSES, **(classes or {})})
-        parts = {name: branch_from_dataset(groups[name], allow_code, linear) for name in names}
+        parts = {name: branch_from_dataset(part, allow_code, linear) for name, part in datasets.items()}
         system = build(record["system"], system_arrays(head), allow_code)
         yield Opened(head, record, system, parts, float(head.attrs.get("seconds", np.nan)))
     except InputError:  # which is a ValueError

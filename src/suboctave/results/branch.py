@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,12 +17,10 @@ from suboctave.curves.points import BranchPoint
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.interruption import Interruption
 from suboctave.model.system import System
+from suboctave.results.curve_tables import CurveTables
 from suboctave.results.readings.readings import BranchReadings, columns, with_readings
 from suboctave.store.columns import parameter_column
-from suboctave.store.registry import Stored
-from suboctave.store.table import write_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -32,7 +29,7 @@ if TYPE_CHECKING:
     from suboctave.results.readings.sweep import SweepPath
 
 
-class Branch(Stored, BranchReadings):
+class Branch(CurveTables, BranchReadings):
     """A curve of periodic motions along one free parameter.
 
     Attributes
@@ -83,6 +80,7 @@ class Branch(Stored, BranchReadings):
         self.events = BifurcationList(events, tuple({e.kind for e in events}))
         self.closed = closed
         self.endings = endings
+        self.interruption = interruption_of(endings)
         self.observe = observe
         self.options = dict(options)
         self.warnings = warnings
@@ -92,16 +90,6 @@ class Branch(Stored, BranchReadings):
 
     def __len__(self) -> int:
         return len(self.points)
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether Ctrl-C or a time limit stopped it, in whichever direction; what had been computed is there."""
-        return self.interruption is not None
-
-    @property
-    def interruption(self) -> Interruption | None:
-        """What stopped it, None if nothing did."""
-        return interruption_of(self.endings)
 
     @property
     def ended(self) -> str:
@@ -247,13 +235,6 @@ class Branch(Stored, BranchReadings):
             "residual": [p.orbit.residual for p in self.points],
             **columns(self, readings),
         }
-
-    def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
-        """The points, or the "bifurcations", as comma-separated text (.csv)."""
-        frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
-        if what not in frames:
-            raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
-        return write_csv(frames[what](), path, overwrite)
 
     def bifurcations_frame(self) -> pandas.DataFrame:
         """One row per bifurcation, grazing and event, in the order met: place, parameters, multiplier, errors.

@@ -6,20 +6,18 @@ import textwrap
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
 from suboctave.curves.junction import period_name
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError
 from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch
+from suboctave.results.curve_tables import CurveTables
 from suboctave.results.readings.readings import shared
 from suboctave.store.columns import led_by
-from suboctave.store.registry import Stored
-from suboctave.store.table import write_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -104,7 +102,7 @@ class DiagramBranch:
         return f"<branch {self.number}: {self.label}, {len(self.branch)} points, {count} branches leave it>"
 
 
-class BifurcationDiagram(Stored):
+class BifurcationDiagram(CurveTables):
     """A response and the branches that bifurcate from it, as a tree; print it to see all of it.
 
     `diagram[2]` is the place of branch 2 in the tree, `diagram["4T"]` that of the one branch whose label begins so;
@@ -167,11 +165,6 @@ class BifurcationDiagram(Stored):
         """All located bifurcations, branch by branch."""
         return [item for branch in self.branches for item in branch.bifurcations]
 
-    @property
-    def interrupted(self) -> bool:
-        """Whether Ctrl-C or a time limit stopped it."""
-        return self.interruption is not None
-
     def of_period(self, nu: int) -> list[Branch]:
         """The branches of motions of `nu` load periods."""
         return [branch for branch in self.branches if branch.nu == nu]
@@ -215,13 +208,6 @@ class BifurcationDiagram(Stored):
             for node, frame in zip(self, frames, strict=True)
         ]
         return pd.concat([frame for frame in frames if len(frame)] or frames[:1], ignore_index=True)
-
-    def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
-        """The points, or the "bifurcations", of all branches as comma-separated text (.csv)."""
-        frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
-        if what not in frames:
-            raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
-        return write_csv(frames[what](), path, overwrite)
 
     def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
         """The datasets of all branches (`Branch.to_xarray`) by number and label: "1: 2T, PD 3.99 to PD 2.30".

@@ -7,7 +7,7 @@ class; nothing here knows one. The attribute `contents` of the first dataset nam
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,13 +17,24 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
+from suboctave.interruption import Interruption
 from suboctave.store import files
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Codec", "Datasets", "Stored", "contents", "from_datasets", "provenance", "register", "to_datasets"]
+__all__ = [
+    "Codec",
+    "Datasets",
+    "Stored",
+    "contents",
+    "from_datasets",
+    "parts_of",
+    "provenance",
+    "register",
+    "to_datasets",
+]
 
 Datasets = Mapping[str, "xarray.Dataset"]
 
@@ -88,11 +99,28 @@ def from_datasets(
     return codec.read(groups, allow_code, linear), details
 
 
+def parts_of(groups: Datasets, names: Iterable[str], whole: str) -> dict[str, xarray.Dataset]:
+    """The datasets of these names; InputError where one is missing, `whole` being what it is a part of."""
+    parts = {}
+    for name in names:
+        if name not in groups:
+            raise InputError(f"{name} of the {whole} is missing")
+        parts[name] = groups[name]
+    return parts
+
+
 class Stored:
     """A result that has a codec."""
 
     #: how long it took; nan where nobody measured
     seconds: float = float("nan")
+    #: what stopped it before its end, Ctrl-C or a time limit (`seconds`); None if nothing did
+    interruption: Interruption | None = None
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C or a time limit stopped it; what had been computed is there."""
+        return self.interruption is not None
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """All of it as a NetCDF file (.nc), which `load` gives back bit for bit (layout: docs/results.md).

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
 from suboctave.store import files
 from suboctave.store.arrays import array_of, flat
-from suboctave.store.registry import Codec, Datasets, from_datasets, register, to_datasets
+from suboctave.store.registry import Codec, Datasets, Stored, from_datasets, parts_of, register, to_datasets
 
 if TYPE_CHECKING:
     import pandas
@@ -24,15 +24,6 @@ __all__ = ["Table", "write_csv"]
 
 #: the part of a table's file that holds what the table was taken from
 _WHOLE = "result"
-
-
-class Whole(Protocol):
-    """A result that a table is taken from."""
-
-    @property
-    def interruption(self) -> Interruption | None:
-        """What stopped it before its end."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +36,7 @@ class Table:
 
     columns: Mapping[str, np.ndarray]
     title: str = ""
-    result: Whole | None = None
+    result: Stored | None = None
     stopped: Interruption | None = None
 
     @property
@@ -109,11 +100,8 @@ def _read(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> Tabl
     columns = {name: array_of(head, name) for name in str(head.attrs.get("columns", "")).splitlines()}
     result: Any = None
     if "parts" in head.attrs:
-        parts = str(head.attrs["parts"]).splitlines()
-        missing = [name for name in parts if name not in groups]
-        if missing:
-            raise InputError(f"{missing[0]} of the table is missing")
-        whole = {name.removeprefix(_WHOLE).removeprefix("/"): groups[name] for name in parts}
+        parts = parts_of(groups, str(head.attrs["parts"]).splitlines(), "table")
+        whole = {name.removeprefix(_WHOLE).removeprefix("/"): part for name, part in parts.items()}
         result, _ = from_datasets(whole, allow_code, linear)
     return Table(columns, str(head.attrs.get("title", "")), result)
 

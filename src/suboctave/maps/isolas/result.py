@@ -331,11 +331,6 @@ class Isolas(Stored, Sequence[Isola]):
         """The two parameters of its curves: omega and the design parameter."""
         return "omega", self.parameter
 
-    @property
-    def interrupted(self) -> bool:
-        """Whether Ctrl-C or a time limit stopped the search."""
-        return self.interruption is not None
-
     def noting(self, notes: Iterable[str], interruption: Interruption | None = None) -> Isolas:
         """The same with more that could not be settled, and with what stopped it."""
         self.notes = (*self.notes, *notes)

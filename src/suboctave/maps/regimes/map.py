@@ -54,11 +54,6 @@ class RegimeMap(LabelledPlane, Stored):
         What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
-    @property
-    def interrupted(self) -> bool:
-        """Whether Ctrl-C or a time limit stopped it."""
-        return self.interruption is not None
-
     @limited
     def check(
         self,

@@ -21,7 +21,7 @@ from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.results.files.branch import branch_from_dataset, branch_to_dataset
 from suboctave.store.layout import events_met
 from suboctave.store.plain import from_json, to_json
-from suboctave.store.registry import Codec, register
+from suboctave.store.registry import Codec, parts_of, register
 
 if TYPE_CHECKING:
     import xarray
@@ -78,10 +78,8 @@ def diagram_from_datasets(
     head = groups[""]
     try:
         count = int(head.attrs["branches"])
-        missing = [name for name in (f"branch_{i}" for i in range(count)) if name not in groups]
-        if missing:
-            raise InputError(f"{missing[0]} of the diagram is missing")
-        branches = [branch_from_dataset(groups[f"branch_{i}"], allow_code, linear) for i in range(count)]
+        parts = parts_of(groups, [f"branch_{i}" for i in range(count)], "diagram")
+        branches = [branch_from_dataset(part, allow_code, linear) for part in parts.values()]
         met: list[Any] = [events_met(branch) for branch in branches]
         nodes = [DiagramBranch(branches[0])]
         for number in range(1, count):
