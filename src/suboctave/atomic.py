@@ -10,8 +10,6 @@ from typing import Any
 
 from suboctave.errors import InputError, path_of
 
-__all__ = ["free_place", "replace_file"]
-
 
 def free_place(path: str | Path, overwrite: bool = False, suffixes: tuple[str, ...] = ()) -> Path:
     """The path, if a file can be written there; found out before any work.

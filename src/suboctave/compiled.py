@@ -20,8 +20,6 @@ import numpy as np
 from numba import config, njit
 from numba.core import event
 
-__all__ = ["KERNELS", "kernel"]
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 #: all kernels that have been imported, as Numba's dispatchers

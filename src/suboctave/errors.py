@@ -15,11 +15,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "ConvergenceError", "InputError", "Refusals", "SuboctaveError", "TimeLimitError", "check_numbers", "is_number",
-    "located", "path_of", "shortened", "suggest",
-]  # fmt: skip
-
 Key = tuple[str | int, ...]
 
 

@@ -22,18 +22,6 @@ from typing import Any, ParamSpec, TypeVar
 
 from suboctave.errors import InputError, TimeLimitError
 
-__all__ = [
-    "Deadline",
-    "Interruption",
-    "TimeLimitReached",
-    "check_seconds",
-    "check_time",
-    "limited",
-    "pass_on",
-    "time_limit",
-    "unlimited",
-]
-
 Arguments = ParamSpec("Arguments")
 Given = TypeVar("Given")
 

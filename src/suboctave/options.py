@@ -20,8 +20,6 @@ from typing import Annotated, Any, ParamSpec, TypedDict, TypeVar, get_args, get_
 
 from suboctave.errors import suggest
 
-__all__ = ["RunOptions", "with_options"]
-
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 

@@ -46,22 +46,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = [
-    "BORDER",
-    "SMALL",
-    "WITHIN",
-    "boundary_drawing",
-    "boundary_names",
-    "boundary_styles",
-    "chosen_axes",
-    "event_entries",
-    "event_markers",
-    "event_words",
-    "is_boundary",
-    "kind_of",
-    "plane_of",
-    "plot_boundaries",
-]
 
 #: what the strokes mean here
 BORDER, WITHIN = "borders stable motions", "within unstable motions"

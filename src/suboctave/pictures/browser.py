@@ -18,8 +18,6 @@ from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Item, Label, Markers, Polyline, Region, Surface
 from suboctave.pictures.words import DIGITS, spelt
 
-__all__ = ["SYMBOLS", "figure_data", "html_of"]
-
 SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "o": "circle", "v": "triangle-down", "^": "triangle-up", "<": "triangle-left", ">": "triangle-right",
     "s": "square", "D": "diamond", "d": "diamond-tall", "P": "cross", "x": "x-thin", "X": "x", "*": "star",

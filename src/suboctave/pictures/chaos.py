@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["plot_basins", "plot_lyapunov", "plot_lyapunov_map", "plot_separation"]
 
 _EXPONENT = r"exponent $\lambda$"
 #: share of white in the colours of the first, second, ... motion of one period

@@ -15,30 +15,6 @@ import numpy as np
 from suboctave.pictures import style
 from suboctave.pictures.style import Mark, Pen
 
-__all__ = [
-    "Axis",
-    "Band",
-    "Beads",
-    "Drawing",
-    "Entry",
-    "Frame",
-    "Guide",
-    "Item",
-    "Label",
-    "Markers",
-    "Polyline",
-    "Raster",
-    "Region",
-    "Surface",
-    "Ticks",
-    "dot",
-    "event_rank",
-    "extent",
-    "ordered",
-    "plain",
-]
-
-
 #: millimetres between beads along a line, and between one and a marker
 _SPACING, _CLEAR = 11.0, 2.3
 

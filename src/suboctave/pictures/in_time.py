@@ -24,16 +24,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = [
-    "Size",
-    "check_contents",
-    "checked_dof",
-    "plot_brute_force",
-    "plot_sections",
-    "plot_stepped_sine",
-    "plot_trajectory",
-    "symbol_of",
-]
 
 Size = str | tuple[float, float]
 _POINTING = {"up": "^", "down": "v", "rest": "o"}

@@ -24,20 +24,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = [
-    "CENTRE",
-    "MERGING",
-    "IsolaRegion",
-    "end_text",
-    "is_isolas",
-    "isola_regions",
-    "parameter_of",
-    "plot_isola_map",
-    "shade",
-    "split",
-    "surface",
-    "with_ends",
-]
 
 #: kinds that the events at the two ends of an isola have in pictures
 CENTRE, MERGING = "isola_centre", "isola_merging"

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.transforms import Bbox
 
-__all__ = ["annotate", "arrange", "fitting_legend", "place_legend"]
 
 Box: TypeAlias = "tuple[float, float, float, float]"
 

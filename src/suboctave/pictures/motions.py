@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["MotionDrawing", "plot_history", "plot_phase"]
 
 #: inches of one frame of a portrait, and of a history
 _PORTRAIT, _HISTORY = (3.0, 2.9), (5.6, 2.0)

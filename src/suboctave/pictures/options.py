@@ -20,21 +20,6 @@ from suboctave.store.layout import check_component, coordinate, has_component, r
 if TYPE_CHECKING:
     import xarray
 
-__all__ = [
-    "DERIVATIVES",
-    "QUANTITIES",
-    "Coordinates",
-    "CurveOptions",
-    "HistoryOptions",
-    "MotionView",
-    "SpaceOptions",
-    "SpectrumOptions",
-    "UnitOptions",
-    "View",
-    "as_multiple",
-    "keywords_of",
-    "shown_multiple",
-]
 
 # What the axis says, with {x} the observed displacement, {k} the harmonic, {e} the element.
 QUANTITIES = {

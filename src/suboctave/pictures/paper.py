@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of, suggest
 from suboctave.pictures import style
 from suboctave.pictures.drawing import (
@@ -32,13 +33,11 @@ from suboctave.pictures.drawing import (
 )
 from suboctave.pictures.labels import annotate, arrange, fitting_legend, place_legend
 from suboctave.pictures.strokes import bent
-from suboctave.store.files import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["DOT", "SUFFIXES", "check_path", "draw", "dress", "figure_of", "handles", "save_figure", "svg_text"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 # No time stamps: the same curve gives the same file.

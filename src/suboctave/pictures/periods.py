@@ -16,14 +16,6 @@ from suboctave.pictures.style import Pen, tinted
 if TYPE_CHECKING:
     import xarray
 
-__all__ = [
-    "curve_styles",
-    "period_colour",
-    "period_name",
-    "period_of",
-    "several_periods",
-    "styles_of_periods",
-]
 
 # Okabe and Ito's; those of T, 2T, 3T, 4T and 8T stay apart for every kind of colour blindness. The last five, which
 # time integration meets, are at least as far from these and each other as any two of the first

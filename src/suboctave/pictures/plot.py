@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["datasets_of", "plot"]
-
 
 def plot(
     curves: Any,

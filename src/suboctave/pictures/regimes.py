@@ -23,7 +23,6 @@ from suboctave.pictures.style import Pen, rgb, tinted
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_regimes"]
 
 Motions = Sequence[tuple[int, bool]]
 #: what a regime is called, its motions, what was not followed

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_drawing, boundary_names, is_boundary, kind_of, plane_of
@@ -37,14 +38,12 @@ from suboctave.pictures.report_tables import (
 from suboctave.pictures.response import response_drawing
 from suboctave.pictures.space import space_drawing
 from suboctave.pictures.words import spelt
-from suboctave.store.files import free_place, replace_file
 from suboctave.store.layout import check_layout
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["write_report"]
 
 #: inches of a still picture in the plane and in space
 _SIZE, _SIZE_IN_SPACE = (6.4, 4.2), (6.4, 4.8)

@@ -21,17 +21,6 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = [
-    "Table",
-    "bifurcations",
-    "columns_of",
-    "isolas_table",
-    "notes_on",
-    "notes_on_isolas",
-    "origin_of",
-    "records_of",
-    "summary_of",
-]
 
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page, or none

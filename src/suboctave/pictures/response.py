@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["draw_response", "plot_panels", "plot_response", "response_drawing", "response_frame"]
 
 #: shares of the axes beyond what is drawn
 _MARGINS = (0.02, 0.06)

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["plot_space", "space_drawing"]
 
 #: width of a response curve beside a curve of bifurcations, and of this one
 _THIN, _THICK = 0.7, 1.25

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["plot_spectrum"]
 
 _CELL = (5.6, 2.4)  # inches of one frame
 #: components below this share of the largest are rounding, or zero by symmetry

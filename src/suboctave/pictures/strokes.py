@@ -19,8 +19,6 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Line", "Stroke", "bent", "cut", "line", "line_through", "strokes", "without_repeats"]
-
 
 @dataclass(frozen=True)
 class _Vertices:

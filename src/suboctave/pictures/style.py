@@ -24,34 +24,6 @@ from suboctave.kinds import KINDS as ROWS
 if TYPE_CHECKING:
     import xarray
 
-__all__ = [
-    "CURVE_COLOURS",
-    "INK",
-    "KINDS",
-    "OF_SUBHARMONICS",
-    "ONE_CURVE",
-    "PRINT",
-    "SCREEN",
-    "SIZES",
-    "SOFT",
-    "STABLE_DASH",
-    "UNSTABLE_DASH",
-    "KindStyle",
-    "Look",
-    "Mark",
-    "Pen",
-    "Sheet",
-    "check_text",
-    "checked_text",
-    "curve_style",
-    "kind_style",
-    "look_of",
-    "marks",
-    "rgb",
-    "sheet_of",
-    "size_in_inches",
-    "tinted",
-]
 
 INK = "#1a1a1a"
 SOFT = "#8c8c8c"

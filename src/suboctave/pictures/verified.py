@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["plot_verified"]
 
 #: by outcome: what the legend says, its mark, its layer
 _MARKS = {

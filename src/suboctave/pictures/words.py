@@ -14,7 +14,6 @@ from suboctave.store.layout import coordinate
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["DIGITS", "Hover", "differing", "fixed_parameters", "spelt"]
 
 #: significant digits that a screen can show
 DIGITS = 9

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["BifurcationDiagram", "DiagramBranch", "tree_text"]
 
 #: characters of a line of a printed diagram
 WIDTH = 88

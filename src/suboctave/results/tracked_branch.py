@@ -135,6 +135,3 @@ def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> 
         TrackedPoint(p.orbit, p.floquet, p.arclength, p.iterations, None, extra, coefficient, *nature)
         for p, extra, coefficient, nature in zip(points, record["extra"], record["coefficient"], natures, strict=True)
     ]
-
-
-__all__ = ["TrackedBranch", "tracked_points", "tracked_record"]

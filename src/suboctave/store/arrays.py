@@ -10,7 +10,6 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["array_of", "flat", "padded"]
 
 _PARTS = ("real", "imag")
 

@@ -18,8 +18,6 @@ from suboctave.errors import InputError
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["digest", "pack", "unpack"]
-
 
 def pack(dataset: xarray.Dataset) -> bytes:
     """The dataset's variables and attributes (numbers and texts) as bytes."""

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["led_by", "parameter_column"]
-
 
 def parameter_column(name: str, taken: Collection[str]) -> str:
     """The column of a parameter in a table whose other columns have the names `taken`."""

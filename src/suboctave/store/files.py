@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.atomic import free_place, replace_file
+from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of
 from suboctave.store.blocks import digest
 from suboctave.store.layout import LAYOUT
@@ -22,7 +22,6 @@ from suboctave.version import __version__
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["free_place", "number", "read", "replace_file", "write"]
 
 _AGAIN = "run the study again, or take a copy that is whole"
 

@@ -29,7 +29,6 @@ from suboctave.version import __version__
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["ISOLA_COLUMNS", "isolas_dataset"]
 
 #: variables on `isola`: name, kind, meaning
 ISOLA_COLUMNS: tuple[tuple[str, Any, str], ...] = (

@@ -20,7 +20,6 @@ from suboctave.store.blocks import pack, unpack
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Journal", "Record", "read_journal"]
 
 _TABLE = "suboctave_journal"
 #: how journals begin that were no databases yet

@@ -38,18 +38,6 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
 
-__all__ = [
-    "LAYOUT",
-    "EventRow",
-    "branch_dataset",
-    "check_component",
-    "check_layout",
-    "coordinate",
-    "curve_dataset",
-    "events_met",
-    "has_component",
-    "reading_name",
-]
 
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
 UNKNOWN = -1  # in event_stable_after

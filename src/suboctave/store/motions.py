@@ -35,7 +35,6 @@ from suboctave.version import __version__
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["check_motion_layout", "motion_dataset", "motion_datasets"]
 
 _CONTENTS = "motion"
 #: samples in one load period: enough for a smooth line, more where the motion has high harmonics

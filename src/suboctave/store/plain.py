@@ -17,8 +17,6 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.model.description import plain_number
 
-__all__ = ["from_json", "to_json"]
-
 
 def to_json(value: Any) -> str:
     """A value as JSON text; InputError for what cannot be written."""

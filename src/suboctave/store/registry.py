@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.atomic import free_place
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
@@ -24,17 +25,6 @@ from suboctave.version import __version__
 if TYPE_CHECKING:
     import xarray
 
-__all__ = [
-    "Codec",
-    "Datasets",
-    "Stored",
-    "contents",
-    "from_datasets",
-    "parts_of",
-    "provenance",
-    "register",
-    "to_datasets",
-]
 
 Datasets = Mapping[str, "xarray.Dataset"]
 
@@ -130,7 +120,7 @@ class Stored:
         InputError
             If the file exists and `overwrite` is not given, or cannot be written there.
         """
-        target = files.free_place(path, overwrite, (".nc",))
+        target = free_place(path, overwrite, (".nc",))
         files.write(target, to_datasets(self), provenance())
         return target
 

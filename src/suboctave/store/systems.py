@@ -11,8 +11,6 @@ from suboctave.model.system import System, describe
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Prefixed", "system_arrays", "written_system"]
-
 
 class Prefixed(dict[str, np.ndarray]):
     """Gives the arrays of systems names of their own among the variables of a file."""

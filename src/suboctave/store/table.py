@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
-from suboctave.store import files
 from suboctave.store.arrays import array_of, flat
 from suboctave.store.registry import Codec, Datasets, Stored, from_datasets, parts_of, register, to_datasets
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["Table", "write_csv"]
 
 #: the part of a table's file that holds what the table was taken from
 _WHOLE = "result"
@@ -76,8 +75,8 @@ class Table:
 
 def write_csv(frame: pandas.DataFrame, path: str | Path, overwrite: bool = False) -> Path:
     """A table as comma-separated text, all digits kept."""
-    target = files.free_place(path, overwrite, (".csv",))
-    files.replace_file(target, lambda place: frame.to_csv(place, index=False, float_format="%.17g"))
+    target = free_place(path, overwrite, (".csv",))
+    replace_file(target, lambda place: frame.to_csv(place, index=False, float_format="%.17g"))
     return target
 
 

@@ -19,8 +19,6 @@ from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError,
 from suboctave.interruption import Interruption
 from suboctave.version import __version__
 
-__all__ = ["main"]
-
 FAILED, WRONG, INTERRUPTED = 1, 2, 130  # 130 is what a shell reports after Ctrl-C
 
 

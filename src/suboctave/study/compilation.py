@@ -18,8 +18,6 @@ from suboctave.analysis import continue_branch, frequency_response, switch_branc
 from suboctave.compiled import without_notice
 from suboctave.model import ElasticStop, Expression, HarmonicLoad, QuadraticDamper, System, library
 
-__all__ = ["COMPUTATIONS", "compile_all"]
-
 Report = Callable[[float, str], None]
 
 

@@ -39,8 +39,6 @@ from suboctave.study.steps.base import (
     tried,
 )
 
-__all__ = ["FIGURES", "CurveFigure", "Figure", "MotionFigure", "StudyCurves", "drawable"]
-
 _VIEW = [field.name for field in fields(View)]
 _Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
 

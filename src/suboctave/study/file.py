@@ -23,8 +23,6 @@ from suboctave.study.steps import STEPS, CheckContext, Known, Step
 from suboctave.study.system import SystemSection, make_system, overridden
 from suboctave.version import __version__
 
-__all__ = ["Study", "read_study"]
-
 #: a study file is written by hand; anything longer is something else
 _LONGEST = 5_000_000
 #: characters of the name of an analysis: files are called after it

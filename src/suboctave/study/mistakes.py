@@ -19,8 +19,6 @@ from suboctave.errors import InputError, Key, suggest
 if TYPE_CHECKING:
     import pydantic
 
-__all__ = ["Lines", "Mistake", "Mistakes", "StudyError"]
-
 
 @dataclass(frozen=True)
 class Mistake:

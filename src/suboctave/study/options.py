@@ -15,8 +15,6 @@ from suboctave.errors import InputError, suggest
 from suboctave.floquet import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 
-__all__ = ["as_formulation", "as_harmonics", "as_newton", "as_seeds", "as_stability", "as_stepping", "read_by"]
-
 _METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}
 _FORMULATIONS: dict[str, Any] = {one.name: one for one in (BorderedSystem, ExtendedSystem, Alcorta2019)}
 

@@ -11,19 +11,17 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from suboctave.atomic import free_place
 from suboctave.errors import InputError, Key
 from suboctave.maps.isolas.result import Isolas
 from suboctave.pictures.paper import SUFFIXES
 from suboctave.pictures.style import check_text
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.store import files
 from suboctave.study.figures import Figure, StudyCurves, drawable
 from suboctave.study.results import Result, Results
 from suboctave.study.steps import Step
 from suboctave.study.steps.base import Complaint
-
-__all__ = ["Outputs", "check_outputs", "csv_names", "places", "tables_of", "write_outputs"]
 
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 #: bytes of a file name: disks take 255, and half a name more is needed while it is written
@@ -126,7 +124,7 @@ def write_outputs(
         for name, item in results.items():
             for path, write in tables_of(name, item, folder):
                 if path not in left:
-                    yield write(files.free_place(path, True), overwrite=True)
+                    yield write(free_place(path, True), overwrite=True)
     missing = []
     for index, figure in enumerate(outputs.figures):
         path = folder / figure.file
@@ -177,5 +175,5 @@ def write_tables(results: Results, folder: Path, overwrite: bool) -> list[Path]:
         raise InputError(f"the folder {folder} cannot be made: {error.strerror}") from None
     jobs = [job for name, item in results.items() for job in tables_of(name, item, folder)]
     for path, _ in jobs:
-        files.free_place(path, overwrite)
+        free_place(path, overwrite)
     return [write(path, overwrite=overwrite) for path, write in jobs]

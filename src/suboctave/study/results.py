@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from suboctave.atomic import free_place
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.time_result import TimeResult
 from suboctave.harmonic.linear_part import LinearPart
@@ -22,7 +23,6 @@ from suboctave.verification import BranchVerification
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Result", "Results", "load"]
 
 #: what an analysis gives
 Result = Branch | BifurcationDiagram | Isolas | Table
@@ -76,7 +76,7 @@ class Results(Mapping[str, Result]):
 
         Raises InputError where the file exists and `overwrite` is not given, or cannot be written.
         """
-        target = files.free_place(path, overwrite, (".nc",))
+        target = free_place(path, overwrite, (".nc",))
         wrong = [name for name in self if not name or "/" in name or name == "."]
         if wrong:
             raise InputError(f"an analysis cannot be called {wrong[0]!r}: names are groups of the file, no slashes")

@@ -35,7 +35,6 @@ from suboctave.study.steps import Context, Step
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["JOURNAL", "Finished", "Outcome", "Recovered", "finished", "keep", "recovered", "run_study"]
 
 JOURNAL = "unfinished.journal"
 #: seconds between records of points of an analysis that is under way

@@ -20,8 +20,6 @@ from suboctave.model.matrices import matrix_coefficient
 from suboctave.model.system import System
 from suboctave.study.mistakes import Mistakes
 
-__all__ = ["SystemSection", "make_system", "overridden", "read_matrix"]
-
 MATRICES = ("mass", "damping", "stiffness")
 SUFFIXES = (".npy", ".npz", ".mtx", ".mat", ".csv")
 

@@ -43,7 +43,6 @@ from suboctave.store.systems import Prefixed, system_arrays
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["branch_from_dataset", "branch_to_dataset"]
 
 _CLASSES = {
     c.__name__: c

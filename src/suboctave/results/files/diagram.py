@@ -26,7 +26,6 @@ from suboctave.store.registry import Codec, parts_of, register
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["diagram_from_datasets", "diagram_to_datasets"]
 
 _MEANINGS = {
     "label": "period, and where the branch begins and ends",

@@ -19,8 +19,6 @@ from suboctave.harmonic.trigonometric import crossings, extrema
 from suboctave.model.elements.smoothness import levels as levels_of
 from suboctave.model.system import System
 
-__all__ = ["check_element", "contact_of", "gapped_elements", "peak_force"]
-
 #: samples around each candidate, and how often the search narrows around the best of them: 16^-9 = 1e-11 of a sample
 _AROUND, _ROUNDS = 33, 9
 #: candidates whose surroundings are searched

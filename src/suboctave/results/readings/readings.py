@@ -28,8 +28,6 @@ from suboctave.store.layout import check_component, has_component, reading_name
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["READINGS", "BranchReadings", "Reading", "read_reading", "shared", "with_readings"]
-
 
 class BranchReadings:
     """What is read off a branch, each an array (len,) over its points. DOFs default to the observed one."""

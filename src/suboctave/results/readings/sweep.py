@@ -22,7 +22,6 @@ from suboctave.store.layout import check_layout
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Jump", "SweepPath", "hysteresis", "sweep_path"]
 
 _DIRECTIONS = {"up": 1.0, "down": -1.0}
 _LEFT_FOR = {

@@ -21,8 +21,6 @@ from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_com
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.trigonometric import peak
 
-__all__ = ["ground_and_load", "largest", "of_harmonic", "translation"]
-
 
 def translation(n: int, direction: ArrayLike | None) -> Array:
     """The rigid translation r (n,): all DOFs alike unless told."""

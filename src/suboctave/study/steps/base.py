@@ -23,25 +23,6 @@ from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.study.results import Result
 
-__all__ = [
-    "STEPS",
-    "CheckContext",
-    "Context",
-    "Curve",
-    "Known",
-    "Motion",
-    "Named",
-    "Range",
-    "Step",
-    "as_curve",
-    "check_branch",
-    "check_motion",
-    "chosen",
-    "chosen_branch",
-    "key_of_curve",
-    "name_or_table",
-]
-
 #: the kinds of steps, by name
 STEPS: dict[str, type[Step]] = {}
 
