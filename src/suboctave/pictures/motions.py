@@ -8,17 +8,18 @@ stroboscopic points, at t = 0, 2 pi / omega, ...: a period doubling doubles thei
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from suboctave.errors import InputError
+from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
-from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionView, UnitOptions, keywords_of
+from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView
 from suboctave.pictures.paper import check_path, figure_of
 from suboctave.pictures.periods import curve_styles, period_name, period_of, styles_of_periods
 from suboctave.pictures.style import Mark, Pen
@@ -41,18 +42,8 @@ _WIDE = 5.0
 _LINE = 0.13
 
 
-def plot_phase(
-    motions: Any,
-    path: str | Path | None = None,
-    *,
-    points: Sequence[int] | None = None,
-    dof: int | None = None,
-    overlay: bool = False,
-    labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: str | tuple[float, float] | None = None,
-    **options: Unpack[UnitOptions],
-) -> Figure:
+@with_options(MotionOptions)
+def plot_phase(motions: Any, path: str | Path | None = None, **options: Unpack[MotionOptions]) -> Figure:
     """Draw phase portraits, dx/dt over x along one response period, side by side or in one frame.
 
     The colour tells the period, T, 2T, ...; circles are the stroboscopic points t = 0, 2 pi / omega, ..., thin lines
@@ -65,33 +56,14 @@ def plot_phase(
         these.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
-    points
-        Which points of the branches, by index.
-    dof
-        Degree of freedom; default the one that the branch observes, of an orbit alone that of its first load.
-    overlay
-        All in one frame; else each in its own, on shared axes.
-    labels, title
-        Names of the motions, title.
-    size
-        "single-column" (84 mm), "double-column" (174 mm), or width and height in inches. With several frames the named
-        sizes are widths.
-    options
-        `frequency`: "rad/s" or "Hz", where the system's time is in seconds. `omega_reference`: frequencies are stated
-        as `omega / omega_reference`, velocities as derivatives by `omega_reference t`. `scale`, `unit`: factor on
-        lengths, and its unit for the labels, `scale=1e3, unit="mm"`. `xlabel`, `ylabel`: texts of the axes.
 
     Raises
     ------
     InputError
         For what cannot be drawn, before anything is.
     """
-    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
-
-    view = MotionView(**keywords_of("plot_phase", options, UnitOptions))
-    check_path(path)
-    datasets = motion_datasets(motions, points, dof)
-    drawn = MotionDrawing(datasets, view, overlay=overlay, labels=labels, size=size, cell=_PORTRAIT)
+    drawn = MotionDrawing(motions, path, options, ["displacement"], _PORTRAIT)
+    datasets, view = drawn.datasets, drawn.view
     factors = np.array([[view.factor(0)], [view.factor(1)]])
     for index in drawn.lower_first:
         data = datasets[index]
@@ -102,48 +74,29 @@ def plot_phase(
         drawn.add_motion(index, at, sections)
     drawn.add_gaps(upright=True)
     texts = [view.name(datasets[0], order, words=not drawn.narrow) for order in (0, 1)]
-    return drawn.figure(Axis(texts[0]), Axis(texts[1]), title, path)
+    return drawn.figure(Axis(texts[0]), Axis(texts[1]))
 
 
-def plot_history(
-    motions: Any,
-    path: str | Path | None = None,
-    *,
-    points: Sequence[int] | None = None,
-    dof: int | None = None,
-    overlay: bool = False,
-    labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: str | tuple[float, float] | None = None,
-    **options: Unpack[HistoryOptions],
-) -> Figure:
+@with_options(HistoryOptions)
+def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack[HistoryOptions]) -> Figure:
     """Draw motions, or the force of an element along them, over one response period.
 
-    Time is counted in load periods from phase zero of the load; beside a motion of longer period others go on, thin.
-    Circles are the stroboscopic instants, thin grey lines the gaps of elements that act on the degree of freedom alone.
+    Time is counted in load periods from phase zero of the load, with `frequency` in seconds; beside a motion of longer
+    period others go on, thin. Circles are the stroboscopic instants, thin grey lines the gaps of elements that act on
+    the degree of freedom alone. `quantity` may be "force", too.
 
     Parameters
     ----------
-    motions, path, points, dof, overlay, labels, title, size
+    motions, path
         As in `plot_phase`.
-    options
-        `quantity`: "displacement", "velocity", "acceleration", or "force" with `element`, its index. `frequency`: "Hz"
-        or "rad/s", where the system's time is in seconds: the axis shows seconds. `omega_reference`: the axis shows
-        `omega_reference t`. `scale`, `unit`: factor on lengths (or on the force), and its unit for the label.
-        `xlabel`, `ylabel`: texts of the axes.
 
     Raises
     ------
     InputError
         For what cannot be drawn, before anything is.
     """
-    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
-
-    view = MotionView(**keywords_of("plot_history", options, HistoryOptions))
-    view.check_quantity([*DERIVATIVES, "force"])
-    check_path(path)
-    datasets = motion_datasets(motions, points, dof, () if view.element is None else (view.element,))
-    drawn = MotionDrawing(datasets, view, overlay=overlay, labels=labels, size=size, cell=_HISTORY, stacked=True)
+    drawn = MotionDrawing(motions, path, options, [*DERIVATIVES, "force"], _HISTORY, stacked=True)
+    datasets, view = drawn.datasets, drawn.view
     units = [_unit_of_time(dataset, view) for dataset in datasets]
     longest = max(float(data["time"].to_numpy()[-1]) * unit for data, unit in zip(datasets, units, strict=True))
     for index in drawn.lower_first:
@@ -165,7 +118,7 @@ def plot_history(
         upwards = f"force of element {view.element}" + (f" ({view.unit})" if view.unit else "")
     else:
         upwards = view.name(datasets[0], DERIVATIVES[view.quantity])
-    return drawn.figure(across, Axis(upwards), title, path)
+    return drawn.figure(across, Axis(upwards))
 
 
 def _values(dataset: xarray.Dataset, view: MotionView) -> np.ndarray:
@@ -185,21 +138,29 @@ def _unit_of_time(dataset: xarray.Dataset, view: MotionView) -> float:
 class MotionDrawing:
     """The frames of one figure of motions: one for each motion on shared axes, or one for all.
 
-    `narrow`, whether there is little room for words; `names` and `pens` of the motions; `legend` and `last`, the
-    legend's entries, first those of single motions.
+    `options` are those of the verb, `quantities` what it can draw, `cell` width and height of a frame in inches;
+    `stacked`: one frame above the other. `narrow`, whether there is little room for words; `names` and `pens` of the
+    motions; `legend` and `last`, the legend's entries, first those of single motions.
     """
 
     def __init__(
         self,
-        datasets: Sequence[xarray.Dataset],
-        view: MotionView,
-        *,
-        overlay: bool,
-        labels: Sequence[str] | None,
-        size: str | tuple[float, float] | None,
+        motions: Any,
+        path: str | Path | None,
+        options: Mapping[str, Any],
+        quantities: Sequence[str],
         cell: tuple[float, float],
         stacked: bool = False,
     ) -> None:
+        from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
+
+        given = {name: value for name, value in options.items() if value is not None}
+        view = MotionView(**{f.name: given[f.name] for f in fields(MotionView) if f.name in given})
+        view.check_quantity(quantities)
+        check_path(path)
+        elements = () if view.element is None else (view.element,)
+        datasets = motion_datasets(motions, given.get("points"), given.get("dof"), elements)
+        overlay, labels, size = bool(given.get("overlay")), given.get("labels"), given.get("size")
         count = len(datasets)
         if labels is not None and len(labels) != count:
             raise InputError(f"labels: expected one for each of the {count} motions, got {len(labels)}")
@@ -207,6 +168,7 @@ class MotionDrawing:
         if len(dofs) > 1:
             raise InputError(f"the motions are of different degrees of freedom ({dofs}): choose one with dof=")
         self.datasets, self.view, self.overlay = datasets, view, overlay and count > 1
+        self.title, self.path = given.get("title", ""), path
         frames = 1 if overlay else count
         self.columns = 1 if stacked else _columns(frames, size)
         rows = math.ceil(frames / self.columns)
@@ -261,7 +223,7 @@ class MotionDrawing:
                 self.frame(index).items.append(line)
                 self.last.setdefault("gaps", Entry(pen))
 
-    def figure(self, across: Axis, upwards: Axis, title: str | None, path: str | Path | None) -> Figure:
+    def figure(self, across: Axis, upwards: Axis) -> Figure:
         """The figure, saved where a path is given."""
         own = (self.view.xlabel, self.view.ylabel)
         axes = [replace(a, label=text or a.label) for a, text in zip((across, upwards), own, strict=True)]
@@ -269,8 +231,8 @@ class MotionDrawing:
         legend = "free" if len(self.frames) == 1 else "outside"
         arranged: dict[str, Any] = {"columns": self.columns, "legend": legend, "grid": False, "small": True}
         entries = {**self.legend, **self.last}
-        drawing = Drawing(axes, self.frames, entries, plain(title or ""), **arranged)
-        return figure_of(drawing, self.sheet, path)
+        drawing = Drawing(axes, self.frames, entries, plain(self.title), **arranged)
+        return figure_of(drawing, self.sheet, self.path)
 
 
 def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:

@@ -6,10 +6,10 @@ The public verbs take these as keywords; `View` and `MotionView` hold them once 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import numpy as np
 
@@ -51,51 +51,79 @@ _DOTS = ("x", r"\dot{x}", r"\ddot{x}")
 class UnitOptions(TypedDict, total=False):
     """Keywords of every figure of curves or motions: units and texts of the axes, see `Units`."""
 
-    frequency: str | None
-    omega_reference: float | None
-    scale: float | None
-    unit: str | None
-    xlabel: str | None
-    ylabel: str | None
+    frequency: Annotated[str | None, '"rad/s" or "Hz", where the system\'s time is in seconds.']
+    omega_reference: Annotated[
+        float | None,
+        "The axis shows `omega / omega_reference`; of motions time is `omega_reference t`, and velocities are "
+        "derivatives by that.",
+    ]
+    scale: Annotated[
+        float | None,
+        "Factor on the quantity; of motions on lengths, of a force on the force; in the plane of two parameters on the "
+        "one that is no frequency.",
+    ]
+    unit: Annotated[str | None, 'Its unit for the label, such as `scale=1e3, unit="mm"`.']
+    xlabel: Annotated[str | None, "Text of the axis to the right, instead of the one that follows from the above."]
+    ylabel: Annotated[str | None, "The same upwards; in space into the depth."]
 
 
 class SpaceOptions(UnitOptions, total=False):
     """Keywords of `plot_space`: the quantity of curves, see `View`, and its units."""
 
-    quantity: str | None
-    harmonic: float | None
-    element: int | None
-    dof: int | None
+    quantity: Annotated[
+        str | None,
+        'What is drawn: "amplitude" (default), "rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms", '
+        '"harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force", "transmissibility"; a '
+        "dataset must have it: `to_xarray(readings=...)`.",
+    ]
+    harmonic: Annotated[
+        float | None,
+        "Of which harmonic (alone: its amplitude), a multiple of omega: 0 is the mean, 0.5 a component of motions of "
+        "two load periods, which is zero for those of one.",
+    ]
+    element: Annotated[int | None, "Of which element, by index."]
+    dof: Annotated[int | None, "Of which degree of freedom; default the observed one."]
 
 
 class CurveOptions(SpaceOptions, total=False):
     """Keywords of `plot`: the quantity of curves, its units, and what of the frame is shown, see `View`."""
 
-    xlim: Sequence[float] | None
-    ylim: Sequence[float] | None
-    marks: Sequence[str] | None
+    xlim: Annotated[Sequence[float] | None, "Part of the axis to the right that is shown, (from, to)."]
+    ylim: Annotated[Sequence[float] | None, "The same upwards."]
+    marks: Annotated[
+        Sequence[str] | None,
+        'Kinds of bifurcations that get markers, ["PD", "LP"]; default all, of a diagram all but grazing contacts.',
+    ]
 
 
-class SpectrumOptions(UnitOptions, total=False):
-    """Keywords of `plot_spectrum`: the quantity of motions, see `MotionView`, and its units."""
+class MotionOptions(UnitOptions, total=False):
+    """Keywords of every figure of motions: which motions, how they are arranged, units and texts of the axes."""
 
-    quantity: str
+    points: Annotated[Sequence[int] | None, "Which points of the branches, by index."]
+    dof: Annotated[
+        int | None,
+        "Degree of freedom; default the one that the branch observes, of an orbit alone that of its first load.",
+    ]
+    overlay: Annotated[bool | None, "All in one frame; else each in its own, on shared axes."]
+    labels: Annotated[Sequence[str] | None, "Names of the motions."]
+    title: Annotated[str | None, "Title."]
+    size: Annotated[
+        str | tuple[float, float] | None,
+        '"single-column" (84 mm), "double-column" (174 mm), or width and height in inches. With several frames the '
+        "named sizes are widths.",
+    ]
+
+
+class SpectrumOptions(MotionOptions, total=False):
+    """Keywords of `plot_spectrum`."""
+
+    quantity: Annotated[str | None, '"displacement" (default), "velocity" or "acceleration".']
 
 
 class HistoryOptions(SpectrumOptions, total=False):
-    """Keywords of `plot_history`: the quantity of motions, or the force of an element, and its units."""
+    """Keywords of `plot_history`."""
 
-    element: int | None
-
-
-def keywords_of(verb: str, given: Mapping[str, Any], known: type) -> dict[str, Any]:
-    """The keywords given to a verb; TypeError for one that is not among those `known`, a TypedDict."""
-    for name in given:
-        if name not in known.__annotations__:
-            raise TypeError(
-                f"{verb}() got an unexpected keyword argument {name!r}{suggest(name, known.__annotations__)}"
-            )
-    return dict(given)
+    element: Annotated[int | None, 'Index of the element whose force is drawn, with `quantity="force"`.']
 
 
 @dataclass(frozen=True, kw_only=True)

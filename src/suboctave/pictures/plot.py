@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from suboctave.errors import InputError
+from suboctave.options import with_options
 from suboctave.pictures.boundary import is_boundary, plot_boundaries
 from suboctave.pictures.isolas import is_isolas
-from suboctave.pictures.options import CurveOptions, View, keywords_of
+from suboctave.pictures.options import CurveOptions, View
 from suboctave.pictures.response import plot_response
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@with_options(CurveOptions)
 def plot(
     curves: Any,
     path: str | Path | None = None,
@@ -49,21 +51,6 @@ def plot(
         Names of the curves in the legend, title.
     size
         "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
-    options
-        `quantity`: what is drawn, "amplitude" (default), "rms", "velocity", "velocity_rms", "acceleration",
-        "acceleration_rms", "harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force",
-        "transmissibility"; a dataset must have it: `to_xarray(readings=...)`.
-
-        `harmonic`, `element`, `dof`: of which harmonic (alone: its amplitude), of which element, of which degree of
-        freedom. Harmonics are multiples of omega: 0 is the mean, 0.5 a component of motions of two load periods, which
-        is zero for those of one.
-
-        `frequency`: "rad/s" or "Hz", where the system's time is in seconds. `omega_reference`: the axis shows
-        `omega / omega_reference`. `scale`, `unit`: factor on the quantity, and its unit for the label, such as
-        `scale=1e3, unit="mm"`; in the plane of two parameters, of the one that is no frequency.
-
-        `xlabel`, `ylabel`: texts of the axes. `xlim`, `ylim`: part of the axes that is shown, (from, to). `marks`:
-        kinds of bifurcations that get markers, ["PD", "LP"]; default all, of a diagram all but grazing contacts.
 
     Raises
     ------
@@ -75,7 +62,7 @@ def plot(
         labels = getattr(given[0], "legend", None) if labels is None else labels
         if options.get("marks") is None:
             options["marks"] = getattr(given[0], "marks", None)
-    view = View(**keywords_of("plot", options, CurveOptions))
+    view = View(**dict[str, Any](options))
     datasets = datasets_of(curves, view)
     if any(is_isolas(dataset) for dataset in datasets):  # in the plane, without the closed branches
         datasets = [dataset for dataset in datasets if "isola" not in dataset.attrs]

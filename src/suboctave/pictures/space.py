@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from suboctave.errors import InputError
+from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.boundary import (
     BORDER,
@@ -31,7 +32,7 @@ from suboctave.pictures.boundary import (
 )
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, Surface, plain
 from suboctave.pictures.isolas import CENTRE, is_isolas, shade, split, surface, with_ends
-from suboctave.pictures.options import Coordinates, SpaceOptions, View, keywords_of
+from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.periods import period_colour, period_name, period_of
 from suboctave.pictures.strokes import Stroke, cut, line_through
@@ -54,6 +55,7 @@ _CLEAR = 0.16
 _MARGIN = 0.04
 
 
+@with_options(SpaceOptions)
 def plot_space(
     curves: Any,
     path: str | Path | None = None,
@@ -83,9 +85,8 @@ def plot_space(
         Text of the vertical axis; `xlabel` and `ylabel` are those of the others.
     elevation, azimuth
         From where it is seen, degrees above the floor and around the vertical axis.
-    options
-        `quantity`, `harmonic`, `element`, `dof`, `frequency`, `omega_reference`, `scale`, `unit`, `xlabel`, `ylabel`,
-        as in `suboctave.plot`; `title` and `size` too.
+    title, size
+        As in `suboctave.plot`.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def plot_space(
     """
     from suboctave.pictures.plot import datasets_of
 
-    view = View(**keywords_of("plot_space", options, SpaceOptions))
+    view = View(**dict[str, Any](options))
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):
             raise InputError(f"{name} is an angle in degrees, not {angle!r}")

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from suboctave.errors import InputError
+from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Entry, Guide, Markers, Polyline, Ticks
 from suboctave.pictures.motions import MotionDrawing
-from suboctave.pictures.options import DERIVATIVES, MotionView, SpectrumOptions, keywords_of
-from suboctave.pictures.paper import check_path
+from suboctave.pictures.options import DERIVATIVES, MotionView, SpectrumOptions
 from suboctave.pictures.periods import period_colour, period_of
 from suboctave.pictures.style import Mark, Pen
 
@@ -43,50 +43,36 @@ _SIZE, _SMALLER = 0.62 * style.MARKER_SIZE, 0.8
 _END = Pen(style.SOFT, 0.9, (0, (1.0, 1.5)))
 
 
+@with_options(SpectrumOptions)
 def plot_spectrum(
     motions: Any,
     path: str | Path | None = None,
     *,
-    points: Sequence[int] | None = None,
-    dof: int | None = None,
     highest: float | None = None,
-    overlay: bool = False,
-    labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: str | tuple[float, float] | None = None,
     **options: Unpack[SpectrumOptions],
 ) -> Figure:
     """Draw the amplitudes of a motion's components on a logarithmic scale, one above the other or in one frame.
 
     Components at whole multiples of omega are those of motions of the load's period; those at multiples of omega / 2,
     omega / 3, ... have colours of their own. A dotted line ends what was solved for, hollow markers beyond it are the
-    neglected components, estimated.
+    neglected components, estimated. With `frequency` the axis shows frequencies, not multiples of omega.
 
     Parameters
     ----------
-    motions, path, points, dof, overlay, labels, title, size
+    motions, path
         As in `plot_phase`.
     highest
         Highest multiple of omega that is shown; default all that was solved for and some of what was neglected.
-    options
-        `quantity`: "displacement", "velocity" or "acceleration". `frequency`: "Hz" or "rad/s", the axis shows
-        frequencies, not multiples of omega. `omega_reference`: the axis shows frequencies over this one. `scale`,
-        `unit`: factor on lengths, and its unit for the label. `xlabel`, `ylabel`: texts of the axes.
 
     Raises
     ------
     InputError
         For what cannot be drawn, before anything is.
     """
-    from suboctave.store.motions import motion_datasets  # loads kernels, which curves from files need not
-
-    view = MotionView(**keywords_of("plot_spectrum", options, SpectrumOptions))
-    view.check_quantity(list(DERIVATIVES))
-    check_path(path)
     if highest is not None and not (isinstance(highest, int | float) and math.isfinite(highest) and highest > 0):
         raise InputError(f"highest must be a positive multiple of omega, not {highest!r}")
-    datasets = motion_datasets(motions, points, dof)
-    drawn = MotionDrawing(datasets, view, overlay=overlay, labels=labels, size=size, cell=_CELL, stacked=True)
+    drawn = MotionDrawing(motions, path, options, list(DERIVATIVES), _CELL, stacked=True)
+    datasets, view = drawn.datasets, drawn.view
     most = highest or max(_end(dataset) * (1.0 + _BEYOND) for dataset in datasets)
     nu = max(period_of(dataset) for dataset in datasets)
     # where components stand close their markers must not become one
@@ -102,7 +88,7 @@ def plot_spectrum(
     ticks = _ticks(nu, most) if view.frequency is None and view.omega_reference is None else None
     across = Axis(text, -0.6 * unit / nu, (most + 0.3 / nu) * unit, ticks=ticks)
     upwards = view.name(datasets[0], DERIVATIVES[view.quantity]).replace("$", r"$|c_k|$ of $", 1)
-    return drawn.figure(across, Axis(upwards, *decades, logarithmic=True), title, path)
+    return drawn.figure(across, Axis(upwards, *decades, logarithmic=True))
 
 
 def _end(dataset: xarray.Dataset) -> float:

@@ -18,8 +18,8 @@ from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isolas
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum
-from suboctave.pictures.isolas import is_isolas
 from suboctave.pictures.options import DERIVATIVES, MotionView, as_multiple
+from suboctave.pictures.plot import datasets_of
 from suboctave.pictures.style import size_in_inches
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
@@ -177,8 +177,7 @@ class CurveFigure(Figure):
         datasets = [dataset for name in there for dataset in self.datasets(results[name], view)]
         if not datasets:
             return False
-        completed = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
-        self.drawing([data if is_isolas(data) else next(completed) for data in datasets], path, labels, view)
+        self.drawing(datasets_of(datasets, view), path, labels, view)
         return True
 
     def datasets(self, item: Result, view: View) -> list[Any]:
