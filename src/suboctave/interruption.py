@@ -12,7 +12,6 @@ thread.
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -20,7 +19,7 @@ from dataclasses import dataclass
 from time import monotonic
 from typing import Any, ParamSpec, TypeVar
 
-from suboctave.errors import InputError, TimeLimitError
+from suboctave.errors import InputError, TimeLimitError, is_number
 
 Arguments = ParamSpec("Arguments")
 Given = TypeVar("Given")
@@ -86,13 +85,9 @@ def check_seconds(seconds: Any) -> float | None:
     """A time limit in seconds, None for none; InputError for what is no positive number."""
     if seconds is None:
         return None
-    try:
-        number = math.nan if isinstance(seconds, bool | str | bytes) else float(seconds)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not 0.0 < number < math.inf:
+    if isinstance(seconds, bool) or not is_number(seconds) or seconds <= 0.0:
         raise InputError(f"seconds must be a positive number, or None for no time limit, not {seconds!r}")
-    return number
+    return float(seconds)
 
 
 @contextmanager
