@@ -49,8 +49,8 @@ def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     """A function (share done, where) to report to, or None.
 
     `progress` is None or False (silent), True (a bar on standard error, silent where that is not a terminal), or a
-    callable that takes the share done, 0 to 1, and a text. If that has a method `found`, it is called after each point
-    with the trace so far (points, bifurcations): a journal keeps it.
+    callable that takes the share done, 0 to 1, and a text. If that has a method `followed`, it is called after each
+    point with the trace so far (points, bifurcations): a journal keeps it.
     """
     if progress is None or progress is False:
         yield None

@@ -64,10 +64,10 @@ class _Follower(Driver):
         self._watch: DoublingWatch | None = None
         if settings.formulation.doubling_test is not None:
             self._watch = DoublingWatch(settings.formulation.doubling_test, self._kinds["PD"], self._located)
-        #: somebody who keeps what has been found (`progress.reporting`)
+        #: somebody who keeps the curve so far (`progress.reporting`)
         self._keeper: Callable[[Trace], None] | None = None
         if settings.report is not None:
-            self._keeper = getattr(settings.report.report, "found", None)
+            self._keeper = getattr(settings.report.report, "followed", None)
 
     def _walk(self) -> None:
         # in a fresh installation the first verdict on stability waits for its kernels to be compiled

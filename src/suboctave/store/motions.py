@@ -84,7 +84,7 @@ def _laid_out(
     import xarray
 
     if isinstance(item, xarray.Dataset):
-        yield _as_asked(item, dof, elements)
+        yield _checked(item, dof, elements)
     elif _is_branch(item):
         if points is None:
             raise InputError(
@@ -104,7 +104,7 @@ def _laid_out(
         yield motion_dataset(orbit, dof, kind=str(getattr(item, "kind", "")), elements=elements)
 
 
-def _as_asked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]) -> xarray.Dataset:
+def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]) -> xarray.Dataset:
     check_motion_layout(dataset)
     there = int(dataset.attrs["dof"])
     if dof is not None and dof != there:

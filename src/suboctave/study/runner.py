@@ -363,7 +363,7 @@ class Noting:
         if self.progress is not None:
             self.progress(share, where)
 
-    def found(self, trace: Any) -> None:
+    def followed(self, trace: Any) -> None:
         """Called at each point of a curve with what there is of it so far."""
         now = perf_counter()
         events = len(trace.bifurcations)
