@@ -173,3 +173,13 @@ def test_orbit_as_data(solve):
         orbit.harmonic(0.25)
     with pytest.raises(InputError, match="out of range"):
         orbit.amplitude(1)
+
+
+def test_laws_at_parameter_values_are_computed_once():
+    system = so.library.reference_oscillator()
+    balance = HarmonicBalance(system, HarmonicBasis(3))
+    assert balance.laws(balance.values) is balance.laws(balance.values)
+    others = {**system.parameters, "j": 0.1}
+    assert balance.laws(others) is balance.laws(dict(others))
+    assert balance.laws(others) is not balance.laws(balance.values)
+    assert balance.laws({**others, "j": 0.2}) is not balance.laws(others)

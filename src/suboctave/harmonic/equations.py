@@ -167,11 +167,11 @@ class Equations:
             return kept[1]
         members = []
         for i, element in enumerate(self.system.elements):
-            key = tuple([values[name] for name in self._names[i]])
+            at = tuple([values[name] for name in self._names[i]])
             cached = self._members.get(i)
-            if cached is None or cached[0] != key:
+            if cached is None or cached[0] != at:
                 c = element.coefficient_values(values)
-                cached = self._members[i] = key, Member(i, element, element.sampling(c), c, self.samples[i])
+                cached = self._members[i] = at, Member(i, element, element.sampling(c), c, self.samples[i])
             members.append(cached[1])
         groups = [DirectionLaws.of(tuple([members[i] for i in group.members])) for group in self.groups]
         self._laws[own] = key, Laws(members, groups)
