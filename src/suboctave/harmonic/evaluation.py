@@ -390,9 +390,8 @@ class BalanceState:
     @lazy
     def tails(self) -> tuple[Array, float]:
         """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
-        weight = self.balance.scales()[0]
-        rows = ((self.x * weight) ** 2).sum(axis=1)
-        beyond = (np.abs(self.neglected * weight) ** 2).sum(axis=1)
+        x, lacking = (part * self.balance.scales()[0] for part in (self.x, self.neglected))
+        rows, beyond = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", lacking, lacking.conj()).real
         squares = np.concatenate((rows[:1], rows[1::2] + rows[2::2], beyond))
         size, tail = math.sqrt(rows.sum()), np.zeros(len(squares))
         if size > 0.0:
