@@ -171,7 +171,7 @@ class BalanceState:
     def _spectra(self) -> ComplexArray:
         """`_exact` with all elements."""
         table, packed = self._exact, self.packed
-        if packed.exact.all() and not self.balance.own:
+        if packed.all_exact and not self.balance.own:
             return table
         for c, channel in enumerate(self.channels):
             if c >= len(packed.exact) or not packed.exact[c]:

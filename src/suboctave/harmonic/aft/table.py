@@ -177,8 +177,8 @@ class PackedLaws(NamedTuple):
         belong to, (G, 2).
     closed_form
         Whether that is all of them.
-    exact
-        Which directions have pieces and polynomials alone, (G,).
+    exact, all_exact
+        Which directions have pieces and polynomials alone, (G,), and whether all have.
     singularities
         Direction, places and widths of where laws are sharp.
     degree, unknown_samples
@@ -194,6 +194,7 @@ class PackedLaws(NamedTuple):
     line: Array
     closed_form: bool
     exact: NDArray[np.bool_]
+    all_exact: bool
     singularities: list[tuple[int, Array, Array]]
     degree: int
     unknown_samples: int
@@ -206,6 +207,7 @@ class PackedLaws(NamedTuple):
         for g, law in enumerate(laws):
             polynomial[g, : len(law.polynomial)] = law.polynomial
         counts = [len(law.pieces) for law in laws]
+        exact = [law.in_closed_form and not len(law.steps) for law in laws]
         return cls(
             np.concatenate([_NO_ROWS] + [law.pieces for law in laws]),
             np.repeat(number, counts),
@@ -215,7 +217,8 @@ class PackedLaws(NamedTuple):
             np.repeat(number, [len(law.steps) for law in laws]),
             np.array([law.line for law in laws]).reshape(-1, 2),
             all(law.in_closed_form for law in laws),
-            np.array([law.in_closed_form and not len(law.steps) for law in laws], dtype=bool),
+            np.array(exact, dtype=bool),
+            all(exact),
             [(g, *pair) for g, law in enumerate(laws) for pair in law.singularities],
             max([law.tangent_degree for law in laws], default=0),
             max([law.unknown_samples for law in laws], default=0),
