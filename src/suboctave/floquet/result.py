@@ -51,7 +51,7 @@ class FloquetResult:
         """The result of a method that cannot say anything of a motion with `count` multipliers, and why."""
         return cls(np.full(count, np.nan, dtype=complex), np.full(count, np.inf), method, note, checks or {})
 
-    @property
+    @lazy
     def applicable(self) -> bool:
         """False if the method could not say anything; `note` says why."""
         return bool(np.isfinite(self.multipliers).all())
