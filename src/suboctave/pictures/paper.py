@@ -68,10 +68,7 @@ def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = No
     else:
         _in_plane(figure, drawing, sheet)
     if path is not None:
-        arranged = figure.get_layout_engine()
-        figure.set_layout_engine(None)  # it is arranged already
         save_figure(figure, path)
-        figure.set_layout_engine(arranged)
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
     setattr(figure, "_repr_png_", partial(_png_bytes, figure))  # noqa: B010
     return figure
@@ -360,9 +357,16 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: float = 300.0) -> Path
     target = path_of(path)
     suffix = target.suffix.lower()
     target.parent.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(_EMBEDDED):
-        options: dict[str, Any] = {"format": suffix[1:], "dpi": dpi, "metadata": _METADATA[suffix]}
-        replace_file(target, lambda place: figure.savefig(place, **options))
+    arranged = figure.get_layout_engine()
+    if arranged is not None:
+        arrange(figure)
+        figure.set_layout_engine(None)  # with one, Matplotlib would draw everything twice
+    try:
+        with matplotlib.rc_context(_EMBEDDED):
+            options: dict[str, Any] = {"format": suffix[1:], "dpi": dpi, "metadata": _METADATA[suffix]}
+            replace_file(target, lambda place: figure.savefig(place, **options))
+    finally:
+        figure.set_layout_engine(arranged)
     return target
 
 
