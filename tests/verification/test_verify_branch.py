@@ -70,7 +70,7 @@ def test_wrong_multipliers_are_found(duffing_curve, to):
     floquet = duffing_curve.points[30].floquet
     assert floquet.stable
     scaled = floquet.multipliers * (to / np.abs(floquet.multipliers).max())
-    wrong = planted(duffing_curve, 30, floquet=replace(floquet, multipliers=scaled))
+    wrong = planted(duffing_curve, 30, known=replace(floquet, multipliers=scaled))
     check = so.verify(wrong, points=[29, 30, 31], bifurcations=False)
     (bad,) = check.disagreements
     assert bad.index == 30
@@ -81,7 +81,7 @@ def test_verdicts_too_near_to_the_circle_are_not_compared(duffing_curve):
     """The wrong verdict again, with a tolerance within which the true multiplier lies."""
     floquet = duffing_curve.points[30].floquet
     scaled = floquet.multipliers * (1.2 / np.abs(floquet.multipliers).max())
-    wrong = planted(duffing_curve, 30, floquet=replace(floquet, multipliers=scaled))
+    wrong = planted(duffing_curve, 30, known=replace(floquet, multipliers=scaled))
     distance = 1.0 - np.abs(floquet.multipliers).max()
     check = so.verify(wrong, tolerance=1.1 * distance, points=[30], bifurcations=False)
     assert check.points[0].outcome == "cannot tell"
