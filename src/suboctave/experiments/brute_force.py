@@ -22,7 +22,6 @@ from suboctave.experiments.common import (
     Integration,
     SectionOptions,
     checked_integration,
-    period_count,
     start_state,
     starting_states,
     varied_grid,
@@ -30,12 +29,13 @@ from suboctave.experiments.common import (
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.columns import parameter_column
-from suboctave.timedomain.flow import Flow, check_count, check_extent
+from suboctave.timedomain.flow import Flow, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -203,7 +203,7 @@ def brute_force_diagram(
     first = start_state(system, state)
     name, at, grid = varied_grid(system, omega, parameter, values, count)
     fresh, names = starting_states(system, states), _starts(start)
-    periods, transient = check_count("periods", periods), period_count("transient", transient)
+    periods, transient = check_count("periods", periods), check_count("transient", transient, 0)
     how = checked_integration(system, options)
     labels = (*names, *(f"state {i}" for i in range(len(fresh))))
     trajectories = len(labels) * len(grid)

@@ -13,10 +13,10 @@ from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.coupled import as_coupled
-from suboctave.model.inputs import check_parameter, check_range
+from suboctave.model.inputs import check_count, check_parameter, check_range, observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
-from suboctave.timedomain.flow import METHODS, Flow, check_count
+from suboctave.timedomain.flow import METHODS, Flow
 from suboctave.timedomain.layout import Layout
 
 __all__ = [
@@ -31,8 +31,6 @@ __all__ = [
     "check_continuous",
     "checked_integration",
     "checked_range",
-    "observed_dof",
-    "period_count",
     "start_state",
     "starting_states",
     "steps_of",
@@ -120,21 +118,6 @@ def steps_of(method: str, given: int | None) -> int:
     if method not in METHODS:
         raise InputError(f"method={shortened(method)}{suggest(str(method), METHODS)}")
     return check_count("steps_per_period", _SAMPLES.get(method, 200) if given is None else given)
-
-
-def observed_dof(system: System, observe: int | None) -> int:
-    """The observed degree of freedom, or `InputError`."""
-    dof = system.observed_dof if observe is None else observe
-    if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or not 0 <= dof < system.n:
-        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
-    return int(dof)
-
-
-def period_count(name: str, value: Any) -> int:
-    """A number of periods, 0 or more."""
-    if not (is_number(value) and float(value).is_integer() and value >= 0):
-        raise InputError(f"{name} must be a whole number of periods, not {shortened(value)}")
-    return int(value)
 
 
 # ------------------------------------------------------------------------------------------------------------ starts
@@ -233,7 +216,7 @@ def check_continuous(system: System, state: Array, omega: float, values: Mapping
 
 def _check_jump(system: System, element: Any, states: Array, values: Mapping[str, float]) -> None:
     law, n = as_coupled(element), system.n
-    rows, c = law.inputs(n), element.coefficient_values(values)
+    rows, c = element.inputs(n), element.coefficient_values(values)
     q = rows @ states[:, :n].T
     if element.depends_on_velocity:
         q = np.vstack([q, rows @ states[:, n:].T])

@@ -21,17 +21,17 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.attractors import state_sizes
-from suboctave.experiments.common import ParallelOptions, check_continuous, period_count, start_state
+from suboctave.experiments.common import ParallelOptions, check_continuous, start_state
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.experiments.two_trajectories import Separation, TwoTrajectories, separate
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_omega, read_values
+from suboctave.model.inputs import check_count, check_omega, read_values
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.timedomain.flow import Flow, Motions, check_count, check_extent, check_motions
+from suboctave.timedomain.flow import Flow, Motions, check_extent, check_motions
 
 if TYPE_CHECKING:
     import pandas
@@ -258,7 +258,7 @@ def lyapunov_exponents(
     if count > size:
         raise InputError(f"count={count}: a system of {system.n} degrees of freedom has {size} exponents")
     periods, trajectories = check_count("periods", periods), check_count("trajectories", trajectories)
-    transient = period_count("transient", transient)
+    transient = check_count("transient", transient, 0)
     check_extent(trajectories, transient + periods, trajectories * periods * (count + 1))
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=count)
     with reporting(options.get("progress"), "Lyapunov exponents") as report:

@@ -14,20 +14,19 @@ from suboctave.experiments.common import (
     ParallelOptions,
     check_continuous,
     checked_range,
-    period_count,
     start_state,
     varied_grid,
 )
 from suboctave.experiments.lyapunov import smooth_weights
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_parameter, read_values
+from suboctave.model.inputs import check_count, check_parameter, read_values
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.columns import parameter_column
-from suboctave.timedomain.flow import Flow, check_count, check_extent
+from suboctave.timedomain.flow import Flow, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -180,7 +179,7 @@ def lyapunov_map(
         raise InputError(f"parameters= fixes {parameter}, which is to be varied")
     if not (isinstance(counts, tuple | list) and len(counts) == 2):
         raise InputError(f"counts={counts!r}: give the number of frequencies and that of values, such as (60, 40)")
-    transient, periods = period_count("transient", transient), check_count("periods", periods)
+    transient, periods = check_count("transient", transient, 0), check_count("periods", periods)
     if periods < 2 * _STRETCHES:
         raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
     cells = check_count("counts", counts[0]) * check_count("counts", counts[1])

@@ -11,15 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
 from suboctave.experiments.attractors import Attractor, attractor_of, distinct
-from suboctave.experiments.common import SectionOptions, checked_integration, period_count, start_state
+from suboctave.experiments.common import SectionOptions, checked_integration, start_state
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.columns import parameter_column
-from suboctave.timedomain.flow import Flow, check_count
+from suboctave.timedomain.flow import Flow
 
 if TYPE_CHECKING:
     import pandas
@@ -183,7 +184,7 @@ def poincare_sections(
     """
     if states is None or not isinstance(states, list | tuple | np.ndarray):
         states = start_state(system, states)
-    periods, transient = check_count("periods", periods), period_count("transient", transient)
+    periods, transient = check_count("periods", periods), check_count("transient", transient, 0)
     how = checked_integration(system, options)
     flow = Flow(system, how.method, 1, how.steps, how.tolerance)
     with reporting(options.get("progress"), "Poincaré sections") as report:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError, suggest
-from suboctave.experiments.common import ComplexArray, observed_dof
+from suboctave.experiments.common import ComplexArray
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
+from suboctave.model.inputs import observed_dof
 from suboctave.model.system import System
 
 if TYPE_CHECKING:

@@ -27,17 +27,17 @@ from suboctave.experiments.common import (
     RecognitionOptions,
     checked_integration,
     checked_range,
-    observed_dof,
     start_state,
 )
 from suboctave.experiments.stepped_result import SteppedSine
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_count, observed_dof
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
-from suboctave.timedomain.flow import Flow, Motions, check_count, check_extent, check_motions
+from suboctave.timedomain.flow import Flow, Motions, check_extent, check_motions
 
 __all__ = ["check_stepped_sine", "stepped_sine"]
 

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from suboctave.experiments.common import FEW, period_count, start_state, steps_of
+from suboctave.experiments.common import FEW, start_state, steps_of
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_omega, read_values
+from suboctave.model.inputs import check_count, check_omega, read_values
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import reporting
-from suboctave.timedomain.flow import Flow, check_count, check_motions
+from suboctave.timedomain.flow import Flow, check_motions
 
 if TYPE_CHECKING:
     import pandas
@@ -159,7 +159,7 @@ def integrate(
     samples = steps_of(method, steps_per_period)
     start = start_state(system, state)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
-    transient = period_count("transient", transient)
+    transient = check_count("transient", transient, 0)
     values, omega = read_values(system, parameters), check_omega(omega)
     with reporting(options.get("progress"), "integrating") as report:
         motions = flow.over(

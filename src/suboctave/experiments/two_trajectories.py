@@ -19,8 +19,9 @@ from suboctave.errors import ConvergenceError, InputError, check_numbers, shorte
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_count
 from suboctave.model.system import System
-from suboctave.timedomain.flow import METHODS, Flow, Report, check_count, check_motions
+from suboctave.timedomain.flow import METHODS, Flow, Report, check_motions
 
 if TYPE_CHECKING:
     import pandas

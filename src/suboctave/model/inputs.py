@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from suboctave.errors import InputError, is_number, shortened, suggest
-from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.system import System
 
+#: the largest count of anything
+_MOST = 100_000_000
 #: DOFs up to which the stiffness is examined for motions that nothing holds
 _MOST_EXAMINED = 400
 
@@ -47,8 +48,7 @@ def _check_held(system: System) -> None:
     free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
     if not len(free):
         return
-    felt = [e.inputs(system.n) if isinstance(e, CoupledElement) else [e.direction(system.n)] for e in system.elements]
-    held = np.array([d * scale for directions in felt for d in directions]).reshape(-1, system.n)
+    held = np.vstack([np.zeros((0, system.n)), *(e.inputs(system.n) * scale for e in system.elements)])
     if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
         shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
         raise InputError(
@@ -61,6 +61,24 @@ def check_parameter(system: System, name: str) -> None:
     """Refuse a name that is neither "omega" nor a parameter."""
     if not isinstance(name, str) or (name != "omega" and name not in system.parameters):
         raise InputError(f"unknown parameter {name!r}{suggest(str(name), ['omega', *system.parameters])}")
+
+
+def check_count(name: str, value: Any, least: int = 1) -> int:
+    """A whole number, positive or at least 0."""
+    whole = not isinstance(value, bool) and is_number(value) and float(value).is_integer()
+    if not whole or value < least:
+        raise InputError(f"{name} must be a {'positive ' * (least > 0)}whole number, not {shortened(value)}")
+    if value > _MOST:
+        raise InputError(f"{name}={shortened(int(value))} is more than {_MOST}, the largest count that is taken")
+    return int(value)
+
+
+def observed_dof(system: System, observe: Any) -> int:
+    """The degree of freedom that is observed; by default the system's."""
+    dof = system.observed_dof if observe is None else observe
+    if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or not 0 <= dof < system.n:
+        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
+    return int(dof)
 
 
 def check_omega(omega: Any) -> float:

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.description import Recorded
 from suboctave.model.elements.base import Array, Dof, Place, required
-from suboctave.model.expressions.coefficients import ZERO, Coefficient, coefficient
+from suboctave.model.expressions.coefficients import ZERO, Coefficient, coefficient, named_coefficient
 from suboctave.model.matrices import MatrixCoefficient
 
 __all__ = [
@@ -56,19 +56,27 @@ class LoadComponent:
     amplitude: Coefficient
     phase: Coefficient
 
+    def __post_init__(self) -> None:
+        self.direction.setflags(write=False)
+
 
 class Load(Recorded, ABC, family="load"):
-    """A periodic or constant force on the right-hand side. Subclasses are immutable by convention."""
+    """A periodic or constant force on the right-hand side. Subclasses are immutable by convention.
+
+    A subclass names its expressions in `coefficient_names`, and reads them by `_take`.
+    """
+
+    coefficient_names: tuple[str, ...] = ()
 
     @property
-    @abstractmethod
     def label(self) -> str:
         """How messages name this load."""
+        return type(self).__name__
 
     @property
-    @abstractmethod
     def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
         """Every expression that its user gave, with what it is."""
+        return tuple((name, getattr(self, name)) for name in self.coefficient_names)
 
     @abstractmethod
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
@@ -80,11 +88,11 @@ class Load(Recorded, ABC, family="load"):
     def check_elements(self, n: int, elements: Sequence[Any]) -> None:
         """Refuse elements that the load cannot act beside."""
 
-    def _read(self, what: str, source: Any) -> Coefficient:
-        try:
-            return coefficient(source)
-        except InputError as error:
-            raise InputError(f"{self.label}, {what}: {error}", (what,)) from None
+    def _take(self, **given: Any) -> None:
+        """Keep expressions by their names; all of them must be given."""
+        required(self.label, **given)
+        for name, source in given.items():
+            setattr(self, name, named_coefficient(source, self.label, name))
 
     def _read_harmonic(self, given: Any, least: int = 0) -> int:
         try:
@@ -126,14 +134,13 @@ class HarmonicLoad(Load):
             )
         if len(phases) == 1:
             phases *= len(amplitudes)
-        self.amplitudes = tuple(self._read("amplitude", given) for given in amplitudes)
+        self.amplitudes = tuple(named_coefficient(given, self.label, "amplitude") for given in amplitudes)
         self.harmonics = tuple(self._read_harmonic(given) for given in harmonics)
-        self.phases = tuple(self._read("phase", given) for given in phases)
-        self.static = self._read("static", static)
+        self.phases = tuple(named_coefficient(given, self.label, "phase") for given in phases)
+        self.static = named_coefficient(static, self.label, "static")
 
     @property
     def label(self) -> str:
-        """How messages name this load."""
         return f"HarmonicLoad({self.place})"
 
     @property
@@ -149,7 +156,6 @@ class HarmonicLoad(Load):
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
         """The cosines of this load, the static part last (harmonic 0)."""
         direction = self.direction(n)
-        direction.setflags(write=False)
         cosines = [
             LoadComponent(direction, harmonic, amplitude, phase)
             for amplitude, harmonic, phase in zip(self.amplitudes, self.harmonics, self.phases, strict=True)
@@ -183,26 +189,21 @@ def _shown(items: Sequence[Any]) -> str:
 class StaticLoad(Load):
     """A constant force on the right-hand side, at `dof` (an index, or a pair) or along `direction`."""
 
+    coefficient_names = ("force",)
+    force: Coefficient
+
     def __init__(
         self, dof: Dof | None = None, force: Number | None = None, *, direction: ArrayLike | None = None
     ) -> None:
         self.place = Place("StaticLoad", dof, direction)
-        required(self.label, force=force)
-        self.force = self._read("force", force)
+        self._take(force=force)
 
     @property
     def label(self) -> str:
-        """How messages name this load."""
         return f"StaticLoad({self.place})"
 
-    @property
-    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
-        """See `Load.coefficients`."""
-        return (("force", self.force),)
-
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
-        """See `Load.components`."""
-        return (LoadComponent(_fixed(self.place.direction(n)), 0, self.force, ZERO),)
+        return (LoadComponent(self.place.direction(n), 0, self.force, ZERO),)
 
     def __repr__(self) -> str:
         return f"StaticLoad({self.place}, force={self.force.text})"
@@ -215,6 +216,10 @@ class RotatingUnbalance(Load):
     there as the same with sin: forwards whirl from `dof` towards `perpendicular`. `harmonic` is the speed of the shaft
     in units of omega. Unit of `mass_eccentricity`: mass times length.
     """
+
+    coefficient_names = ("mass_eccentricity", "phase")
+    mass_eccentricity: Coefficient
+    phase: Coefficient
 
     def __init__(
         self,
@@ -230,27 +235,18 @@ class RotatingUnbalance(Load):
         if any(len(place.dofs) != 1 for place in places) or len({place.dofs for place in places}) < len(places):
             raise InputError("RotatingUnbalance: dof and perpendicular must be two different DOFs, one index each")
         self.places = tuple(places)
-        required(self.label, mass_eccentricity=mass_eccentricity)
-        self.mass_eccentricity = self._read("mass_eccentricity", mass_eccentricity)
-        self.phase = self._read("phase", phase)
+        self._take(mass_eccentricity=mass_eccentricity, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
 
     @property
     def label(self) -> str:
-        """How messages name this load."""
         return f"RotatingUnbalance({self.places[0]})"
 
-    @property
-    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
-        """See `Load.coefficients`."""
-        return (("mass_eccentricity", self.mass_eccentricity), ("phase", self.phase))
-
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
-        """See `Load.components`."""
         amplitude = coefficient(f"({self.mass_eccentricity.text}) * {self.harmonic**2} * omega**2")
         phases = (self.phase, _sum(self.phase, _QUARTER))
         return tuple(
-            LoadComponent(_fixed(place.direction(n)), self.harmonic, amplitude, phase)
+            LoadComponent(place.direction(n), self.harmonic, amplitude, phase)
             for place, phase in zip(self.places, phases, strict=False)
         )
 
@@ -267,11 +263,6 @@ class _WithMatrices(Load):
     def __init__(self, direction: ArrayLike | None) -> None:
         self.vector = None if direction is None else Place(type(self).__name__, None, direction)
 
-    @property
-    def label(self) -> str:
-        """How messages name this load."""
-        return type(self).__name__
-
     def direction(self, n: int) -> Array:
         """The vector r (n,) of a rigid translation."""
         return np.ones(n) if self.vector is None else self.vector.direction(n)
@@ -281,7 +272,7 @@ class _WithMatrices(Load):
     ) -> list[LoadComponent]:
         """`matrix r amplitude cos(harmonic omega t + phase)`, one cosine per expression in the matrix."""
         return [
-            LoadComponent(_fixed(vector), harmonic, coefficient(f"({factor.text}) * {amplitude}"), phase)
+            LoadComponent(vector, harmonic, coefficient(f"({factor.text}) * {amplitude}"), phase)
             for factor, vector in matrix.products(r)
             if np.any(vector)
         ]
@@ -298,18 +289,14 @@ class Gravity(_WithMatrices):
     r has the entry 1 at every DOF that moves with gravity, 0 at horizontal ones, -1 at those that point upwards.
     """
 
+    coefficient_names = ("acceleration",)
+    acceleration: Coefficient
+
     def __init__(self, acceleration: Number | None = None, direction: ArrayLike | None = None) -> None:
         super().__init__(direction)
-        required("Gravity", acceleration=acceleration)
-        self.acceleration = self._read("acceleration", acceleration)
-
-    @property
-    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
-        """See `Load.coefficients`."""
-        return (("acceleration", self.acceleration),)
+        self._take(acceleration=acceleration)
 
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
-        """See `Load.components`."""
         mass = self._matrices(matrices)[0]
         return tuple(self._along(mass, self.direction(n), 0, f"({self.acceleration.text})", ZERO))
 
@@ -320,6 +307,9 @@ class Gravity(_WithMatrices):
 class _Base(_WithMatrices):
     """Motion of the base: see the top of the module."""
 
+    coefficient_names = ("amplitude", "phase")
+    amplitude: Coefficient
+    phase: Coefficient
     #: power of i omega from what is given (displacement or acceleration) to the acceleration
     _order = 0
 
@@ -332,22 +322,14 @@ class _Base(_WithMatrices):
         phase: Number = 0.0,
     ) -> None:
         super().__init__(direction)
-        required(self.label, amplitude=amplitude)
         if coordinates not in ("relative", "absolute"):
             hint = suggest(str(coordinates), ("relative", "absolute"))
             raise InputError(f"{self.label}: coordinates must be 'relative' or 'absolute', not {coordinates!r}{hint}")
         self.coordinates = coordinates
-        self.amplitude = self._read("amplitude", amplitude)
-        self.phase = self._read("phase", phase)
+        self._take(amplitude=amplitude, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
 
-    @property
-    def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
-        """See `Load.coefficients`."""
-        return (("amplitude", self.amplitude), ("phase", self.phase))
-
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
-        """See `Load.components`."""
         mass, damping, stiffness = self._matrices(matrices)
         r, k, given = self.direction(n), self.harmonic, f"({self.amplitude.text})"
         frequency = f"({k}*omega)"
@@ -368,7 +350,7 @@ class _Base(_WithMatrices):
             return
         r = self.direction(n)
         for element in elements:
-            felt = element.inputs(n) if hasattr(element, "inputs") else element.direction(n)[None]
+            felt = element.inputs(n)
             if np.any(np.abs(felt @ r) > 1e-12 * np.abs(felt).sum(axis=1)):
                 raise InputError(
                     f"{self.label} in absolute coordinates: {element.label} acts between the structure and the base, "
@@ -398,11 +380,6 @@ class BaseAcceleration(_Base):
     """
 
     _order = 0
-
-
-def _fixed(direction: Array) -> Array:
-    direction.setflags(write=False)
-    return direction
 
 
 def _sum(a: Coefficient, b: Coefficient) -> Coefficient:

@@ -67,6 +67,10 @@ class MatrixCoefficient:
             result = result + c.value(values) * scipy.sparse.csr_array(pattern)
         return result
 
+    def compact(self, values: Mapping[str, float]) -> Any:
+        """The matrix at these values as it was given, dense or sparse."""
+        return self.sparse_value(values) if self.sparse else self.value(values)
+
     def products(self, vector: Array) -> list[tuple[Coefficient, Array]]:
         """Its product with a vector (n,), as pairs of an expression and a vector that add up to it."""
         parts = [(coefficient(1.0), self._base), *self._terms]

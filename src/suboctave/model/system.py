@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, Key, Refusals, located, shortened, suggest
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value, read_expression
 from suboctave.model.elements.base import Array, BaseElement
-from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
@@ -26,6 +25,7 @@ from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mas
 __all__ = ["System", "build", "describe"]
 
 _MATRICES = ("mass", "damping", "stiffness")
+_PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names")
 
 
 class System:
@@ -64,17 +64,19 @@ class System:
         dof_names: Iterable[str] = (),
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
-        self._fill(
-            read,
-            matrix_coefficient(damping, read.n, "damping"),
-            matrix_coefficient(stiffness, read.n, "stiffness"),
-            tuple(sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes)),
-            _several(loads, Load, "HarmonicLoad", "loads"),
-            _read_parameters(parameters),
-            str(name),
-            _read_dof_names(dof_names, read.n),
-            check=True,
-        )
+        parts = {
+            "mass": read,
+            "damping": matrix_coefficient(damping, read.n, "damping"),
+            "stiffness": matrix_coefficient(stiffness, read.n, "stiffness"),
+            "elements": tuple(
+                sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes)
+            ),
+            "loads": _several(loads, Load, "HarmonicLoad", "loads"),
+            "parameters": _read_parameters(parameters),
+            "name": str(name),
+            "dof_names": _read_dof_names(dof_names, read.n),
+        }
+        self._fill(parts, check=True)
         self._check_values(self.parameters)
 
     @classmethod
@@ -96,37 +98,16 @@ class System:
         read = _read_parameters(parameters)
         return cls(**parts_of(equations, read), parameters=read, name=name)
 
-    def _fill(
-        self,
-        mass: MatrixCoefficient,
-        damping: MatrixCoefficient,
-        stiffness: MatrixCoefficient,
-        elements: tuple[BaseElement, ...],
-        loads: tuple[Load, ...],
-        parameters: Mapping[str, float],
-        name: str,
-        dof_names: tuple[str, ...],
-        check: bool = False,
-    ) -> None:
-        n = mass.n
-        fields = {
-            "mass": mass,
-            "damping": damping,
-            "stiffness": stiffness,
-            "elements": elements,
-            "loads": loads,
-            "parameters": MappingProxyType(dict(parameters)),
-            "name": name,
-            "dof_names": dof_names,
-            "n": n,
-        }
-        for field, value in fields.items():
+    def _fill(self, parts: Mapping[str, Any], check: bool) -> None:
+        """Take parts; `check`: whether they fit each other, where no system has accepted them already."""
+        n = parts["mass"].n
+        for field, value in {**parts, "n": n, "parameters": MappingProxyType(dict(parts["parameters"]))}.items():
             object.__setattr__(self, field, value)
         refusals = Refusals()
         components: list[LoadComponent] = []
-        for i, load in enumerate(loads):
+        for i, load in enumerate(self.loads):
             with refusals.at("loads", i):
-                components += load.components(n, (mass, damping, stiffness))
+                components += load.components(n, (self.mass, self.damping, self.stiffness))
         if check:
             self._check_parts(refusals)
         refusals.refuse()
@@ -141,15 +122,13 @@ class System:
         for name, value in changed.items():
             self.check_parameter(name)
             changed[name] = _number(name, value)
-        parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        result = _assemble(*parts, {**self.parameters, **changed}, self.name, self.dof_names)
+        result = self.moved_to(changed)
         result._check_values(changed)
         return result
 
     def moved_to(self, values: Mapping[str, float]) -> System:
         """As `with_parameters`, at values where a motion was solved: nothing is checked, or said, any more."""
-        parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        return _assemble(*parts, {**self.parameters, **values}, self.name, self.dof_names)
+        return self._changed(parameters={**self.parameters, **values})
 
     def with_scaled_loads(self, name: str = "load_scale") -> System:
         """The same system whose oscillating loads are multiplied by a new parameter, 1 to begin with.
@@ -168,8 +147,11 @@ class System:
             )
             for c in self._components
         ]
-        parts = (self.mass, self.damping, self.stiffness, self.elements, tuple(loads))
-        return _assemble(*parts, {**self.parameters, name: 1.0}, self.name, self.dof_names)
+        return self._changed(loads=tuple(loads), parameters={**self.parameters, name: 1.0})
+
+    def _changed(self, **parts: Any) -> System:
+        """A system with these parts in the place of its own."""
+        return _assemble({field: getattr(self, field) for field in _PARTS} | parts)
 
     def check_parameter(self, name: str) -> None:
         """Raise `InputError`, with a suggestion, if there is no parameter of this name."""
@@ -194,8 +176,7 @@ class System:
         for i, element in enumerate(self.elements):
             with refusals.at("elements", i):
                 element.direction(self.n)
-                if isinstance(element, CoupledElement):
-                    element.inputs(self.n)
+                element.inputs(self.n)
         for i, load in enumerate(self.loads):
             with refusals.at("loads", i):
                 load.check_elements(self.n, self.elements)
@@ -231,12 +212,11 @@ class System:
             with located("elements", i):
                 self._check_law(element, first)
         if first or self.mass.names.intersection(changed):
-            mass = self.mass.sparse_value(self.parameters) if self.mass.sparse else self.mass.value(self.parameters)
+            mass = self.mass.compact(self.parameters)
             with located("mass"):
                 check_mass(mass)
         if first:
-            damping = self.damping.sparse_value if self.damping.sparse else self.damping.value
-            check_damping(damping(self.parameters), mass.diagonal())
+            check_damping(self.damping.compact(self.parameters), mass.diagonal())
 
     def _check_law(self, element: BaseElement, first: bool) -> None:
         element.check(self.parameters, first)
@@ -312,8 +292,7 @@ class System:
         raise AttributeError("a System does not change")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        parts = (self.mass, self.damping, self.stiffness, self.elements, self.loads)
-        return _assemble, (*parts, dict(self.parameters), self.name, self.dof_names)
+        return _assemble, ({field: getattr(self, field) for field in _PARTS} | {"parameters": dict(self.parameters)},)
 
     def __repr__(self) -> str:
         title = f"System {self.name!r}" if self.name else "System"
@@ -328,20 +307,10 @@ class System:
         return "\n".join(lines)
 
 
-def _assemble(
-    mass: MatrixCoefficient,
-    damping: MatrixCoefficient,
-    stiffness: MatrixCoefficient,
-    elements: tuple[BaseElement, ...],
-    loads: tuple[Load, ...],
-    parameters: Mapping[str, float],
-    name: str,
-    dof_names: tuple[str, ...] = (),
-    check: bool = False,
-) -> System:
-    """A system from parts; `check`: whether they fit each other, where no system has accepted them already."""
+def _assemble(parts: Mapping[str, Any], check: bool = False) -> System:
+    """A system from all of its parts by name."""
     result = object.__new__(System)
-    result._fill(mass, damping, stiffness, elements, loads, parameters, name, dof_names, check)
+    result._fill(parts, check)
     return result
 
 
@@ -425,23 +394,21 @@ def build(
     Raises InputError where the description is not one, or names a class that is not known (see `allow_code` above).
     """
     try:
-        mass, damping, stiffness = (_read_matrix(description[what], what, arrays or {}) for what in _MATRICES)
-        elements, loads = (
-            tuple(build_part(item, family, arrays or {}, allow_code) for item in description[f"{family}s"])
-            for family in ("element", "load")
-        )
-        parameters, name = description["parameters"], str(description["name"])
-        dof_names = _read_dof_names(description["dof_names"], mass.n)
+        parts: dict[str, Any] = {what: _read_matrix(description[what], what, arrays or {}) for what in _MATRICES}
+        for family in ("element", "load"):
+            items = description[f"{family}s"]
+            parts[f"{family}s"] = tuple(build_part(item, family, arrays or {}, allow_code) for item in items)
+        parts |= {"parameters": description["parameters"], "name": str(description["name"])}
+        parts["dof_names"] = _read_dof_names(description["dof_names"], parts["mass"].n)
     except InputError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
-    if not mass.n == damping.n == stiffness.n:
+    if len({parts[what].n for what in _MATRICES}) > 1:
         raise InputError("this is not the description of a system: its matrices have different sizes")
-    read = _read_parameters(parameters)
-    system = _assemble(mass, damping, stiffness, elements, loads, read, name, dof_names, check=True)
+    system = _assemble(parts | {"parameters": _read_parameters(parts["parameters"])}, check=True)
     system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
-    check_mass(mass.sparse_value(system.parameters) if mass.sparse else mass.value(system.parameters))
+    check_mass(system.mass.compact(system.parameters))
     return system
 
 

@@ -110,7 +110,6 @@ class AdaptiveMethod(Method):
         self.first = (np.eye(size) if transition else generic)[:, :count]
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
-        """See `Method.numbers`."""
         inverse = np.linalg.inv(numbers.mass)
         outputs = inverse @ self.layout.outputs.T
         weight, omega = np.sqrt(np.diagonal(numbers.mass, axis1=1, axis2=2)), numbers.omega[:, None]
@@ -131,7 +130,6 @@ class AdaptiveMethod(Method):
         return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
     def group(self, batch: Batch, members: NDArray[np.int_], alive: int) -> AdaptiveGroup:
-        """See `Method.group`."""
         return AdaptiveGroup(self, batch, members, alive)
 
 
@@ -171,7 +169,6 @@ class AdaptiveGroup(Group):
         return bool(done)
 
     def left(self) -> float:
-        """See `Group.left`."""
         return float(self.row("left").sum())
 
     def results(self) -> dict[str, Any]:

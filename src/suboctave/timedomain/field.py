@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from suboctave.errors import InputError
 from suboctave.model import System
 from suboctave.model.elements.base import BaseElement
-from suboctave.model.elements.batch_form import switches
 from suboctave.model.elements.coupled import as_coupled
+from suboctave.model.elements.smoothness import switches
+from suboctave.model.inputs import read_values
 
 __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
@@ -84,14 +85,6 @@ def _loads(system: System, values: Mapping[str, float], omega: float) -> _Loads:
     )
 
 
-def _full_values(system: System, values: Mapping[str, float] | None) -> dict[str, float]:
-    full = dict(system.parameters)
-    for name, value in (values or {}).items():
-        system.check_parameter(name)
-        full[name] = float(value)
-    return full
-
-
 class Field:
     """The scaled vector field of a system at given parameters, frequency and scales.
 
@@ -113,7 +106,7 @@ class Field:
         self.system = system
         self.omega = float(omega)
         self.reference = float(reference if reference is not None else omega)
-        self.values = _full_values(system, values)
+        self.values = {**system.parameters, **read_values(system, values)}
         self.n = system.n
         self.mass, self.damping, self.stiffness = (np.asarray(a, dtype=float) for a in system.matrices(self.values))
         self.inverse_mass = np.linalg.inv(self.mass)
@@ -123,7 +116,7 @@ class Field:
         self.switches: list[Switch] = []
         for index, element in enumerate(system.elements):
             c = element.coefficient_values(self.values)
-            direction = as_coupled(element).inputs(self.n)[0]
+            direction = element.inputs(self.n)[0]
             places = switches(element.sampling(c), c)
             self.switches += [Switch(index, direction, *place) for place in places]
             if not places or places[0][2] is None:

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
 from suboctave.interruption import Interruption, check_time
 from suboctave.model.elements.base import Array
+from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.timedomain.adaptive import AdaptiveMethod
 from suboctave.timedomain.batch import Batch, Method
@@ -30,15 +31,15 @@ from suboctave.timedomain.layout import Layout
 from suboctave.timedomain.newmark import NewmarkMethod
 from suboctave.timedomain.python_callbacks import PythonCallbacks
 
-__all__ = ["METHODS", "Flow", "Motions", "Report", "check_count", "check_extent", "check_motions"]
+__all__ = ["METHODS", "Flow", "Motions", "Report", "check_extent", "check_motions"]
 
 METHODS = ("accurate", "newmark")
 Report = Callable[[float, str], None]
 #: seconds after which a run is interrupted or reports
 _INTERVAL = 0.1
-#: numbers that one answer may hold, periods of the load that all trajectories together may take (weeks on one
-#: processor), and the largest count of anything
-_LARGEST, _LONGEST, _MOST = 400_000_000, 100_000_000_000, 100_000_000
+#: numbers that one answer may hold, and periods of the load that all trajectories together may take (weeks on one
+#: processor)
+_LARGEST, _LONGEST = 400_000_000, 100_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,15 +367,6 @@ def _floats(name: str, given: ArrayLike) -> Array:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} must be a finite number or an array of them, not {shortened(given)}") from None
-
-
-def check_count(name: str, value: int) -> int:
-    """A positive whole number, or `InputError`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InputError(f"{name} must be a positive whole number, not {shortened(value)}")
-    if value > _MOST:
-        raise InputError(f"{name}={shortened(int(value))} is more than {_MOST}, the largest count that is taken")
-    return int(value)
 
 
 def check_extent(trajectories: int, periods: int, numbers: int) -> None:

@@ -24,7 +24,7 @@ from suboctave.timedomain.field import Array, Field
 if TYPE_CHECKING:
     from scipy.integrate import DOP853, DenseOutput
 
-__all__ = ["Crossing", "Passage", "Step", "advance"]
+__all__ = ["Crossing", "Passage", "Step", "advance", "reach"]
 
 # Points on the interpolant of a step at which distances are looked at, when a switch is near.
 _GRID = np.linspace(0.0, 1.0, 9)
@@ -88,6 +88,14 @@ def _step(solver: DOP853, model: Field) -> None:
             f"the range reached (largest scaled component {np.max(np.abs(solver.y[: 2 * model.n])):.3g}), the sign of "
             "the damping, and the state at the start"
         )
+
+
+def reach(model: Field, rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float) -> Array:
+    """The stacked state at `end`, contacts frozen on the way, in one step if the tolerances allow it."""
+    solver = _solver(rhs, begin, y, end, rtol, atol, end - begin)
+    while solver.status == "running":
+        _step(solver, model)
+    return np.asarray(solver.y, dtype=float)
 
 
 def _at_start(solver: DOP853) -> Array:
@@ -177,14 +185,12 @@ class _Watch:
         for _ in range(_LANDING_ITERATIONS):
             if tau - begin <= 4 * _EPS * abs(begin):
                 return best[1:] if best is not None else (begin, y_begin)
-            short = _solver(rhs, begin, y_begin, tau, rtol, atol, tau - begin)
-            while short.status == "running":
-                _step(short, self.model)
-            z = short.y[:m]
+            y = reach(self.model, rhs, begin, y_begin, tau, rtol, atol)
+            z = y[:m]
             distance, approach = float(self._margin(z)[switch]), float(self._margin_rate(z)[switch])
             if best is not None and abs(distance) >= best[0]:
                 break
-            best = abs(distance), tau, short.y
+            best = abs(distance), tau, y
             correction = -distance / approach if approach != 0.0 else 0.0
             if self.model.switches[switch].stiffness is None:
                 break

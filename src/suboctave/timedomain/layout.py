@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.elements.batch_form import BatchForm
-from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.system import System
 
@@ -71,7 +70,7 @@ class Layout:
         numbers = corners = 0
         for element in system.elements:
             form = element.batch_form(element.coefficient_values(system.parameters))
-            inputs = tuple(_entered(channels, row) for row in as_coupled(element).inputs(n))
+            inputs = tuple(_entered(channels, row) for row in element.inputs(n))
             output = _entered(outputs, element.direction(n))
             self.laws.append(PlacedLaw(len(self.laws), element, form, inputs, output, numbers, corners))
             numbers += form.count
@@ -120,7 +119,8 @@ class Layout:
     def _law(self, placed: PlacedLaw, at: Mapping[str, float]) -> list[float]:
         element = placed.element
         element.check(at, False)
-        numbers = placed.form.numbers(element.coefficient_values(at))
+        c = element.coefficient_values(at)
+        numbers = placed.form.numbers(c, element.sampling(c))
         if len(numbers) != placed.form.count:
             raise InputError(f"{element.label}: the law changes its form with its coefficients")
         return numbers

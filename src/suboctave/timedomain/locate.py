@@ -24,8 +24,9 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.model import System
+from suboctave.model.inputs import check_count, observed_dof
 from suboctave.timedomain.field import Array, Field, scaled_field
-from suboctave.timedomain.shooting import PeriodicSolution, check_dof, check_periods, finish
+from suboctave.timedomain.shooting import PeriodicSolution, finish
 from suboctave.timedomain.trajectory import flow, measured_lengths
 
 __all__ = ["Curve", "CurvePoint", "locate_by_shooting"]
@@ -180,7 +181,7 @@ def locate_by_shooting(
     """
     if kind not in _KINDS:
         raise InputError(f"unknown kind of bifurcation {kind!r}{suggest(str(kind), _KINDS)}")
-    periods, dof = check_periods(periods), check_dof(system, observe)
+    periods, dof = check_count("periods", periods), observed_dof(system, observe)
     start = np.array(state, dtype=float)
     model = scaled_field(system, start, omega, values)
     # One pass for the size of the motion, then fixed scales: the secant iteration needs one measure of length.

@@ -67,7 +67,6 @@ class NewmarkMethod(Method):
         self.rows = newmark_rows(layout, self.lanes)
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
-        """See `Method.numbers`."""
         h = 2.0 * np.pi / (numbers.omega * self.steps)
         h1 = h[:, None, None]
         inverse = np.linalg.inv(4.0 / h1**2 * numbers.mass + 2.0 / h1 * numbers.damping + numbers.stiffness)
@@ -86,7 +85,6 @@ class NewmarkMethod(Method):
         return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
     def group(self, batch: Batch, members: NDArray[np.int_], alive: int) -> NewmarkGroup:
-        """See `Method.group`."""
         return NewmarkGroup(self, batch, members)
 
 
@@ -101,7 +99,6 @@ class NewmarkGroup(Group):
         self.row("x")[:], self.row("v")[:] = batch.states[members, :n].T, batch.states[members, n:].T
 
     def advance(self, effort: int, out: Array, peaks: Array | None) -> bool:
-        """See `Group.advance`."""
         method, to = self.method, min(self.step + effort, self.end)
         measured = np.zeros((0, 0, 0)) if peaks is None else peaks[self.used :]
         self.used += method.function(
@@ -112,7 +109,6 @@ class NewmarkGroup(Group):
         return to == self.end
 
     def left(self) -> float:
-        """See `Group.left`."""
         return (self.end - self.step) / self.method.stride * self.method.lanes
 
     def results(self) -> dict[str, Any]:

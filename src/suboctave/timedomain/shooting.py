@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from operator import index
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError
 from suboctave.model import System
+from suboctave.model.inputs import check_count, observed_dof
 from suboctave.timedomain.field import Array, Field, scaled_field
 from suboctave.timedomain.integrator import Passage, advance
 from suboctave.timedomain.trajectory import flow, largest_displacement, measured_lengths
@@ -70,25 +70,6 @@ class PeriodicSolution:
         )
 
 
-def check_periods(periods: int) -> int:
-    """`periods` as a positive integer, or `InputError`."""
-    try:
-        count = index(periods)
-    except TypeError:
-        count = 0
-    if count < 1:
-        raise InputError(f"periods must be a positive integer, not {periods!r}")
-    return count
-
-
-def check_dof(system: System, observe: int | None) -> int:
-    """The observed degree of freedom, `system.observed_dof` unless told, or `InputError`."""
-    dof = system.observed_dof if observe is None else observe
-    if not 0 <= dof < system.n:
-        raise InputError(f"observe={dof} is out of range: the system has degrees of freedom 0 to {system.n - 1}")
-    return int(dof)
-
-
 def shoot(
     system: System,
     state: ArrayLike,
@@ -106,7 +87,7 @@ def shoot(
     strongly unstable motions, to the norm of the monodromy matrix. `values` replaces parameters by name. Raises
     `InputError` before any work, `ConvergenceError` if Newton does not arrive.
     """
-    periods, dof = check_periods(periods), check_dof(system, observe)
+    periods, dof = check_count("periods", periods), observed_dof(system, observe)
     y = np.array(state, dtype=float)
     model = scaled_field(system, y, omega, values)
     end = 2.0 * np.pi * periods

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError
 from suboctave.model import System
 from suboctave.timedomain.field import Array, Field, default_lengths, scaled_field
-from suboctave.timedomain.integrator import Passage, advance
+from suboctave.timedomain.integrator import Passage, advance, reach
 
 __all__ = ["Contact", "Trajectory", "integrate", "largest_displacement", "state_transition"]
 
@@ -178,8 +178,6 @@ def largest_displacement(model: Field, passage: Passage, dof: int) -> float:
 
 def _extreme(model: Field, passage: Passage, i: int, at: float, dof: int) -> float:
     """Scaled displacement at the zero of the velocity near `at`, inside step `i`, by Newton on exact integrations."""
-    from scipy.integrate import DOP853
-
     n, step = model.n, passage.steps[i]
     rhs = model.right_hand_side(step.active)
     z = step.start[: 2 * n]
@@ -187,10 +185,7 @@ def _extreme(model: Field, passage: Passage, i: int, at: float, dof: int) -> flo
         at = min(max(at, step.begin), step.end)
         if at - step.begin <= 1e-14 * max(1.0, abs(at)):
             return float(z[dof])
-        solver = DOP853(rhs, step.begin, step.start[: 2 * n], at, rtol=1e-13, atol=1e-13, first_step=at - step.begin)
-        while solver.status == "running":
-            solver.step()
-        z = solver.y
+        z = reach(model, rhs, step.begin, step.start[: 2 * n], at, 1e-13, 1e-13)
         rate = float(rhs(at, z)[n + dof])
         speed = float(z[n + dof])
         if rate == 0.0 or abs(speed / rate) <= 1e-9:  # the displacement is off by the square of this

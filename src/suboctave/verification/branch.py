@@ -17,13 +17,12 @@ from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import FloquetResult
-from suboctave.harmonic.basis import ComplexArray
 from suboctave.interruption import Interruption
 from suboctave.kinds import KINDS
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch
-from suboctave.verification.motion import distance_from_gap, verify_motion
+from suboctave.verification.motion import distance_from_gap, pairing, verify_motion
 from suboctave.verification.result import (
     AGREES,
     DISAGREES,
@@ -118,7 +117,7 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
         margin = float(np.max(np.abs(multipliers))) - 1.0
         doubt = float(np.max(shot.errors[np.abs(multipliers) > 0.5], initial=0.0))
         stable = margin < 0.0
-        error = _pairing(floquet.multipliers, multipliers) if known else float("inf")
+        error = pairing(floquet.multipliers, multipliers, relative=True) if known else float("inf")
         allowed = tolerance + 10.0 * (floquet.error + doubt) + 100.0 * shot.distance
         if shot.distance > tolerance:
             outcome, reason = DISAGREES, f"Shooting arrives at another motion (relative distance {shot.distance:.1e})"
@@ -182,12 +181,3 @@ def _confirmed(
         return verdict(float("nan"), float("inf"), False, f"Shooting failed: {failure}")
     omega = float("nan") if check.solution is None else check.solution.omega
     return verdict(omega, check.distance, check.agrees, check.reason)
-
-
-def _pairing(computed: ComplexArray, true: ComplexArray) -> float:
-    """Largest difference under the best pairing, relative where multipliers are larger than one."""
-    from scipy.optimize import linear_sum_assignment
-
-    cost = np.abs(computed[:, None] - true[None, :]) / np.maximum(1.0, np.abs(true))[None, :]
-    rows, columns = linear_sum_assignment(cost)
-    return float(cost[rows, columns].max())

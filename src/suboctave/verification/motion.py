@@ -15,6 +15,7 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.points import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet import FloquetResult, StabilityMethod, method_of
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS
 from suboctave.model.elements.coupled import reads
@@ -108,7 +109,7 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
     if isinstance(what, Bifurcation) and touches:
         distance = max(distance, distance_from_gap(what, solution.state, solution.omega))
-    error = _pairing(floquet.multipliers, solution.multipliers)
+    error = pairing(floquet.multipliers, solution.multipliers)
 
     def verdict(agrees: bool, reason: str) -> Verification:
         return Verification(distance, error, solution.stable, agrees, solution, reason)
@@ -169,13 +170,14 @@ def _by_shooting(motion: PeriodicOrbit, kind: str, start: Array, tolerance: floa
         return shoot(system, start, omega, periods=periods)
 
 
-def _pairing(a: np.ndarray, b: np.ndarray) -> float:
-    """Largest distance between two sets of multipliers under the best pairing."""
+def pairing(computed: ComplexArray, true: ComplexArray, relative: bool = False) -> float:
+    """Largest difference between two sets of multipliers under the best pairing; `relative` to those beyond one."""
     from scipy.optimize import linear_sum_assignment
 
-    cost = np.abs(a[:, None] - b[None, :])
-    rows, columns = linear_sum_assignment(cost)
-    return float(cost[rows, columns].max())
+    cost = np.abs(computed[:, None] - true[None, :])
+    if relative:
+        cost = cost / np.maximum(1.0, np.abs(true))
+    return float(cost[linear_sum_assignment(cost)].max())
 
 
 def _orbit(what: Any | BranchPoint | Bifurcation) -> PeriodicOrbit:

@@ -9,7 +9,7 @@ nan behind those that there are), `multiplier_errors`, `multiplier_error` (the l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,17 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["BranchVerification", "VerifiedBifurcation", "VerifiedPoint", "verification_dataset"]
 
 AGREES, DISAGREES, OPEN = "agrees", "disagrees", "cannot tell"
-
-#: columns of points and of bifurcations in a dataset, with their types
-POINT_COLUMNS: dict[str, Any] = {
-    "index": int, "omega": float, "amplitude": float, "distance": float, "multiplier_error": float, "outcome": str,
-    "reason": str,
-}  # fmt: skip
-EVENT_COLUMNS: dict[str, Any] = {
-    "kind": str, "omega": float, "amplitude": float, "true_omega": float, "distance": float, "agrees": bool,
-    "reason": str,
-}  # fmt: skip
-VERDICTS = ("stable", "computed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +102,15 @@ class VerifiedBifurcation:
     def __repr__(self) -> str:
         verdict = "confirmed" if self.agrees else "NOT CONFIRMED"
         return f"{self.kind} at omega = {self.omega:.9g}: {verdict}; distance {self.distance:.1e}. {self.reason}"
+
+
+_KINDS: dict[Any, type] = {"int": int, "float": float, "str": str, "bool": bool}
+#: columns of points and of bifurcations in a dataset, with their types
+POINT_COLUMNS, EVENT_COLUMNS = (
+    {column.name: _KINDS[column.type] for column in fields(kind) if column.type in _KINDS}
+    for kind in (VerifiedPoint, VerifiedBifurcation)
+)
+VERDICTS = ("stable", "computed")
 
 
 @dataclass(frozen=True, eq=False)

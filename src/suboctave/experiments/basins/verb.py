@@ -16,13 +16,13 @@ from suboctave.experiments.common import BasinOptions, checked_integration, star
 from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_omega, check_range, read_values
+from suboctave.model.inputs import check_count, check_omega, check_range, read_values
 from suboctave.model.system import System
 from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.arrays import padded
-from suboctave.timedomain.flow import check_count, check_extent
+from suboctave.timedomain.flow import check_extent
 
 if TYPE_CHECKING:
     import pandas

@@ -22,7 +22,7 @@ from suboctave.model.description import Recorded
 from suboctave.model.differences import central_difference, shift_derivative, shifted, step_of
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
 from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling
-from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
 __all__ = ["Array", "BaseElement", "Dof", "Element", "Place"]
 
@@ -115,13 +115,9 @@ class BaseElement(Recorded, ABC, family="element"):
         self.place = Place(kind, dof, direction)
         if len(coefficients) != len(self.coefficient_names):
             raise InputError(f"{kind} takes {len(self.coefficient_names)} coefficients, got {len(coefficients)}")
-        read = []
-        for name, source in zip(self.coefficient_names, coefficients, strict=True):
-            try:
-                read.append(coefficient(source))
-            except InputError as error:
-                raise InputError(f"{kind}({self.place}), {name}: {error}", (name,)) from None
-        self.coefficients: tuple[Coefficient, ...] = tuple(read)
+        given = zip(self.coefficient_names, coefficients, strict=True)
+        read = tuple(named_coefficient(source, f"{kind}({self.place})", name) for name, source in given)
+        self.coefficients: tuple[Coefficient, ...] = read
         self._constant = np.array([c.value({}) if c.constant else np.nan for c in read])
         self._varying = tuple((i, c) for i, c in enumerate(read) if not c.constant)
 
@@ -133,6 +129,10 @@ class BaseElement(Recorded, ABC, family="element"):
     def direction(self, n: int) -> Array:
         """The vector (n,) with `u = direction . x`."""
         return self.place.direction(n)
+
+    def inputs(self, n: int) -> Array:
+        """Directions (m, n) of the displacements that the force reads; gaps and corners are places of the first."""
+        return self.direction(n)[None]
 
     def coefficient_values(self, values: Mapping[str, float]) -> Array:
         """The coefficients (nc,) at these values of the parameters."""
@@ -191,7 +191,7 @@ class BaseElement(Recorded, ABC, family="element"):
 
     def batch_form(self, c: Array) -> BatchForm:
         """The law as code for the integration of many trajectories; default: `tangent` is called back."""
-        return CalledBack(self, c)
+        return CalledBack(c, self.sampling(c))
 
     def __repr__(self) -> str:
         shown = [str(self.place)]
@@ -238,7 +238,7 @@ class Element(BaseElement):
 
     def batch_form(self, c: Array) -> BatchForm:
         """See `BaseElement.batch_form`; default: the law that `sampling` declares."""
-        return super().batch_form(c) if self.depends_on_velocity else form_of_sampling(self, c)
+        return super().batch_form(c) if self.depends_on_velocity else form_of_sampling(self.sampling(c), c)
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, Array | None, Array | None, Array | None]:
         """`(f_uuu, f_uuv, f_uvv, f_vvv)`, (N,) each; the last three are None for a law without velocity.

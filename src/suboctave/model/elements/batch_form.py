@@ -11,17 +11,17 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.model.elements.smoothness import (
-    CornerSampling,
     PiecewiseLinear,
     PolynomialSampling,
     Sampling,
     SharpSampling,
+    levels,
 )
 
 __all__ = [
@@ -33,17 +33,10 @@ __all__ = [
     "TanhForm",
     "WrittenForm",
     "form_of_sampling",
-    "switches",
 ]
 
 
 Array = NDArray[np.float64]
-
-
-class _Element(Protocol):
-    """What a form needs of its element."""
-
-    def sampling(self, c: Array) -> Sampling: ...
 
 
 @dataclass(frozen=True)
@@ -80,9 +73,9 @@ class BatchForm(ABC):
     corners: int = 0
     has_code = True
 
-    @abstractmethod
-    def numbers(self, c: Array) -> list[float]:
-        """The numbers of the code, from the coefficients of the element."""
+    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
+        """The numbers of the code, from the coefficients of the element and its smoothness there."""
+        return c.tolist()
 
     @abstractmethod
     def tangent(self, names: Names) -> Tangent:
@@ -102,12 +95,10 @@ class BatchForm(ABC):
 class PolynomialForm(BatchForm):
     """`sum_p c_p u^p`."""
 
-    def __init__(self, element: _Element, degree: int) -> None:
-        self.element = element
+    def __init__(self, degree: int) -> None:
         self.count = degree + 1
 
-    def numbers(self, c: Array) -> list[float]:
-        sampling = self.element.sampling(c)
+    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
         assert isinstance(sampling, PolynomialSampling)
         assert sampling.coefficients is not None
         return list(sampling.coefficients)
@@ -125,13 +116,11 @@ class PolynomialForm(BatchForm):
 class ArctanForm(BatchForm):
     """`constant + slope u + sum_i k_i / pi [y_i atan(s_i y_i) - ln(1 + (s_i y_i)^2) / (2 s_i)]`, y_i = u - b_i."""
 
-    def __init__(self, element: _Element, steps: int) -> None:
-        self.element = element
+    def __init__(self, steps: int) -> None:
         self.steps = self.corners = steps
         self.count = 2 + 4 * steps
 
-    def numbers(self, c: Array) -> list[float]:
-        sampling = self.element.sampling(c)
+    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
         assert isinstance(sampling, SharpSampling)
         assert sampling.steps is not None
         out = [sampling.constant, sampling.slope]
@@ -157,14 +146,12 @@ class ArctanForm(BatchForm):
 class PiecesForm(BatchForm):
     """Springs on half-lines, `k_i (u - b_i)` where `side_i (u - b_i) > 0`."""
 
-    def __init__(self, element: _Element, sides: Sequence[int]) -> None:
-        self.element = element
+    def __init__(self, sides: Sequence[int]) -> None:
         self.sides = tuple(sides)
         self.corners = len(self.sides)
         self.count = 2 * self.corners
 
-    def numbers(self, c: Array) -> list[float]:
-        sampling = self.element.sampling(c)
+    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
         assert isinstance(sampling, PiecewiseLinear)
         return [float(c[index]) for piece in sampling.pieces for index in (piece.stiffness, piece.gap)]
 
@@ -195,9 +182,6 @@ class QuadraticForm(BatchForm):
 
     count = corners = 1
 
-    def numbers(self, c: Array) -> list[float]:
-        return [float(c[0])]
-
     def tangent(self, names: Names) -> Tangent:
         c, v = names.number(0), names.r[0]
         return Tangent([], f"{c} * {v} * abs({v})", [""], [f"2.0 * {c} * abs({v})"])
@@ -215,7 +199,7 @@ class TanhForm(BatchForm):
 
     count = 2
 
-    def numbers(self, c: Array) -> list[float]:
+    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
         return [float(c[0]), 1.0 / float(c[1])]
 
     def tangent(self, names: Names) -> Tangent:
@@ -242,9 +226,6 @@ class WrittenForm(BatchForm):
         atoms = law.expression.atoms(*CORNER_FUNCTIONS)
         self.places = sorted({atom.args[0] for atom in atoms if atom.free_symbols & states}, key=str)
         self.corners = len(self.places)
-
-    def numbers(self, c: Array) -> list[float]:
-        return [float(value) for value in c]
 
     def _states(self, names: Names) -> list[str]:
         return [*names.q, *(names.r if self.moving else ())]
@@ -301,14 +282,13 @@ class CalledBack(BatchForm):
 
     has_code = False
 
-    def __init__(self, element: _Element, c: Array) -> None:
-        self.element = element
-        self.corners = len(switches(element.sampling(c), c))
+    def __init__(self, c: Array, sampling: Sampling) -> None:
+        self.corners = len(levels(sampling, c))
         self.count = self.corners + len(c)
 
-    def numbers(self, c: Array) -> list[float]:
-        places = [place for place, _, _ in switches(self.element.sampling(c), c)] + [math.inf] * self.corners
-        return [*places[: self.corners], *(float(value) for value in c)]
+    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
+        places = [*levels(sampling, c), *[math.inf] * self.corners]
+        return [*places[: self.corners], *c.tolist()]
 
     def tangent(self, names: Names) -> Tangent:
         raise TypeError("a law that is called back has no code")
@@ -317,25 +297,12 @@ class CalledBack(BatchForm):
         return [], f"{names.q[0]} - {names.number(i)}", names.r[0]
 
 
-def switches(sampling: Sampling, c: Array) -> list[tuple[float, int, float | None]]:
-    """Displacements at which a law changes or is sharp: (place, side, stiffness of the piece beyond it).
-
-    A piece acts while `side (u - place) > 0`; without a stiffness the law is smooth but for the place itself.
-    """
-    if isinstance(sampling, PiecewiseLinear):
-        return [(float(c[piece.gap]), piece.side, float(c[piece.stiffness])) for piece in sampling.pieces]
-    if isinstance(sampling, SharpSampling | CornerSampling):
-        return [(float(place), 1, None) for place in sampling.points]
-    return []
-
-
-def form_of_sampling(element: _Element, c: Array) -> BatchForm:
+def form_of_sampling(sampling: Sampling, c: Array) -> BatchForm:
     """The law of one displacement as its smoothness class gives it, else called back."""
-    sampling = element.sampling(c)
     if isinstance(sampling, PolynomialSampling) and sampling.coefficients is not None:
-        return PolynomialForm(element, sampling.degree)
+        return PolynomialForm(sampling.degree)
     if isinstance(sampling, SharpSampling) and sampling.steps is not None:
-        return ArctanForm(element, len(sampling.steps))
+        return ArctanForm(len(sampling.steps))
     if isinstance(sampling, PiecewiseLinear):
-        return PiecesForm(element, [piece.side for piece in sampling.pieces])
-    return CalledBack(element, c)
+        return PiecesForm([piece.side for piece in sampling.pieces])
+    return CalledBack(c, sampling)

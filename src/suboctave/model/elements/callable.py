@@ -71,7 +71,6 @@ class Callable(Element):
 
     @property
     def label(self) -> str:
-        """How messages name this element."""
         return f"Callable({self.place}, {getattr(self.function, '__name__', 'function')})"
 
     @property
@@ -190,7 +189,6 @@ class Callable(Element):
         return AdaptiveSampling()
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.tangent`."""
         return (self._value(u, v, c), *self._slopes(u, v, c))
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:

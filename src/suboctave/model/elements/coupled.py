@@ -49,7 +49,6 @@ class CoupledElement(BaseElement):
         self.input_places = tuple(_input_place(self.label, given) for given in inputs)
 
     def inputs(self, n: int) -> Array:
-        """Directions (m, n) of the displacements that the force reads."""
         return np.array([place.direction(n) for place in self.input_places])
 
     @abstractmethod
@@ -120,7 +119,7 @@ class _OneInput:
 
 def reads(element: BaseElement, n: int) -> Array:
     """The direction (n,) of the displacement that an element's gaps and corners are places of."""
-    return element.inputs(n)[0] if isinstance(element, CoupledElement) else element.direction(n)
+    return np.asarray(element.inputs(n)[0])
 
 
 def as_coupled(element: BaseElement) -> CoupledElement | _OneInput:

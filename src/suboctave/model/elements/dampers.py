@@ -47,7 +47,6 @@ class QuadraticDamper(_Damper):
         super().__init__(dof, [coefficient], direction=direction)
 
     def batch_form(self, c: Array) -> BatchForm:
-        """See `BaseElement.batch_form`."""
         return QuadraticForm()
 
     def sampling(self, c: Array) -> CornerSampling:
@@ -55,12 +54,10 @@ class QuadraticDamper(_Damper):
         return CornerSampling(velocities=(0.0,))
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.tangent`."""
         rate = c[0] * np.abs(v)
         return rate * v, np.zeros_like(u), 2.0 * rate
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.curvature`."""
         zero = np.zeros_like(u)
         return zero, zero, 2.0 * c[0] * np.sign(v)
 
@@ -70,7 +67,6 @@ class QuadraticDamper(_Damper):
         return zero, zero, zero, zero
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.coefficient_tangent`."""
         size = np.abs(v)
         return (size * v)[None], np.zeros((1, len(u))), 2.0 * size[None]
 
@@ -118,7 +114,6 @@ class TanhFriction(_Damper):
             )
 
     def batch_form(self, c: Array) -> BatchForm:
-        """See `BaseElement.batch_form`."""
         return TanhForm()
 
     def sampling(self, c: Array) -> SharpVelocitySampling:
@@ -126,23 +121,19 @@ class TanhFriction(_Damper):
         return SharpVelocitySampling((0.0,), (0.5 * math.pi * float(c[1]),))
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.tangent`."""
         t = np.tanh(v / c[1])
         return c[0] * t, np.zeros_like(u), c[0] / c[1] * (1.0 - t * t)
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.curvature`."""
         t, zero = np.tanh(v / c[1]), np.zeros_like(u)
         return zero, zero, -2.0 * c[0] / c[1] ** 2 * t * (1.0 - t * t)
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array, Array]:
-        """See `Element.third`."""
         t, zero = np.tanh(v / c[1]), np.zeros_like(u)
         s = 1.0 - t * t
         return zero, zero, zero, c[0] / c[1] ** 3 * s * (4.0 * t * t - 2.0 * s)
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.coefficient_tangent`."""
         force, v0 = c
         y = v / v0
         t = np.tanh(y)
@@ -151,7 +142,6 @@ class TanhFriction(_Damper):
         return f_c, np.zeros((2, len(u))), np.array([s / v0, force / v0**2 * s * (2.0 * t * y - 1.0)])
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
-        """See `Element.coefficient_curvature`."""
         force, v0 = c
         y = v / v0
         t = np.tanh(y)

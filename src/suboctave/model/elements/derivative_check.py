@@ -20,6 +20,7 @@ from suboctave.model.elements.smoothness import (
     PolynomialSampling,
     SharpSampling,
     SharpVelocitySampling,
+    levels,
 )
 
 __all__ = ["DerivativeReport", "check_derivatives"]
@@ -103,9 +104,7 @@ class _Places:
 def _one_input(element: Element, c: Array, u: ArrayLike | None, v: ArrayLike | None) -> _Places:
     """Around the gaps or sharp points, on both sides of each; those beside a corner are left out."""
     kind = element.sampling(c)
-    points = list(kind.points) if isinstance(kind, SharpSampling | CornerSampling) else []
-    if isinstance(kind, PiecewiseLinear):
-        points = [float(c[piece.gap]) for piece in kind.pieces]
+    points = list(levels(kind, c))
     widths = list(kind.widths) if isinstance(kind, SharpSampling) else []
     reach = max([abs(point) for point in points] + [0.0]) or max(widths, default=1.0)
     if u is None:
@@ -147,16 +146,16 @@ def _coupled(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike |
     if len({len(row) for row in rows}) != 1 or not np.all(np.isfinite(np.concatenate(rows))):
         raise InputError("u and v must be finite, with one row of equal length per input")
     q: Array = np.array(rows, dtype=float)
-    for row, levels in ((0, corners.points), (m, corners.velocities)):
-        if levels:
+    for row, places in ((0, corners.points), (m, corners.velocities)):
+        if places:
             margin = (_BESIDE_ROUGH if corners.rough else _BESIDE) * STEP * float(np.max(np.abs(q[row])))
-            q = _away_from(q, row, list(levels), margin)
+            q = _away_from(q, row, list(places), margin)
     steps = [STEP * (abs(float(value)) or 1.0) for value in c]
     return _Places(q, 0.37 + 0.9 * np.arange(q.shape[1], dtype=float), [step_of(row) for row in q], steps)
 
 
-def _away_from(q: Array, row: int, levels: list[float], margin: float) -> Array:
-    far = np.all([np.abs(q[row] - level) > margin for level in levels], axis=0) if levels else np.full(q.shape[1], True)
+def _away_from(q: Array, row: int, places: list[float], margin: float) -> Array:
+    far = np.all([np.abs(q[row] - place) > margin for place in places], axis=0) if places else np.full(q.shape[1], True)
     if not np.any(far):
         raise InputError("every place given lies on a corner of the law; give some away from it")
     return q[:, far].copy()

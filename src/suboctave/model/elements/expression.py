@@ -81,11 +81,9 @@ class Expression(CoupledElement):
 
     @property
     def label(self) -> str:
-        """How messages name this element."""
         return f"Expression({self.place}, {self.expression!r:.60})"
 
     def batch_form(self, c: Array) -> BatchForm:
-        """See `BaseElement.batch_form`."""
         return WrittenForm(self._law)
 
     def sampling(self, c: Array) -> Sampling:
@@ -93,23 +91,18 @@ class Expression(CoupledElement):
         return self._law.sampling(c)
 
     def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
-        """See `CoupledElement.tangent`."""
         return self._law.tangent(q, theta, c)
 
     def curvature(self, q: Array, theta: Array, c: Array) -> Array:
-        """See `CoupledElement.curvature`."""
         return self._law.curvature(q, theta, c)
 
     def third(self, q: Array, theta: Array, c: Array) -> Array:
-        """See `CoupledElement.third`."""
         return self._law.third(q, theta, c)
 
     def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
-        """See `CoupledElement.coefficient_tangent`."""
         return self._law.coefficient_tangent(q, theta, c)
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
-        """See `CoupledElement.coefficient_curvature`."""
         return self._law.coefficient_curvature(q, theta, c)
 
     def __repr__(self) -> str:

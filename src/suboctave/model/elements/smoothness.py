@@ -20,6 +20,7 @@ __all__ = [
     "SharpSampling",
     "SharpVelocitySampling",
     "levels",
+    "switches",
 ]
 
 
@@ -124,8 +125,18 @@ Sampling: TypeAlias = (
 )
 
 
+def switches(sampling: Sampling, c: NDArray[np.float64]) -> list[tuple[float, int, float | None]]:
+    """Displacements at which a law changes or is sharp: (place, side, stiffness of the piece beyond it).
+
+    A piece acts while `side (u - place) > 0`; without a stiffness the law is smooth but for the place itself.
+    """
+    if isinstance(sampling, PiecewiseLinear):
+        return [(float(c[piece.gap]), piece.side, float(c[piece.stiffness])) for piece in sampling.pieces]
+    if isinstance(sampling, SharpSampling | CornerSampling):
+        return [(float(place), 1, None) for place in sampling.points]
+    return []
+
+
 def levels(kind: Sampling, coefficients: NDArray[np.float64]) -> tuple[float, ...]:
     """Displacements at which a law has a corner, or is sharp, at these coefficients."""
-    if isinstance(kind, PiecewiseLinear):
-        return tuple(float(coefficients[piece.gap]) for piece in kind.pieces)
-    return kind.points if isinstance(kind, SharpSampling | CornerSampling) else ()
+    return tuple(place for place, _, _ in switches(kind, coefficients))

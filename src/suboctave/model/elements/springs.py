@@ -59,19 +59,15 @@ class PolynomialSpring(Element):
         return out
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        """See `Element.tangent`."""
         return self._derivative(0, u, c), self._derivative(1, u, c), None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
-        """See `Element.curvature`."""
         return self._derivative(2, u, c), None, None
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
-        """See `Element.third`."""
         return self._derivative(3, u, c), None, None, None
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        """See `Element.coefficient_tangent`."""
         f_c = np.array([_power(u, power) for power in self.powers])
         f_uc = np.array([power * _power(u, power - 1) for power in self.powers])
         return f_c, f_uc, None
@@ -92,7 +88,6 @@ class CubicSpring(PolynomialSpring):
         super().__init__(dof, {3: coefficient}, direction=direction)
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        """See `Element.tangent`."""
         stiffness = c[0] * u * u
         return stiffness * u, 3.0 * stiffness, None
 

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, suggest
 from suboctave.model.elements.base import Array, Dof, Element, required
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear, SharpSampling
-from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
 __all__ = ["Clearance", "ElasticStop", "Freeplay"]
 
@@ -233,7 +233,6 @@ class _Stops(Element):
         )
 
     def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
-        """See `Element.smoothness_change`."""
         if not self.regularised:
             return None
         moved = [(law, *rates[index].tolist()) for index, law in self._laws(c) if isinstance(law, _Rounded)]
@@ -246,7 +245,6 @@ class _Stops(Element):
         )
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        """See `Element.tangent`."""
         f, f_u = np.sum([law.tangent(u) for _, law in self._laws(c)], axis=0)
         return f, f_u, None
 
@@ -307,7 +305,6 @@ class ElasticStop(_Stops):
 
     @property
     def label(self) -> str:
-        """How messages name this element."""
         return f"ElasticStop({self.place}, gap={self.coefficients[1].text})"
 
     def _options(self) -> list[str]:
@@ -378,7 +375,7 @@ class Freeplay(_Play):
         direction: ArrayLike | None = None,
     ) -> None:
         required("Freeplay", stiffness=stiffness, gap=gap)
-        read = _read("Freeplay", "gap", gap)
+        read = named_coefficient(gap, "Freeplay", "gap")
         super().__init__(dof, stiffness, f"-({read.text})", read.text, regularization, direction, {"gap": read})
 
 
@@ -402,14 +399,8 @@ class Clearance(_Play):
         direction: ArrayLike | None = None,
     ) -> None:
         required("Clearance", stiffness=stiffness, clearance=clearance)
-        width, centre = _read("Clearance", "clearance", clearance), _read("Clearance", "offset", offset)
+        width = named_coefficient(clearance, "Clearance", "clearance")
+        centre = named_coefficient(offset, "Clearance", "offset")
         left, right = (f"({centre.text}) {sign} ({width.text})/2" for sign in "-+")
         given = {"clearance": width, "offset": centre}
         super().__init__(dof, stiffness, left, right, regularization, direction, given)
-
-
-def _read(kind: str, what: str, source: Any) -> Coefficient:
-    try:
-        return coefficient(source)
-    except InputError as error:
-        raise InputError(f"{kind}, {what}: {error}", (what,)) from None

@@ -14,7 +14,7 @@ from typing import Any
 from suboctave.errors import InputError, suggest
 from suboctave.model.expressions.reader import FUNCTIONS, Evaluate, read
 
-__all__ = ["ZERO", "Coefficient", "coefficient"]
+__all__ = ["ZERO", "Coefficient", "coefficient", "named_coefficient"]
 
 
 class Coefficient:
@@ -131,6 +131,14 @@ def coefficient(source: Any) -> Coefficient:
         f"a coefficient is a number or an expression in the parameters as text, not {source!r} "
         f"({type(source).__name__})"
     )
+
+
+def named_coefficient(source: Any, owner: str, name: str) -> Coefficient:
+    """The coefficient of this name; refusals begin with its owner, and point at it."""
+    try:
+        return coefficient(source)
+    except InputError as error:
+        raise InputError(f"{owner}, {name}: {error}", (name,)) from None
 
 
 def _number(number: float, text: str = "") -> Coefficient:
