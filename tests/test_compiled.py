@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -98,6 +99,34 @@ def test_several_threads_may_call_a_kernel_while_one_of_them_compiles_it(made):
         sys.setswitchinterval(interval)
     assert results == [30.0] * 2000
     assert len(total.signatures) == 1
+
+
+DIGITS = """
+import numpy as np
+from suboctave.harmonic.aft.pieces import add_pieces, product_spectrum
+from suboctave.harmonic.quadrature import search_grid
+
+high = np.arange(1.0, 41.0)
+motion = np.append(0.1, np.exp(1j * high**2) / high**2)
+grid, pieces = search_grid(40), np.array([[2.0, 0.1, 1.0], [1.5, -0.2, -1.0]])
+force, stiffness = np.zeros((2, 81), dtype=complex)
+add_pieces(motion, pieces, grid.zr, grid.zi, force, stiffness)
+product = product_spectrum(motion, 0.0, np.append(stiffness, stiffness[1:41]), 80)
+print(force.tobytes().hex(), stiffness.tobytes().hex(), product.tobytes().hex())
+"""
+
+
+def test_the_process_that_compiles_computes_the_same_digits_as_those_that_load(tmp_path):
+    """Sums that may be reordered are part of whatever calls them, not a second copy compiled in other company."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def digits() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", DIGITS], env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stdout
+
+    assert digits() == digits()
 
 
 def signatures() -> dict[str, list[str]]:

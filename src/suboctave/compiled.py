@@ -84,16 +84,23 @@ event.register("numba:compile", _Compilation())
 
 
 def kernel(**options: Any) -> Callable[[_Function], _Function]:
-    """Decorator of a kernel: `numba.njit` with its cache and these options."""
+    """Decorator of a kernel: `numba.njit` with its cache and these options.
+
+    Sums that the compiler may reorder (`fastmath`) are inlined wherever they are called, with all that is around them.
+    Else each caller would have a copy beside the original, compiled in other company and so reordered otherwise, and
+    which of them runs would depend on what the process has compiled or loaded before.
+    """
 
     def decorate(function: _Function) -> _Function:
         if config.DISABLE_JIT:
             return np.errstate(all="ignore")(function)
+        called = (function.__globals__.get(name) for name in function.__code__.co_names)
+        inlined = "fastmath" in options or any(getattr(k, "targetoptions", {}).get("forceinline") for k in called)
         try:
-            result = njit(cache=True, **options)(function)
+            result = njit(cache=True, forceinline=inlined, **options)(function)
         except RuntimeError:  # no folder for the cache
             _print_once(_NO_CACHE)
-            result = njit(**options)(function)
+            result = njit(forceinline=inlined, **options)(function)
         KERNELS.append(result)
         return result
 
