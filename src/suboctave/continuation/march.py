@@ -178,9 +178,10 @@ class March:
         if curve is not p.curve:
             u, along = curve.transfer(u, p.curve), curve.transfer(along, p.curve)
         weights = curve.weights(u, largest)
-        return CurvePoint(
-            curve, u, along / length(weights * along), weights, p.evaluation, p.orientation, p.arclength, p.iterations
-        )
+        size = length(weights * along)
+        if not 0.0 < size < math.inf:
+            raise OverflowError(f"the tangent has the length {size:g}")
+        return CurvePoint(curve, u, along / size, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
     def _advance(
         self, point: CurvePoint, step: float, behind: list[CurvePoint]

@@ -65,7 +65,8 @@ def check_parameter(system: System, name: str) -> None:
 
 def check_count(name: str, value: Any, least: int = 1) -> int:
     """A whole number, positive or at least 0."""
-    whole = not isinstance(value, bool) and is_number(value) and float(value).is_integer()
+    exact = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    whole = exact or (not isinstance(value, bool) and is_number(value) and float(value).is_integer())
     if not whole or value < least:
         raise InputError(f"{name} must be a {'positive ' * (least > 0)}whole number, not {shortened(value)}")
     if value > _MOST:
