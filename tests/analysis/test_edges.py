@@ -12,6 +12,7 @@ import suboctave as so
 from suboctave.errors import ConvergenceError, InputError
 
 DUFFING = so.library.duffing()
+RESULT = so.integrate(DUFFING, omega=1.0, periods=1)
 HUGE = 10**400
 SQUARE = {"omega": 1.0, "box": ((-1, 1), (-1, 1))}
 
@@ -78,7 +79,7 @@ MISTAKES = {
     "bytes for a file": (lambda: so.load(b"a.nc"), "name"),
     "a name too long for a file": (lambda: so.load("a" * 5000), "too long"),
     "a folder for a file": (lambda: so.load("."), "folder"),
-    "nowhere to save to": (lambda: so.integrate(DUFFING, omega=1.0, periods=1).save(None), "name"),
+    "nowhere to save to": (lambda: RESULT.save(None), "name"),
     "an array for a coefficient": (lambda: spring(np.array([1.0, 2.0])), "number or an expression"),
     "a direction in words": (lambda: so.CubicSpring(coefficient=1.0, direction="x"), "direction"),
     "a complex direction": (lambda: so.CubicSpring(coefficient=1.0, direction=[1j]), "direction"),
