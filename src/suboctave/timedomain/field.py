@@ -136,16 +136,21 @@ class Field:
         self._linear[n:, n:] = -velocity_per_force @ (self.damping * self.lengths * reference)
         push = self.loads.direction @ velocity_per_force.T
         self._push = np.hstack([np.zeros_like(push), push])
-        self._laws: list[tuple[Callable[..., tuple[Array, Array]], Array, Array, Array]] = []
+        #: of every law: its tangent, its coefficients, which of the columns read are its own
+        self._laws: list[tuple[Callable[..., tuple[Array, Array]], Array, slice]] = []
+        read, act = [np.zeros((0, 2 * n))], [np.zeros((0, 2 * n))]
+        columns = 0
         for element, c in self.smooth:
             law = as_coupled(element)
             inputs = law.inputs(n)
             zero = np.zeros_like(inputs)
-            read = np.hstack([inputs * self.lengths, zero])
+            read.append(np.hstack([inputs * self.lengths, zero]))
             if element.depends_on_velocity:
-                read = np.vstack([read, np.hstack([zero, inputs * self.lengths * reference])])
-            act = np.concatenate([np.zeros(n), -velocity_per_force @ element.direction(n)])
-            self._laws.append((law.tangent, c, np.ascontiguousarray(read.T), act))
+                read.append(np.hstack([zero, inputs * self.lengths * reference]))
+            act.append(np.concatenate([np.zeros(n), -velocity_per_force @ element.direction(n)])[None])
+            first, columns = columns, columns + len(inputs) * (1 + element.depends_on_velocity)
+            self._laws.append((law.tangent, c, slice(first, columns)))
+        self._read, self._act = np.ascontiguousarray(np.vstack(read).T), np.vstack(act)
 
         along = np.array([s.side * s.direction for s in self.switches]).reshape(-1, n)
         gap = np.array([s.side * s.gap for s in self.switches])
@@ -177,7 +182,7 @@ class Field:
     def right_hand_side(self, active: NDArray[np.bool_], slope: bool = False) -> RightHandSide:
         """The rate of the stacked rows per unit of `tau`, contacts frozen as in `active` (one flag per switch)."""
         matrix, constant = self._matrices(active)
-        m, laws = 2 * self.n, self._laws
+        m, laws, read, act = 2 * self.n, self._laws, self._read, self._act
         loads, amplitude, push = self.loads, self.loads.amplitude, self._push
         harmonic, phase = loads.harmonic, loads.phase
         relative = self.reference / self.omega
@@ -189,12 +194,14 @@ class Field:
             angle = harmonic * tau + phase
             cosine = np.cos(angle)
             first += constant + (amplitude * cosine) @ push
-            for law, c, read, act in laws:
-                q = rows @ read
-                f, f_q = law(q[0][:, None], np.array([tau]), c)
-                force = q @ f_q[:, 0]
-                force[0] = f[0]
-                out += np.multiply.outer(force, act)
+            if laws:
+                q, instant = rows @ read, np.array([tau])
+                force = np.empty((len(rows), len(laws)))
+                for i, (law, c, own) in enumerate(laws):
+                    f, f_q = law(q[0, own, None], instant, c)
+                    force[:, i] = q[:, own] @ f_q[:, 0]
+                    force[0, i] = f[0]
+                out += force @ act
             if slope:
                 # F_tau = F / omega, so d F_tau / d(omega/W) = -(W/omega) F_tau + W (1/omega) dF/d omega
                 change = loads.amplitude_slope * cosine - amplitude * loads.phase_slope * np.sin(angle)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -116,7 +117,7 @@ class _Rounded:
         f_ss = size * (_phi_ss(y, s) - _phi_ss(-b, s))
         return np.array([[np.zeros_like(u), f_kb, f_ks], [f_kb, f_bb, f_bs], [f_ks, f_bs, f_ss]])
 
-    @property
+    @cached_property
     def rest(self) -> float:
         """r: what makes the force at `u = 0` that of the exact law."""
         at_zero = _phi(-self.b, self.s, _phi_y(-self.b, self.s))
@@ -163,6 +164,16 @@ def _phi_ys(y: Any, s: float) -> Any:
 
 def _phi_ss(y: Any, s: float) -> Any:
     return y**2 / (np.pi * s * (1.0 + (s * y) ** 2)) - np.log1p((s * y) ** 2) / (np.pi * s**3)
+
+
+@lru_cache(maxsize=256)
+def _laws_of(
+    sides: tuple[int, ...], regularised: bool, c: tuple[float, ...]
+) -> tuple[tuple[list[int], _Exact | _Rounded], ...]:
+    """Of stops with the coefficients c, the stiffness first: which of these are the own of each, and its law."""
+    last, kind = ([len(c) - 1], _Rounded) if regularised else ([], _Exact)
+    own = [([0, gap, *last], side) for gap, side in enumerate(sides, start=1)]
+    return tuple((index, kind(side, *(c[i] for i in index))) for index, side in own)
 
 
 # ---------------------------------------------------------------------------------------------------------- elements
@@ -213,11 +224,9 @@ class _Stops(Element):
                 "1e100): leave it out for the exact law, or choose units in which the gap is nearer to 1"
             )
 
-    def _laws(self, c: Array) -> list[tuple[list[int], _Exact | _Rounded]]:
+    def _laws(self, c: Array) -> tuple[tuple[list[int], _Exact | _Rounded], ...]:
         """Of every stop: which of the coefficients are its own, and its law."""
-        last, kind = ([len(c) - 1], _Rounded) if self.regularised else ([], _Exact)
-        own = [([0, gap, *last], side) for gap, side in enumerate(self.sides, start=1)]
-        return [(index, kind(side, *c[index].tolist())) for index, side in own]
+        return _laws_of(self.sides, self.regularised, tuple(c.tolist()))
 
     def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gaps with width 1/s."""
@@ -245,8 +254,8 @@ class _Stops(Element):
         )
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        f, f_u = np.sum([law.tangent(u) for _, law in self._laws(c)], axis=0)
-        return f, f_u, None
+        forces, slopes = zip(*(law.tangent(u) for _, law in self._laws(c)), strict=True)
+        return sum(forces[1:], forces[0]), sum(slopes[1:], slopes[0]), None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
         """`f_uu`; for the exact law its regular part, which is zero."""
