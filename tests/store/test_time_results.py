@@ -166,5 +166,5 @@ def test_a_part_that_is_missing_is_named():
     with pytest.raises(so.InputError, match="result/branch"):
         from_datasets({name: part for name, part in parts.items() if name != "result/branch"})
     head = to_datasets(MAKERS["trajectory"]())
-    with pytest.raises(so.InputError, match="no result of suboctave"):
+    with pytest.raises(so.InputError, match="stored as 'trajectory' cannot be read"):
         from_datasets({"": head[""].drop_vars("velocity")})

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError
 from suboctave.experiments.basins.attractors import BasinAttractor
 from suboctave.experiments.basins.verb import Basins
 from suboctave.experiments.brute_force import BruteForceDiagram
@@ -39,17 +38,12 @@ _CLASSES: dict[str, type] = {"TwoTrajectories": TwoTrajectories}
 
 
 def _read(kind: _Kind, groups: Datasets, allow_code: bool, linear: Any) -> TimeResult:
-    """The result that `_written` wrote, equal bit for bit; InputError where the datasets are not those of one."""
+    """The result that `_written` wrote, equal bit for bit."""
     dataset = groups[""]
-    try:
-        record = from_json(str(dataset["record"].item()), _CLASSES)
-        system = build(record["system"], system_arrays(dataset), allow_code)
-        result: TimeResult = kind.made(**kind.arguments(_Read(dataset, record, system)), system=system)
-        result.seconds = float(record["seconds"])
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is no result of suboctave: {type(error).__name__}: {error}") from None
+    record = from_json(str(dataset["record"].item()), _CLASSES)
+    system = build(record["system"], system_arrays(dataset), allow_code)
+    result: TimeResult = kind.made(**kind.arguments(_Read(dataset, record, system)), system=system)
+    result.seconds = float(record["seconds"])
     return result
 
 

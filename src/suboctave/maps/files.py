@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -76,30 +75,20 @@ class Opened(NamedTuple):
         return [part for name, part in self.parts.items() if name.startswith(beginning)]
 
 
-@contextmanager
 def opened(
     groups: Mapping[str, xarray.Dataset],
     words: str,
     allow_code: bool,
     linear: LinearPart | None,
     classes: Mapping[str, type] | None = None,
-) -> Iterator[Opened]:
-    """Read what `map_datasets` laid out; InputError where that fails, here or within: "this is no" or "these are no"
-    `words`, or parts are missing.
-    """
-    plural = words.endswith("s")
-    try:
-        head = groups[""]
-        datasets = parts_of(groups, str(head.attrs["parts"]).splitlines(), words if plural else "map")
-        record = from_json(str(head["record"].item()), {**CLASSES, **(classes or {})})
-        parts = {name: branch_from_dataset(part, allow_code, linear) for name, part in datasets.items()}
-        system = build(record["system"], system_arrays(head), allow_code)
-        yield Opened(head, record, system, parts, float(head.attrs.get("seconds", np.nan)))
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, StopIteration) as error:
-        no = "these are no" if plural else "this is no"
-        raise InputError(f"{no} {words} of suboctave: {type(error).__name__}: {error}") from None
+) -> Opened:
+    """Read what `map_datasets` laid out; InputError where parts of `words` are missing."""
+    head = groups[""]
+    datasets = parts_of(groups, str(head.attrs["parts"]).splitlines(), words)
+    record = from_json(str(head["record"].item()), {**CLASSES, **(classes or {})})
+    parts = {name: branch_from_dataset(part, allow_code, linear) for name, part in datasets.items()}
+    system = build(record["system"], system_arrays(head), allow_code)
+    return Opened(head, record, system, parts, float(head.attrs.get("seconds", np.nan)))
 
 
 def piece_number(piece: MonotonePiece, pieces: Sequence[MonotonePiece]) -> int:

@@ -81,12 +81,18 @@ def to_datasets(item: Any, details: Mapping[str, Any] | None = None) -> dict[str
 def from_datasets(
     groups: Datasets, allow_code: bool = False, linear: LinearPart | None = None
 ) -> tuple[Any, dict[str, Any]]:
-    """The result that `to_datasets` wrote, and the attributes of the dataset named ""."""
+    """The result that `to_datasets` wrote, and the attributes of the dataset named ""; InputError where it is none."""
     details = {str(name): files.number(value) for name, value in groups[""].attrs.items()}
     codec = _codecs.get(str(details.get("contents")))
     if codec is None:
         raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
-    return codec.read(groups, allow_code, linear), details
+    try:
+        return codec.read(groups, allow_code, linear), details
+    except InputError:  # which is a ValueError
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, StopIteration) as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"what is stored as {codec.contents!r} cannot be read: {reason}") from None
 
 
 def parts_of(groups: Datasets, names: Iterable[str], whole: str) -> dict[str, xarray.Dataset]:

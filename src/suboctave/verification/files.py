@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.results.files.branch import branch_from_dataset, branch_to_dataset
 from suboctave.store.arrays import array_of
 from suboctave.store.plain import from_json, to_json
-from suboctave.store.registry import Codec, register
+from suboctave.store.registry import Codec, parts_of, register
 from suboctave.verification.result import (
     EVENT_COLUMNS,
     POINT_COLUMNS,
@@ -48,37 +47,25 @@ def verification_to_datasets(check: BranchVerification) -> dict[str, xarray.Data
 def verification_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> BranchVerification:
-    """The verification that `verification_to_datasets` wrote.
-
-    Raises InputError where the datasets are not those of one, or the branch is missing.
-    """
-    if "branch" not in groups:
-        raise InputError("the branch that was verified is missing")
-    branch = branch_from_dataset(groups["branch"], allow_code, linear)
+    """The verification that `verification_to_datasets` wrote."""
+    branch = branch_from_dataset(parts_of(groups, ["branch"], "verification")["branch"], allow_code, linear)
     head = groups[""]
-    try:
-        record = from_json(str(head["record"].item()))
-        columns = {
-            name: array_of(head, name) for name in (*POINT_COLUMNS, *VERDICTS, "multipliers", "multiplier_errors")
-        }
-        points = []
-        for i, (count, errors) in enumerate(zip(record["multipliers"], record["errors"], strict=True)):
-            known: dict[str, Any] = {name: kind(columns[name][i]) for name, kind in POINT_COLUMNS.items()}
-            known |= {name: None if columns[name][i] < 0 else bool(columns[name][i]) for name in VERDICTS}
-            points.append(VerifiedPoint(
-                multipliers=columns["multipliers"][i, :count].copy(),
-                errors=columns["multiplier_errors"][i, :errors].copy(), **known,
-            ))  # fmt: skip
-        met = {name: array_of(head, f"event_{name}") for name in EVENT_COLUMNS}
-        events = [
-            VerifiedBifurcation(parameters=values, **{name: kind(met[name][i]) for name, kind in EVENT_COLUMNS.items()})
-            for i, values in enumerate(record["parameters"])
-        ]
-        tolerance, complete = float(head.attrs["tolerance"]), bool(head.attrs["complete"])
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is no verification of suboctave: {type(error).__name__}: {error}") from None
+    record = from_json(str(head["record"].item()))
+    columns = {name: array_of(head, name) for name in (*POINT_COLUMNS, *VERDICTS, "multipliers", "multiplier_errors")}
+    points = []
+    for i, (count, errors) in enumerate(zip(record["multipliers"], record["errors"], strict=True)):
+        known: dict[str, Any] = {name: kind(columns[name][i]) for name, kind in POINT_COLUMNS.items()}
+        known |= {name: None if columns[name][i] < 0 else bool(columns[name][i]) for name in VERDICTS}
+        points.append(VerifiedPoint(
+            multipliers=columns["multipliers"][i, :count].copy(),
+            errors=columns["multiplier_errors"][i, :errors].copy(), **known,
+        ))  # fmt: skip
+    met = {name: array_of(head, f"event_{name}") for name in EVENT_COLUMNS}
+    events = [
+        VerifiedBifurcation(parameters=values, **{name: kind(met[name][i]) for name, kind in EVENT_COLUMNS.items()})
+        for i, values in enumerate(record["parameters"])
+    ]
+    tolerance, complete = float(head.attrs["tolerance"]), bool(head.attrs["complete"])
     return BranchVerification(branch, tuple(points), tuple(events), tolerance, complete)
 
 

@@ -81,26 +81,23 @@ def _end(end: IsolaEnd, names: Mapping[int, str], curves: Sequence[TrackedBranch
 def isolas_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> Isolas:
-    """The isolas that `isolas_to_datasets` wrote.
-
-    Raises InputError where the datasets are not those of isolas, or some are missing.
-    """
-    with opened(groups, "isolas", allow_code, linear) as stored:
-        record, parameter = stored.record, str(stored.head.attrs["isolas"])
-        closed = iter(stored.named("closed_"))
-        isolas = Isolas(
-            [_isola(given, stored, parameter, closed) for given in record["isolas"]],
-            stored.system,
-            parameter,
-            record["bounds"],
-            record["omega"],
-            stored.named("limit_points_")[: record["listed"]],
-            stored.named("doublings_"),
-            record["notes"],
-            str(stored.head.attrs["said"]),
-            record["interruption"] if "interruption" in record else _interruption_of(record["notes"]),
-        )
-        isolas.seconds = stored.seconds
+    """The isolas that `isolas_to_datasets` wrote."""
+    stored = opened(groups, "isolas", allow_code, linear)
+    record, parameter = stored.record, str(stored.head.attrs["isolas"])
+    closed = iter(stored.named("closed_"))
+    isolas = Isolas(
+        [_isola(given, stored, parameter, closed) for given in record["isolas"]],
+        stored.system,
+        parameter,
+        record["bounds"],
+        record["omega"],
+        stored.named("limit_points_")[: record["listed"]],
+        stored.named("doublings_"),
+        record["notes"],
+        str(stored.head.attrs["said"]),
+        record["interruption"] if "interruption" in record else _interruption_of(record["notes"]),
+    )
+    isolas.seconds = stored.seconds
     return isolas
 
 
@@ -174,22 +171,22 @@ def isola_map_to_datasets(isola_map: IsolaMap) -> dict[str, xarray.Dataset]:
 def isola_map_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> IsolaMap:
-    """The map that `isola_map_to_datasets` wrote; InputError where the datasets are not those of one."""
-    with opened(groups, "map of isolas", allow_code, linear, {"Probe": Probe}) as stored:
-        record, curves = stored.record, list(stored.parts.values())
-        own = {name[len(_ISOLAS) + 1 :]: part for name, part in groups.items() if name.split("/")[0] == _ISOLAS}
-        isolas = isolas_from_datasets(own, allow_code, linear)
-        parameter, second = record["parameter"], record["second"]
-        borders = [border for curve in curves for border in pieces_of(curve, second, parameter)]
-        regions = []
-        for given in record["regions"]:
-            low, high = (borders[end] if kind == "border" else end for kind, end in given["ends"])
-            span = Span(ends=(low, high), **given["span"])
-            beside = tuple(curves[i] for i in given["curves"])
-            regions.append(IsolaRegion(isolas[given["isola"]], second, span, beside, tuple(given["probes"])))
-        bounds, notes, interruption = record["bounds"], record["notes"], record["interruption"]
-        loaded = IsolaMap(regions, stored.system, parameter, second, record["within"], bounds, notes, interruption)
-        loaded.seconds = stored.seconds
+    """The map that `isola_map_to_datasets` wrote."""
+    stored = opened(groups, "map", allow_code, linear, {"Probe": Probe})
+    record, curves = stored.record, list(stored.parts.values())
+    own = {name[len(_ISOLAS) + 1 :]: part for name, part in groups.items() if name.split("/")[0] == _ISOLAS}
+    isolas = isolas_from_datasets(own, allow_code, linear)
+    parameter, second = record["parameter"], record["second"]
+    borders = [border for curve in curves for border in pieces_of(curve, second, parameter)]
+    regions = []
+    for given in record["regions"]:
+        low, high = (borders[end] if kind == "border" else end for kind, end in given["ends"])
+        span = Span(ends=(low, high), **given["span"])
+        beside = tuple(curves[i] for i in given["curves"])
+        regions.append(IsolaRegion(isolas[given["isola"]], second, span, beside, tuple(given["probes"])))
+    bounds, notes, interruption = record["bounds"], record["notes"], record["interruption"]
+    loaded = IsolaMap(regions, stored.system, parameter, second, record["within"], bounds, notes, interruption)
+    loaded.seconds = stored.seconds
     return loaded
 
 

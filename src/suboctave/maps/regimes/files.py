@@ -80,26 +80,26 @@ def _written(arc: Arc, places: Mapping[int, tuple[str, int]], pieces: Sequence[M
 def regime_map_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> RegimeMap:
-    """The map that `regime_map_to_datasets` wrote; InputError where the datasets are not those of one."""
-    with opened(groups, "regime map", allow_code, linear) as stored:
-        record, branches, curves = stored.record, stored.parts, stored.named("curve_")
-        pieces = _pieces(curves, record["parameter"])
-        name, bounds, omega = record["parameter"], record["bounds"], SearchRange(*record["omega"])
-        options = record["options"]
-        catalogue = Catalogue(stored.system, name, bounds, omega, "adaptive", options, len(curves), curves, pieces)
-        catalogue.notes += record["notes"]
-        catalogue.interruption = record["interruption"]
-        slices = []
-        for given in record["slices"]:
-            met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]
-            arcs = [_arc(arc, branches, pieces) for arc in given["arcs"]]
-            slices.append(Slice(given["value"], catalogue, 2 ** record["depth"], branches=met, arcs=arcs))
-        strips = [
-            Strip(low, high, None if number is None else slices[number], examined)
-            for low, high, number, examined in record["strips"]
-        ]
-        regimes = RegimeMap(catalogue, strips, record["depth"], record["resolution"])
-        regimes.seconds = stored.seconds
+    """The map that `regime_map_to_datasets` wrote."""
+    stored = opened(groups, "map", allow_code, linear)
+    record, branches, curves = stored.record, stored.parts, stored.named("curve_")
+    pieces = _pieces(curves, record["parameter"])
+    name, bounds, omega = record["parameter"], record["bounds"], SearchRange(*record["omega"])
+    options = record["options"]
+    catalogue = Catalogue(stored.system, name, bounds, omega, "adaptive", options, len(curves), curves, pieces)
+    catalogue.notes += record["notes"]
+    catalogue.interruption = record["interruption"]
+    slices = []
+    for given in record["slices"]:
+        met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]
+        arcs = [_arc(arc, branches, pieces) for arc in given["arcs"]]
+        slices.append(Slice(given["value"], catalogue, 2 ** record["depth"], branches=met, arcs=arcs))
+    strips = [
+        Strip(low, high, None if number is None else slices[number], examined)
+        for low, high, number, examined in record["strips"]
+    ]
+    regimes = RegimeMap(catalogue, strips, record["depth"], record["resolution"])
+    regimes.seconds = stored.seconds
     return regimes
 
 

@@ -9,7 +9,7 @@ per point nor per event is JSON in the variable `record`. docs/results.md descri
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +81,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         rows = [() if e.null_vectors is None else getattr(e.null_vectors, side) for e in events]
         new[f"event_null_{side}"] = (("event", "null"), padded(rows, complex))
     record = {
-        "points": [writer.point(p) for p in branch.points],
+        "points": [writer.motion(p.orbit, p.floquet) for p in branch.points],
         "event_list": [(_PLACES[where], index) for where, index, _ in located],
         "events": [writer.event(event, branch) for event in events],
         "name": branch.name,
@@ -96,7 +96,7 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "observe": int(branch.observe),
         "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
-        "tables": writer.tables(),
+        "tables": writer.tables,
         "tracked": tracked_record(branch) if isinstance(branch, TrackedBranch) else None,
     }
     new["record"] = ((), np.array(to_json(record), dtype=object))
@@ -118,13 +118,8 @@ def branch_from_dataset(dataset: xarray.Dataset, allow_code: bool = False, linea
     """The branch that `branch_to_dataset` wrote, equal bit for bit.
 
     `linear`: the linear part that it was computed with, where that was not the system's own matrices.
-
-    Raises InputError where the dataset is not one of those.
     """
-    try:
-        return _Reader(dataset, allow_code, linear).branch()
-    except (KeyError, IndexError, TypeError, AttributeError) as error:
-        raise InputError(f"this is no branch of suboctave: {type(error).__name__}: {error}") from None
+    return _Reader(dataset, allow_code, linear).branch()
 
 
 register(
@@ -163,73 +158,45 @@ def _orbits(
     return variables
 
 
-@dataclass(frozen=True)
-class _Discretisation:
-    """What motions of a branch share: system, harmonics, samples."""
-
-    system: int
-    harmonics: int
-    nu: int
-    samples: tuple[int | None, ...]
-    values: tuple[float, ...]
-    linear: str
-
-
 class _Writer:
-    """Collects what motions share, each thing once."""
+    """Collects what motions share, each thing once: systems, discretisations, rules of harmonics, contexts."""
 
     def __init__(self) -> None:
         self.arrays: dict[str, np.ndarray] = {}
-        self._systems: dict[int, tuple[int, System, Any]] = {}
-        self._balances: dict[int, tuple[HarmonicBalance, int]] = {}
-        self._shared: dict[_Discretisation, int] = {}
-        self._rules: list[AdaptiveHarmonics] = []
-        self._contexts: list[Any] = []
+        self.tables: dict[str, list[Any]] = {"systems": [], "discretisations": [], "rules": [], "contexts": []}
+        #: numbers of systems and balances by identity, with these, so that no other object takes it
+        self._numbers: dict[int, tuple[int, Any]] = {}
 
-    def tables(self) -> dict[str, Any]:
-        return {
-            "systems": [text for _, _, text in self._systems.values()],
-            "discretisations": [{f.name: getattr(d, f.name) for f in fields(d)} for d in self._shared],
-            "rules": list(self._rules),
-            "contexts": list(self._contexts),
-        }
+    def _listed(self, table: str, entry: Any) -> int:
+        """The number of an entry in a table."""
+        if entry not in self.tables[table]:
+            self.tables[table].append(entry)
+        return self.tables[table].index(entry)
 
     def system(self, system: System) -> int:
-        if id(system) not in self._systems:
-            written = describe(system, Prefixed(self.arrays))
-            for index, _, text in self._systems.values():
-                if text == written:
-                    self._systems[id(system)] = (index, system, text)
-                    return index
-            self._systems[id(system)] = (len(self._systems), system, written)
-        return self._systems[id(system)][0]
+        if id(system) not in self._numbers:
+            self._numbers[id(system)] = self._listed("systems", describe(system, Prefixed(self.arrays))), system
+        return self._numbers[id(system)][0]
 
     def _discretisation(self, balance: HarmonicBalance) -> int:
-        if id(balance) not in self._balances:
+        if id(balance) not in self._numbers:
             linear = balance.linear
-            shared = _Discretisation(
-                self.system(balance.system),
-                int(balance.basis.harmonics),
-                int(balance.basis.nu),
-                tuple(None if s is None else int(s) for s in balance.samples),
-                tuple(float(balance.values[name]) for name in balance.system.parameters),
-                "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
-            )
-            self._balances[id(balance)] = (balance, self._shared.setdefault(shared, len(self._shared)))
-        return self._balances[id(balance)][1]
+            shared = {
+                "system": self.system(balance.system),
+                "harmonics": int(balance.basis.harmonics),
+                "nu": int(balance.basis.nu),
+                "samples": tuple(None if s is None else int(s) for s in balance.samples),
+                "values": tuple(float(balance.values[name]) for name in balance.system.parameters),
+                "linear": "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
+            }
+            self._numbers[id(balance)] = self._listed("discretisations", shared), balance
+        return self._numbers[id(balance)][0]
 
-    def _orbit(self, orbit: PeriodicOrbit, floquet: FloquetResult) -> list[Any]:
-        rule = -1
-        if orbit.adaptive is not None:
-            if orbit.adaptive not in self._rules:
-                self._rules.append(orbit.adaptive)
-            rule = self._rules.index(orbit.adaptive)
+    def motion(self, orbit: PeriodicOrbit, floquet: FloquetResult) -> list[Any]:
+        rule = -1 if orbit.adaptive is None else self._listed("rules", orbit.adaptive)
         verdict = {f.name: getattr(floquet, f.name) for f in fields(floquet) if f.name not in ("multipliers", "errors")}
         verdict["checks"] = dict(floquet.checks)
         return [self._discretisation(orbit.balance), rule, len(floquet.multipliers), verdict]
-
-    def point(self, point: BranchPoint) -> list[Any]:
-        return self._orbit(point.orbit, point.floquet)
 
     def event(self, event: Bifurcation, branch: Branch) -> dict[str, Any]:
         taken = ("orbit", "floquet", "null_vectors", "context")
@@ -240,7 +207,7 @@ class _Writer:
             "values": dict(orbit.values),
             "residual": orbit.residual,
             "truncation": orbit.truncation,
-            "orbit": self._orbit(orbit, event.floquet),
+            "orbit": self.motion(orbit, event.floquet),
             "null": None,
             "normal_form": event.normal_form,
             "context": None,
@@ -250,9 +217,7 @@ class _Writer:
             own["null"] = [len(vectors.right), bool(np.iscomplexobj(vectors.right)), len(vectors.left)]
         if event.context is not None:
             context = {**event.context, "system": self.system(event.context.get("system", branch.system))}
-            if context not in self._contexts:
-                self._contexts.append(context)
-            own["context"] = self._contexts.index(context)
+            own["context"] = self._listed("contexts", context)
         return {"fields": plain, **own}
 
 
@@ -261,6 +226,7 @@ class _Reader:
         self.dataset = dataset
         self.record = from_json(str(dataset["record"].item()), _CLASSES)
         self.tables = self.record["tables"]
+        self._arrays: dict[str, np.ndarray] = {}
         stored = system_arrays(dataset)
         self.systems = [build(text, stored, allow_code) for text in self.tables["systems"]]
         self.system = self.systems[self.record["system"]]
@@ -268,18 +234,42 @@ class _Reader:
 
     def _balance(self, stated: Mapping[str, Any], linear: LinearPart | None) -> HarmonicBalance:
         # files of earlier versions name harmonics that were left out: their coefficients are zero
-        d = _Discretisation(**{f.name: stated[f.name] for f in fields(_Discretisation)})
-        system = self.systems[d.system]
-        if d.linear and linear is None:
+        system, other = self.systems[stated["system"]], stated["linear"]
+        if other and linear is None:
             raise InputError(
-                f"this branch was computed with another linear part, a {d.linear}: make it again and give it as linear="
+                f"this branch was computed with another linear part, a {other}: make it again and give it as linear="
             )
-        values = dict(zip(system.parameters, d.values, strict=True))
-        given = linear if d.linear else None
-        return HarmonicBalance(system, HarmonicBasis(d.harmonics, d.nu), values, given, d.samples)
+        values = dict(zip(system.parameters, stated["values"], strict=True))
+        basis = HarmonicBasis(stated["harmonics"], stated["nu"])
+        return HarmonicBalance(system, basis, values, linear if other else None, stated["samples"])
 
     def array(self, name: str) -> np.ndarray:
-        return array_of(self.dataset, name)
+        """A variable, each put together once."""
+        if name not in self._arrays:
+            self._arrays[name] = array_of(self.dataset, name)
+        return self._arrays[name]
+
+    def motion(
+        self,
+        prefix: str,
+        i: int,
+        stored: Sequence[Any],
+        omega: float,
+        values: dict[str, float],
+        residual: float,
+        error: float,
+    ) -> tuple[PeriodicOrbit, FloquetResult]:
+        """A motion with its verdict; `error`: what was neglected of it."""
+        which, rule, count, verdict = stored
+        balance = self.balances[which]
+        x = self.array(f"{prefix}coefficients")[i, : balance.basis.size, : balance.size].copy()
+        adaptive = None if rule < 0 else self.tables["rules"][rule]
+        multipliers, errors = (
+            self.array(f"{prefix}{name}")[i, :count].copy() for name in ("multipliers", "multiplier_errors")
+        )
+        return PeriodicOrbit(balance, x, omega, values, residual, error, adaptive), FloquetResult(
+            multipliers, errors, **verdict
+        )
 
     def branch(self) -> Branch:
         record = self.record
@@ -316,11 +306,10 @@ class _Reader:
         omega, values = self.array("omega"), self.array("parameters")
         residual, error = self.array("residual"), self.array("error")
         arclength, iterations = self.array("arclength"), self.array("iterations")
-        motions = _Motions(self, "")
         points = []
         for i, stored in enumerate(self.record["points"]):
             at = {name: float(value) for name, value in zip(names, values[i], strict=True)}
-            orbit, floquet = motions.at(i, stored, float(omega[i]), at, float(residual[i]), float(error[i]))
+            orbit, floquet = self.motion("", i, stored, float(omega[i]), at, float(residual[i]), float(error[i]))
             points.append(BranchPoint(orbit, floquet, float(arclength[i]), int(iterations[i])))
         if self.record.get("tracked"):
             points[:] = tracked_points(points, self.record["tracked"])
@@ -328,11 +317,10 @@ class _Reader:
 
     def _events(self) -> list[Bifurcation]:
         right, left = self.array("event_null_right"), self.array("event_null_left")
-        motions = _Motions(self, "event_")
         events = []
         for i, stored in enumerate(self.record["events"]):
             numbers = stored["omega"], stored["values"], stored["residual"], stored["truncation"]
-            orbit, floquet = motions.at(i, stored["orbit"], *numbers)
+            orbit, floquet = self.motion("event_", i, stored["orbit"], *numbers)
             vectors = None
             if stored["null"] is not None:
                 wide, is_complex, narrow = stored["null"]
@@ -348,23 +336,3 @@ class _Reader:
             event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
             events.append(event.with_normal_form(stored["normal_form"]) if "normal_form" in stored else event)
         return events
-
-
-class _Motions:
-    """Motions with their verdicts, one by one from the tables of a dataset."""
-
-    def __init__(self, reader: _Reader, prefix: str) -> None:
-        self.reader = reader
-        self.coefficients = reader.array(f"{prefix}coefficients")
-        self.multipliers = reader.array(f"{prefix}multipliers")
-        self.errors = reader.array(f"{prefix}multiplier_errors")
-
-    def at(
-        self, i: int, stored: Sequence[Any], omega: float, values: dict[str, float], residual: float, truncation: float
-    ) -> tuple[PeriodicOrbit, FloquetResult]:
-        which, rule, count, verdict = stored
-        balance = self.reader.balances[which]
-        x = self.coefficients[i, : balance.basis.size, : balance.size].copy()
-        adaptive = None if rule < 0 else self.reader.tables["rules"][rule]
-        floquet = FloquetResult(self.multipliers[i, :count].copy(), self.errors[i, :count].copy(), **verdict)
-        return PeriodicOrbit(balance, x, omega, values, residual, truncation, adaptive), floquet

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
@@ -70,35 +69,27 @@ def diagram_to_datasets(diagram: BifurcationDiagram) -> dict[str, xarray.Dataset
 def diagram_from_datasets(
     groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
 ) -> BifurcationDiagram:
-    """The diagram that `diagram_to_datasets` wrote, the same tree with equal branches.
-
-    Raises InputError where the datasets are not those of a diagram, or some are missing.
-    """
+    """The diagram that `diagram_to_datasets` wrote, the same tree with equal branches."""
     head = groups[""]
-    try:
-        count = int(head.attrs["branches"])
-        parts = parts_of(groups, [f"branch_{i}" for i in range(count)], "diagram")
-        branches = [branch_from_dataset(part, allow_code, linear) for part in parts.values()]
-        met: list[Any] = [events_met(branch) for branch in branches]
-        nodes = [DiagramBranch(branches[0])]
-        for number in range(1, count):
-            parent = nodes[int(head["parent"].values[number])]
-            event = int(head["origin"].values[number])
-            if event < 0:
-                nodes.append(DiagramBranch(branches[number], number=number))
-            else:
-                origin, crossed = met[parent.number][event], parent.branch.bifurcations["BP"]
-                nodes.append(DiagramBranch(branches[number], origin, parent.depth + 1, number, met=crossed))
-            parent.children.append(nodes[-1])
-        record = from_json(str(head["record"].item()), {"Interruption": Interruption})
-        for number, (event, why) in zip(record["failures_of"], record["failures"], strict=True):
-            nodes[number].failures.append((met[number][event], why))
-        for number, event in zip(record["left_of"], record["left"], strict=True):
-            nodes[number].left.append(met[number][event])
-    except InputError:  # which is a ValueError
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is no diagram of suboctave: {type(error).__name__}: {error}") from None
+    count = int(head.attrs["branches"])
+    parts = parts_of(groups, [f"branch_{i}" for i in range(count)], "diagram")
+    branches = [branch_from_dataset(part, allow_code, linear) for part in parts.values()]
+    met: list[Any] = [events_met(branch) for branch in branches]
+    nodes = [DiagramBranch(branches[0])]
+    for number in range(1, count):
+        parent = nodes[int(head["parent"].values[number])]
+        event = int(head["origin"].values[number])
+        if event < 0:
+            nodes.append(DiagramBranch(branches[number], number=number))
+        else:
+            origin, crossed = met[parent.number][event], parent.branch.bifurcations["BP"]
+            nodes.append(DiagramBranch(branches[number], origin, parent.depth + 1, number, met=crossed))
+        parent.children.append(nodes[-1])
+    record = from_json(str(head["record"].item()), {"Interruption": Interruption})
+    for number, (event, why) in zip(record["failures_of"], record["failures"], strict=True):
+        nodes[number].failures.append((met[number][event], why))
+    for number, event in zip(record["left_of"], record["left"], strict=True):
+        nodes[number].left.append(met[number][event])
     stopped = str(head.attrs.get("stopped", ""))
     # older files hold the words alone
     noted = Interruption() if stopped.startswith("interrupted") else None
