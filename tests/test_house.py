@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 import textwrap
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -138,6 +139,7 @@ def test_the_import_finder_sees_every_spelling(text, rooms, tmp_path, monkeypatc
     assert len(violations("model", path)) == len(rooms)  # a room below, or the package's front door: both refused
 
 
+@cache
 def imported_modules() -> dict[str, set[str]]:
     """The modules that each module imports, those inside functions and for type checkers too."""
     paths = {".".join(path.relative_to(SOURCE.parent).with_suffix("").parts): path for path in SOURCE.rglob("*.py")}
