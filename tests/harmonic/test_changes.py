@@ -9,7 +9,7 @@ import suboctave as so
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.derivatives import third_derivative
 from suboctave.harmonic.evaluation import HarmonicBalance
-from suboctave.harmonic.perturbation import Kind, bilinear_gradient, form_rates, operator
+from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 
 NAMES = ("k", "gap", "s", "load")
 
@@ -60,7 +60,7 @@ def test_form_by_parameters(state, kind, name):
     rng = np.random.default_rng(5)
     left, right = rng.standard_normal((2, len(operator(state, kind))))
     expected = _difference(state, name, lambda moved: left @ operator(moved, kind) @ right)
-    rates = form_rates(state, kind, left, right, (name,))
+    rates = bilinear_gradient(state, kind, left, right, (name,)).rates
     assert rates[name] == pytest.approx(expected, rel=1e-7, abs=1e-8)
 
 

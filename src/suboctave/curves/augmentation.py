@@ -14,10 +14,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bordered import Bordered
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.perturbation import form_rates
 
 #: of g by the coefficients, by parameters, by kappa
 Gradient = tuple[np.ndarray, dict[str, complex], complex]
@@ -110,12 +108,4 @@ class Augmentation(ABC):
         return extra
 
 
-def gradient_of(b: Bordered, names: tuple[str, ...]) -> Gradient:
-    """The gradient of g, the parameters' part apart: most of it is the same whatever the parameters are."""
-    named = tuple(name for name in names if name != "omega")
-    rates = form_rates(b.state, b.kind, b.left, b.right, named, b.kappa)
-    by_x, plain, by_kappa = b.gradient(("omega",))
-    return by_x, plain | {name: -rate for name, rate in rates.items()}, by_kappa
-
-
-__all__ = ["Augmentation", "Equations", "Gradient", "gradient_of"]
+__all__ = ["Augmentation", "Equations", "Gradient"]

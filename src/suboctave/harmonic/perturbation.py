@@ -33,7 +33,7 @@ from suboctave.harmonic.linear_part import apply_blocks
 from suboctave.harmonic.trigonometric import motion, wave_sums
 from suboctave.harmonic.waves import Frequencies, Kind, Waves, along_basis, as_waves, fourier
 
-__all__ = ["Gradient", "Kind", "bilinear_gradient", "form_rates", "operator", "operator_along", "parameter_gradient"]
+__all__ = ["Gradient", "Kind", "bilinear_gradient", "operator", "operator_along", "parameter_gradient"]
 
 
 @dataclass(frozen=True)
@@ -210,15 +210,6 @@ def _form_rate(form: _Form, name: str) -> complex:
         if block is not None:
             rate += complex(np.vdot(form.u, _per_wave(block, form.drive())))
     return rate
-
-
-def form_rates(
-    state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray, names: tuple[str, ...], kappa: float = 0.0
-) -> dict[str, complex]:
-    """Derivatives of `left^H J_kappa right` by parameters alone, as `bilinear_gradient` gives them with all others."""
-    form = _Form(state, kind, left, right, kappa)
-    rates = {name: _form_rate(form, name) for name in names}
-    return rates if kind is Kind.FREE else {name: complex(rate.real) for name, rate in rates.items()}
 
 
 def rate_by_kappa(state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray) -> complex:

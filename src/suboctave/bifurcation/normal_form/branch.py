@@ -73,7 +73,7 @@ def labelled(form: NormalForm, terms: Terms) -> NormalForm:
 
 def _quadratic_size(own: Expansion) -> float:
     """Sum of the moduli that `psi.R''[phi, phi]` is made of, along the motion."""
-    phi, psi = own.waves(), Waves.of(own.state, Kind.INTEGER, own.psi)
+    phi, psi = own.waves, Waves.of(own.state, Kind.INTEGER, own.psi)
     total = 0.0
     for channel in own.state.channels:
         along = np.ascontiguousarray((psi.amplitudes @ channel.out)[None])

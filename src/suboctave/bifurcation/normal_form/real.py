@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,18 +47,19 @@ class Expansion:
         by_parameter = turn * slope.rates[name].real
         return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, Multilinear(state))
 
+    @cached_property
     def waves(self) -> Waves:
         """phi as waves."""
         return Waves.of(self.state, self.kind, self.phi)
 
     def squared(self) -> Array:
         """R''[phi, phi], shape (dimension,)."""
-        phi = self.waves()
+        phi = self.waves
         return self.forms.second(phi, phi, Frequencies.of(self.state, Kind.INTEGER)).vector(Kind.INTEGER)
 
     def cubic(self, second: Array) -> tuple[float, float]:
         """c3 from X2 (dimension,), and the size of its two terms."""
-        phi = self.waves()
+        phi = self.waves
         mixed = float((self.by_motion * second.reshape(self.by_motion.shape)).sum())
         third = self.forms.third(phi, phi, phi, Frequencies.of(self.state, self.kind)).vector(self.kind)
         pure = float(self.psi @ third) / 6.0

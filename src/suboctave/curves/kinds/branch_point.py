@@ -12,7 +12,7 @@ import numpy as np
 
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
-from suboctave.curves.augmentation import Augmentation, Equations, Gradient, gradient_of
+from suboctave.curves.augmentation import Augmentation, Equations, Gradient
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, parameter_gradient
@@ -108,7 +108,7 @@ class BranchPointEquations(Equations):
     @lazy
     def gradient(self) -> Gradient:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
-        return gradient_of(self.bordered, self.names)
+        return self.bordered.gradient(self.names)
 
     @property
     def rows(self) -> Array:

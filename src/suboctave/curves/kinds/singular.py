@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.bifurcation.tracked import kind_of
-from suboctave.curves.augmentation import Augmentation, Equations, Gradient, gradient_of
+from suboctave.curves.augmentation import Augmentation, Equations, Gradient
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, rate_by_kappa
@@ -113,7 +113,7 @@ class SingularEquations(Equations):
     @lazy
     def gradient(self) -> Gradient:
         """Derivatives of g by the coefficients, by the two parameters, and by kappa."""
-        return self._kept or gradient_of(self.bordered, self.names)
+        return self._kept or self.bordered.gradient(self.names)
 
     def takes_over(self, other: Equations) -> bool:
         """Keep the gradient of a motion a rounding away, but for kappa: whether that vanishes is asked for."""
