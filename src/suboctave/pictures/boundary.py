@@ -12,7 +12,6 @@ period doublings are subcritical.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,18 +28,18 @@ from suboctave.pictures.drawing import (
     Frame,
     Label,
     Markers,
-    Polyline,
     event_rank,
     plain,
 )
 from suboctave.pictures.isolas import CENTRE, MERGING, end_text, shade, split, with_ends
+from suboctave.pictures.layers import add_strokes, check_count, checked, events_of
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.periods import period_colour, period_name, period_of
-from suboctave.pictures.strokes import Line, cut, line_through, without_repeats
-from suboctave.pictures.style import Mark, Pen, tinted
-from suboctave.pictures.words import Hover, differing, fixed_parameters
-from suboctave.store.layout import check_layout, coordinate
+from suboctave.pictures.strokes import Line, line_through
+from suboctave.pictures.style import Mark, Pen, places_among, tinted
+from suboctave.pictures.words import differing, fixed_parameters
+from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -116,8 +115,7 @@ def boundary_drawing(
     if projected and y is not None:
         raise InputError("y= names a parameter; with a quantity= that is what is drawn upwards")
     axes = Coordinates((_first(group, x), None) if projected else plane_axes(group, x, y), view or View())
-    if labels is not None and len(labels) != len(group):
-        raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
+    check_count("labels", labels, len(group), "curves")
     for dataset in group:
         axes.check(dataset)
     names = [plain(name) for name in (labels if labels is not None else boundary_names(group))]
@@ -126,17 +124,13 @@ def boundary_drawing(
     spread = (limits[0][1] - limits[0][0], limits[1][1] - limits[1][0])
     shaded = shade(heads, axes.names, axes.factors)
     entries = {region.name: Entry(patch=region.colour) for region in shaded}
-    frame, verdicts, hollow = Frame([*shaded]), set(), False
+    frame, verdicts, hollow = Frame([*shaded]), set[bool | None](), False
     earlier: dict[Pen, list[np.ndarray]] = {}
     for dataset, name, pen in zip(group, names, pens, strict=True):
-        places, hover = axes.of(dataset)[1], Hover(dataset)
-        whole = line_through(dataset, *axes.of(dataset))
-        for stroke in without_repeats(cut(dataset, whole), earlier.setdefault(pen, []), spread):
-            role = "curve" if stroke.stable is None else "border" if stroke.stable else "within"
-            words = f"{name}, {WITHIN}" if stroke.stable is False else name
-            seen: dict[str, Any] = {"role": role, "name": words, "group": name, "hover": partial(hover.along, stroke)}
-            frame.items.append(Polyline(stroke.at, pen.along(stroke.stable), smooth=True, **seen))
-        verdicts |= set() if whole.stable is None else set(whole.stable.tolist())
+        seen = {None: ("curve", name, name), True: ("border", name, name), False: ("within", f"{name}, {WITHIN}", name)}
+        verdicts |= add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=spread)
+        points, places = axes.of(dataset)
+        whole = line_through(dataset, points, places)
         below = _subcritical(dataset, whole)
         hollow = hollow or bool(below.any())
         for first, last in _runs(below, whole.stable):
@@ -145,7 +139,9 @@ def boundary_drawing(
             line = whole.at[:, first : last + 1]
             frame.items.append(Beads(line, mark, places, role=role, name=words, group=name))
         entries[name] = Entry(pen.along(None), _small_mark(kind_of(dataset), pen, hollow=False))
-    entries |= _entries(verdicts, hollow)
+    entries |= verdict_entries(verdicts)
+    if hollow:
+        entries[SUBCRITICAL] = Entry(mark=_small_mark("PD", style.ONE_CURVE, hollow=True))
     for dataset in group:
         frame.items += event_markers(dataset, axes, axes.marked(dataset))
     entries |= event_entries(kind for data in group for kind in data["event_kind"].to_numpy()[axes.marked(data)])
@@ -192,14 +188,8 @@ def _words(kind: str, nu: int) -> str:
 
 def boundary_styles(group: Sequence[xarray.Dataset], names: Sequence[str]) -> list[Pen]:
     """The pen of each: by kind and period, and among those by name."""
-    seen: dict[tuple[str, int], list[str]] = {}
-    pens = []
-    for dataset, name in zip(group, names, strict=True):
-        kind, nu = kind_of(dataset), period_of(dataset)
-        alike = seen.setdefault((kind, nu), [])
-        if name not in alike:
-            alike.append(name)
-        place = alike.index(name)
+    pens, kinds = [], [(kind_of(dataset), period_of(dataset)) for dataset in group]
+    for (kind, nu), place in zip(kinds, places_among(kinds, names), strict=True):
         white, width = _APART[place % len(_APART)]
         pens.append(Pen(tinted(_colour(kind, nu), white), width * KINDS[kind].width, style.curve_style(place).dash))
     return pens
@@ -248,15 +238,11 @@ def event_words(kind: str) -> str:
 
 def event_markers(dataset: xarray.Dataset, axes: Coordinates, marked: np.ndarray) -> list[Markers]:
     """Markers of extrema and points of codimension two; `marked`, (events,): which of them."""
-    markers, places, hover = [], axes.of(dataset)[1], Hover(dataset)
-    for kind, style_of, every in style.marks(dataset):
-        which = every[marked[every]]
-        if which.size:
-            words = event_words(kind)
-            seen: dict[str, Any] = {"name": words, "group": words, "hover": partial(hover.of_events, which)}
-            layer = 5.5 if kind.startswith("isola") else 5.0
-            markers.append(Markers(places[:, which], style_of.mark(), role=kind, layer=layer, **seen))
-    return markers
+    return [
+        Markers(mark=look.mark(), layer=5.5 if kind.startswith("isola") else 5.0, name=words, group=words, **placed)
+        for kind, look, placed in events_of(dataset, axes, marked)
+        for words in [event_words(kind)]
+    ]
 
 
 def event_entries(kinds: Iterable[Any]) -> dict[str, Entry]:
@@ -271,17 +257,10 @@ def _small_mark(kind: str, pen: Pen, *, hollow: bool) -> Mark:
     return Mark(own.marker, SMALL * own.size, "white" if hollow else pen.colour, pen.colour)
 
 
-def _entries(verdicts: set[bool], hollow: bool) -> dict[str, Entry]:
-    """What the legend says of strokes, where there are dashed ones, and of hollow marks."""
-    entries = {}
-    if False in verdicts:
-        plain_pen = Pen(style.SOFT, 1.0, style.UNSTABLE_DASH)
-        for stable, words in ((True, BORDER), (False, WITHIN)):
-            if stable in verdicts:
-                entries[words] = Entry(plain_pen.along(stable))
-    if hollow:
-        entries[SUBCRITICAL] = Entry(mark=_small_mark("PD", style.ONE_CURVE, hollow=True))
-    return entries
+def verdict_entries(verdicts: set[bool | None], width: float = 1.0) -> dict[str, Entry]:
+    """What the legend says of strokes, where there are dashed ones."""
+    pen, words = Pen(style.SOFT, width, style.UNSTABLE_DASH), {True: BORDER, False: WITHIN}
+    return {words[s]: Entry(pen.along(s)) for s in words if s in verdicts} if False in verdicts else {}
 
 
 def _names_of_events(group: Sequence[xarray.Dataset], axes: Coordinates) -> list[Label]:
@@ -306,15 +285,10 @@ def _names_of_events(group: Sequence[xarray.Dataset], axes: Coordinates) -> list
 # ----------------------------------------------------------------------------------------------------------------- axes
 def _checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
     """The datasets of curves of bifurcations, at least one; InputError for anything else."""
-    if not curves:
-        raise InputError("no curve to draw")
-    for dataset in curves:
-        check_layout(dataset)
-        if not is_boundary(dataset):
-            raise InputError("this is no curve of bifurcations; plot draws responses, plot_space both together")
-        if dataset.sizes.get("point", 0) == 0:
-            raise InputError("a curve without points cannot be drawn")
-    return list(curves)
+    group = checked(curves)
+    if not all(is_boundary(dataset) for dataset in group):
+        raise InputError("this is no curve of bifurcations; plot draws responses, plot_space both together")
+    return group
 
 
 def plane_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:

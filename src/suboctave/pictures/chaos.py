@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Band, Drawing, Entry, Frame, Guide, Markers, Polyline, Raster, plain
 from suboctave.pictures.in_time import Size, check_contents
+from suboctave.pictures.layers import check_count
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.periods import period_colour
-from suboctave.pictures.style import Mark, Pen, rgb, tinted
+from suboctave.pictures.style import Mark, Pen, places_among, rgb, tinted
 
 if TYPE_CHECKING:
     import xarray
@@ -140,8 +140,7 @@ def plot_basins(
     """
     check_contents(basins, "basins")
     names = [str(name) for name in basins["attractor"].to_numpy()]
-    if points is not None and len(points) != len(names):
-        raise InputError(f"points: expected those of {len(names)} attractors, got {len(points)}")
+    check_count("points", points, len(names), "attractors")
     labels = basins["label"].to_numpy()
     cells, entries = np.zeros((*labels.shape, 3)), {}
     shares = dict(zip([str(k) for k in basins["kind"].to_numpy()], basins["share"].to_numpy(), strict=True))
@@ -174,12 +173,11 @@ def plot_basins(
 
 def _colours(periods: np.ndarray) -> list[str]:
     """A colour for the basin of each motion, by period."""
-    seen: dict[int, int] = {}
-    colours = []
-    for period in periods.tolist():
-        place = seen[period] = seen.get(period, -1) + 1
-        colours.append(tinted(period_colour(period), (_GREYS if period == 1 else _TINTS)[place % 4]))
-    return colours
+    listed = periods.tolist()
+    places = places_among(listed, [str(i) for i in range(len(listed))])
+    return [
+        tinted(period_colour(p), (_GREYS if p == 1 else _TINTS)[i % 4]) for p, i in zip(listed, places, strict=True)
+    ]
 
 
 def _symbol(name: str, one: bool) -> str:

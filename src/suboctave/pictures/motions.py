@@ -19,6 +19,7 @@ from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
+from suboctave.pictures.layers import check_count
 from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView
 from suboctave.pictures.paper import check_path, figure_of
 from suboctave.pictures.periods import curve_styles, period_name, period_of, styles_of_periods
@@ -162,8 +163,7 @@ class MotionDrawing:
         datasets = motion_datasets(motions, given.get("points"), given.get("dof"), elements)
         overlay, labels, size = bool(given.get("overlay")), given.get("labels"), given.get("size")
         count = len(datasets)
-        if labels is not None and len(labels) != count:
-            raise InputError(f"labels: expected one for each of the {count} motions, got {len(labels)}")
+        check_count("labels", labels, count, "motions")
         dofs = sorted({int(dataset.attrs["dof"]) for dataset in datasets})
         if len(dofs) > 1:
             raise InputError(f"the motions are of different degrees of freedom ({dofs}): choose one with dof=")

@@ -128,21 +128,7 @@ class HistoryOptions(SpectrumOptions, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class Units:
-    """Units and texts of the axes.
-
-    Attributes
-    ----------
-    frequency
-        "rad/s" or "Hz" (where time is in seconds); None leaves omega without a unit.
-    omega_reference
-        The axis shows `omega / omega_reference`; of motions time is `omega_reference t`, and velocities are
-        derivatives by that.
-    scale, unit
-        Values are multiplied by `scale`, and the label ends in `(unit)`: `scale=1e3, unit="mm"` for lengths in m, or
-        `scale=1/0.02` for a displacement in units of 0.02. Phases are in degrees unless scaled.
-    xlabel, ylabel
-        Instead of the labels that follow from the above.
-    """
+    """Units and texts of the axes: what `UnitOptions` says of each. Phases are in degrees unless scaled."""
 
     frequency: str | None = None
     omega_reference: float | None = None
@@ -178,22 +164,9 @@ class Units:
 
 @dataclass(frozen=True)
 class View(Units):
-    """What is drawn of curves and in which units.
+    """What is drawn of curves and in which units: the fields are options of `suboctave.plot`, which explains them.
 
-    Attributes
-    ----------
-    quantity
-        What is drawn upwards: "amplitude", or a reading such as "rms", "velocity", "harmonic", "phase", "peak_force".
-        Default the amplitude, with `harmonic` that of this harmonic.
-    harmonic, element, dof
-        Of which multiple of omega (default 1; 0 is the mean, 0.5 a component of motions of two load periods), of which
-        element, of which degree of freedom (default: the observed one).
-    xlim, ylim
-        Part of the axes that is shown, in the units that they show; default everything.
-    marks
-        Kinds of bifurcations and names of events that get markers; default all.
-
-    Others as `Units`.
+    The quantity is the amplitude by default, with `harmonic` that of this harmonic.
     """
 
     quantity: str = ""

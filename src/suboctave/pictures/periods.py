@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from suboctave.pictures import style
-from suboctave.pictures.style import Pen, tinted
+from suboctave.pictures.style import Pen, places_among, tinted
 
 if TYPE_CHECKING:
     import xarray
@@ -41,13 +41,8 @@ def period_colour(nu: int) -> str:
 
 def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[Pen]:
     """The styles of curves by their periods; those of one period and one name look alike."""
-    seen: dict[int, list[str]] = {}
     styles = []
-    for nu, name in zip(periods, names, strict=True):
-        alike = seen.setdefault(nu, [])
-        if name not in alike:
-            alike.append(name)
-        place = alike.index(name)
+    for nu, place in zip(periods, places_among(periods, names), strict=True):
         like = style.curve_style(place)
         styles.append(Pen(tinted(period_colour(nu), _TINTS[place % len(_TINTS)]), like.width, like.dash))
     return styles

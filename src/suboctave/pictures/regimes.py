@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Raster
+from suboctave.pictures.layers import check_count
 from suboctave.pictures.paper import DOT, figure_of
 from suboctave.pictures.periods import period_colour
 from suboctave.pictures.style import Pen, rgb, tinted
@@ -69,8 +69,7 @@ def plot_regimes(
     smallest
         Regimes with a smaller share of the plane are counted in the legend, not named.
     """
-    if labels is not None and len(labels) != len(regimes):
-        raise InputError(f"labels: expected one for each of the {len(regimes)} regimes, got {len(labels)}")
+    check_count("labels", labels, len(regimes), "regimes")
     colours = _colours(regimes)
     isolated = np.array([_isolated(regime) for regime in regimes], dtype=bool)
     across, upwards = (np.linspace(*own, count + 1) for own, count in zip(ranges, cells.shape[::-1], strict=True))

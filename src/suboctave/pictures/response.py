@@ -7,23 +7,22 @@ Stable motions solid, unstable ones dashed, located bifurcations marked. Figures
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary
-from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, Ticks, ordered, plain
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, ordered, plain
+from suboctave.pictures.layers import Seen, add_strokes, check_count, checked, events_of
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
-from suboctave.pictures.strokes import cut, line_through, without_repeats
 from suboctave.pictures.style import Pen
-from suboctave.pictures.words import Hover, differing, fixed_parameters
-from suboctave.store.layout import check_layout, coordinate
+from suboctave.pictures.words import differing, fixed_parameters
+from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -75,8 +74,7 @@ def plot_panels(
     """
     groups = [_as_list(panel) for panel in panels]
     for name, given in (("labels", labels), ("titles", titles)):
-        if given is not None and len(given) != len(groups):
-            raise InputError(f"{name}: expected one entry for each of the {len(groups)} panels, got {len(given)}")
+        check_count(name, given, len(groups), "panels")
     wide = 6.4 if len(groups) == 1 else 1.0 + 4.2 * len(groups)
     sheet = style.sheet_of((wide, 4.2) if size is None else size, len(groups))
     drawing = response_drawing(groups, x=x, labels=labels, view=view)
@@ -147,8 +145,7 @@ def response_frame(
     group = _as_list(curves)
     for dataset in group:
         axes.check(dataset)
-    if labels is not None and len(labels) != len(group):
-        raise InputError(f"labels: expected one for each of the {len(group)} curves, got {len(labels)}")
+    check_count("labels", labels, len(group), "curves")
     periods = several_periods(group) if by_period is None else by_period
     names = [plain(name) for name in (labels if labels is not None else _names(group, periods))]
     several = len(group) > 1
@@ -157,49 +154,38 @@ def response_frame(
     # sub-harmonic motions over those that they branch off from
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
     spread = _spread(np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1))
-    earlier: dict[style.Pen, list[np.ndarray]] = {}
+    earlier: dict[Pen, list[np.ndarray]] = {}
     frame, entries, marks = Frame(), dict[str, Entry](), dict[str, Entry]()
     for index in order:
         dataset, pen = group[index], pens[index]
-        named, hover = names[index] if labels is not None or several or periods else "", Hover(dataset)
-        if named:
-            entries[named] = Entry(Pen(pen.colour, 1.3 * pen.width))
-        whole = line_through(dataset, *axes.of(dataset))
-        for stroke in without_repeats(cut(dataset, whole), earlier.setdefault(pen, []), spread):
-            role = "curve" if stroke.stable is None else "stable" if stroke.stable else "unstable"
-            words = "motions" if stroke.stable is None else role
-            name, curve = (f"{titles[index]}: {words}", titles[index]) if several else (words, words)
-            seen: dict[str, Any] = {"role": role, "name": name, "group": curve, "hover": partial(hover.along, stroke)}
-            frame.items.append(Polyline(stroke.at, pen.along(stroke.stable), smooth=True, **seen))
-            if stroke.stable is not None:
-                # where ink is the colour of one period, the dashes are shown in a colour of none
-                plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
-                entries[role] = Entry(plain_pen.along(stroke.stable))
+        if labels is not None or several or periods:
+            entries[names[index]] = Entry(Pen(pen.colour, 1.3 * pen.width))
+        seen = _seen(titles[index] if several else "")
+        for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=spread) - {None}:
+            # where ink is the colour of one period, the dashes are shown in a colour of none
+            plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
+            entries[_ROLES[stable]] = Entry(plain_pen.along(stable))
     for index in order:  # markers after all lines: none is crossed out by another curve
-        dataset = group[index]
+        dataset, curve = group[index], titles[index] if several else ""
+        # the shape tells the kind, the filling the criticality, the edge the curve, where there are several
         edge = pens[index].colour if several or periods else style.INK
-        frame.items += _events(dataset, axes, edge, titles[index] if several else "", marks)
+        smaller = style.OF_SUBHARMONICS if curve and period_of(dataset) > 1 else 1.0
+        for kind, look, placed in events_of(dataset, axes, axes.marked(dataset)):
+            layer = (4.0 if kind == "grazing" else 5.0) + (0.5 if smaller < 1.0 else 0.0)
+            name = f"{curve}: {look.name}" if curve else look.name
+            mark = look.mark(edge, smaller, 1.5 if curve else 1.0)
+            frame.items.append(Markers(mark=mark, layer=layer, name=name, group=curve or look.name, **placed))
+            marks[look.name] = Entry(mark=look.mark())
     return frame, entries | marks
 
 
-def _events(
-    dataset: xarray.Dataset, axes: Coordinates, edge: str, curve: str, entries: dict[str, Entry]
-) -> list[Markers]:
-    """Markers: the shape tells the kind, the filling the criticality; the edge the curve, where there are several."""
-    smaller = style.OF_SUBHARMONICS if curve and period_of(dataset) > 1 else 1.0
-    places, seen, hover = axes.of(dataset)[1], axes.marked(dataset), Hover(dataset)
-    markers = []
-    for kind, mark, which in style.marks(dataset):
-        chosen = which[seen[which]]
-        if not len(chosen):
-            continue
-        layer = (4.0 if kind == "grazing" else 5.0) + (0.5 if smaller < 1.0 else 0.0)
-        seen_as: dict[str, Any] = {"name": f"{curve}: {mark.name}" if curve else mark.name, "group": curve or mark.name}
-        drawn = mark.mark(edge, smaller, 1.5 if curve else 1.0)
-        texts = partial(hover.of_events, chosen)
-        markers.append(Markers(places[:, chosen], drawn, role=kind, layer=layer, hover=texts, **seen_as))
-        entries[mark.name] = Entry(mark=mark.mark())
-    return markers
+_ROLES = {None: "curve", True: "stable", False: "unstable"}
+
+
+def _seen(curve: str) -> Seen:
+    """Role, name and group of the strokes of a curve, "" for the only one."""
+    words = {**_ROLES, None: "motions"}
+    return {s: (_ROLES[s], f"{curve}: {words[s]}" if curve else words[s], curve or words[s]) for s in _ROLES}
 
 
 def _spread(at: np.ndarray) -> tuple[float, float]:
@@ -210,22 +196,7 @@ def _spread(at: np.ndarray) -> tuple[float, float]:
 
 
 def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
-    import xarray
-
-    group: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
-    if not group:
-        raise InputError("no curve to draw")
-    for dataset in group:
-        if not isinstance(dataset, xarray.Dataset):
-            raise InputError(f"expected a dataset of a curve, got {type(dataset).__name__}; a branch has to_xarray()")
-        check_layout(dataset)
-        if "point" not in dataset.sizes:
-            raise InputError(
-                "this dataset is no curve; one of a motion is drawn by plot_phase, plot_spectrum, plot_history"
-            )
-        if dataset.sizes["point"] == 0:
-            raise InputError("a curve without points cannot be drawn")
-    return group
+    return checked(list(curves) if isinstance(curves, list | tuple) else [curves])
 
 
 def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:

@@ -7,7 +7,6 @@ their projection on the floor, which is the picture of `boundary`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -17,9 +16,7 @@ from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.boundary import (
-    BORDER,
     SMALL,
-    WITHIN,
     boundary_names,
     boundary_styles,
     chosen_axes,
@@ -29,16 +26,17 @@ from suboctave.pictures.boundary import (
     is_boundary,
     kind_of,
     plane_of,
+    verdict_entries,
 )
-from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, Surface, plain
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Surface, plain
 from suboctave.pictures.isolas import CENTRE, is_isolas, shade, split, surface, with_ends
+from suboctave.pictures.layers import add_strokes, checked, events_of, seen_as
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.periods import period_colour, period_name, period_of
-from suboctave.pictures.strokes import Stroke, cut, line_through
+from suboctave.pictures.strokes import cut, line_through
 from suboctave.pictures.style import Pen, tinted
-from suboctave.pictures.words import Hover
-from suboctave.store.layout import check_layout, coordinate
+from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -120,6 +118,7 @@ def space_drawing(
 ) -> Drawing:
     """Response curves and curves of bifurcations laid out in space; `names`: of all that is given, for the browser."""
     group, heads = split(given)
+    checked(group)
     axes = Coordinates((*space_axes(group, x, y), None), view or View())
     for dataset in group:
         axes.check(dataset)
@@ -158,20 +157,19 @@ def _add_responses(
     """
     entries: dict[str, Entry] = {}
     depths = [float(np.nanmean(axes.of(dataset)[0][1])) for dataset in responses]
-    verdicts = set()
+    verdicts = set[bool | None]()
     for index in np.argsort(depths, kind="stable")[::-1]:
         dataset = responses[index]
-        pen = Pen(period_colour(period_of(dataset)), _THIN, style.UNSTABLE_DASH)
-        verdicts |= _add_strokes(frame, dataset, axes, pen, called.get(id(dataset), ""), ("response", 3.0))
+        pen, name = Pen(period_colour(period_of(dataset)), _THIN, style.UNSTABLE_DASH), called.get(id(dataset), "")
+        verdicts |= add_strokes(frame, dataset, axes, pen, seen_as("response", name))
     for nu in sorted({period_of(dataset) for dataset in responses}):
         words = "response" if nu == 1 else f"response, {period_name(nu)}"
         entries[words] = Entry(Pen(period_colour(nu), _THIN))
     for dataset in responses:
-        places, hover = axes.of(dataset)[1], Hover(dataset)
-        for kind, mark, which in style.marks(dataset):
-            if (kind, period_of(dataset)) in tracked:
-                seen: dict[str, Any] = {"name": mark.name, "group": mark.name, "hover": partial(hover.of_events, which)}
-                frame.items.append(Markers(places[:, which], mark.mark(size=1.3 * SMALL), role=kind, layer=6.0, **seen))
+        met = [(str(kind), period_of(dataset)) in tracked for kind in dataset["event_kind"].to_numpy()]
+        for _, look, placed in events_of(dataset, axes, np.array(met, dtype=bool)):
+            mark = look.mark(size=1.3 * SMALL)
+            frame.items.append(Markers(mark=mark, layer=6.0, name=look.name, group=look.name, **placed))
     return entries, {"unstable": Entry(Pen(style.SOFT, _THIN, style.UNSTABLE_DASH))} if False in verdicts else {}
 
 
@@ -183,46 +181,17 @@ def _add_boundaries(
     floor: float,
 ) -> dict[str, Entry]:
     """Curves of bifurcations, as given and with the ends of isolas among their events, and their projections."""
-    entries, within = {}, set()
+    entries, within = dict[str, Entry](), set[bool | None]()
     names = [plain(name) for name in boundary_names([dataset for dataset, _ in bounds])]
     pens = boundary_styles([dataset for dataset, _ in bounds], names)
     for (given, dataset), name, pen in zip(bounds, names, pens, strict=True):
         pale, thick = Pen(tinted(pen.colour, _SHADE), 0.7 * pen.width), Pen(pen.colour, _THICK * pen.width, pen.dash)
         curve = called.get(id(given), name)
-        _add_strokes(frame, dataset, axes, pale, curve, ("floor", 1.0), floor)
-        within |= _add_strokes(frame, dataset, axes, thick, curve, ("boundary", 5.0))
+        add_strokes(frame, dataset, axes, pale, seen_as("floor", curve), floor=floor, layer=1.0)
+        within |= add_strokes(frame, dataset, axes, thick, seen_as("boundary", curve), layer=5.0)
         entries[name] = Entry(thick.along(None))
         frame.items += event_markers(dataset, axes, np.ones(dataset.sizes["event"], dtype=bool))
-    if False in within:
-        plain_pen = Pen(style.SOFT, _THICK, style.UNSTABLE_DASH)
-        for stable, words in ((True, BORDER), (False, WITHIN)):
-            if stable in within:
-                entries[words] = Entry(plain_pen.along(stable))
-    return entries
-
-
-def _add_strokes(
-    frame: Frame,
-    dataset: xarray.Dataset,
-    axes: Coordinates,
-    pen: Pen,
-    curve: str,
-    seen_as: tuple[str, float],
-    floor: float | None = None,
-) -> set[bool | None]:
-    """Add the strokes of a curve, or their projection on the floor at this height; returns their verdicts."""
-    role, layer = seen_as
-    hover, strokes = Hover(dataset), _strokes(dataset, axes)
-    for stroke in strokes:
-        at = stroke.at if floor is None else np.vstack([stroke.at[:2], np.full(stroke.at.shape[1], floor)])
-        drawn = pen.along(stroke.stable if floor is None else None)
-        seen: dict[str, Any] = {"role": role, "layer": layer, "name": curve, "group": curve}
-        frame.items.append(Polyline(at, drawn, hover=partial(hover.along, stroke), **seen))
-    return {stroke.stable for stroke in strokes}
-
-
-def _strokes(dataset: xarray.Dataset, axes: Coordinates) -> list[Stroke]:
-    return cut(dataset, line_through(dataset, *axes.of(dataset)))
+    return entries | verdict_entries(within, _THICK)
 
 
 def _surfaces(given: Sequence[xarray.Dataset], axes: Coordinates) -> list[tuple[int, np.ndarray]]:
@@ -243,7 +212,8 @@ def _surfaces(given: Sequence[xarray.Dataset], axes: Coordinates) -> list[tuple[
             if is_boundary(dataset):
                 kinds = with_ends(dataset, [every[which].isel(isola=[number])])["event_kind"].to_numpy()
                 tips += list(axes.of(dataset)[1].T[kinds == CENTRE])
-        around = [np.hstack([stroke.at for stroke in _strokes(dataset, axes)]) for dataset in closed]
+        lines = [cut(dataset, line_through(dataset, *axes.of(dataset))) for dataset in closed]
+        around = [np.hstack([stroke.at for stroke in strokes]) for strokes in lines]
         grid = surface(around, tips[:1])
         if grid is not None:
             surfaces.append((period_of(closed[0]), grid))
@@ -252,12 +222,6 @@ def _surfaces(given: Sequence[xarray.Dataset], axes: Coordinates) -> list[tuple[
 
 def space_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:
     """What is drawn to the right and into the depth; InputError where that must be given, or is not there."""
-    if not group:
-        raise InputError("no curve to draw")
-    for dataset in group:
-        check_layout(dataset)
-        if dataset.sizes.get("point", 0) == 0:
-            raise InputError("a curve without points cannot be drawn")
     pairs = {plane_of(dataset) for dataset in group if is_boundary(dataset)}
     if not pairs and (x is None or y is None):
         free, names = {str(dataset.attrs["free"]) for dataset in group}, _differing(group)

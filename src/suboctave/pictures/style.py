@@ -13,6 +13,7 @@ letters are then 7 to 8 points high.
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -158,6 +159,15 @@ def curve_style(index: int) -> Pen:
     """The pen of one of several curves in a frame."""
     colour = CURVE_COLOURS[index % len(CURVE_COLOURS)]
     return Pen(colour, _WIDTHS[index % len(_WIDTHS)], _DASHES[index % len(_DASHES)])
+
+
+def places_among(keys: Sequence[Hashable], names: Sequence[str]) -> list[int]:
+    """Of each curve the place of its name among those of the curves with the same key, in the order met."""
+    seen: dict[Hashable, dict[str, int]] = {}
+    return [
+        own.setdefault(name, len(own))
+        for own, name in ((seen.setdefault(key, {}), name) for key, name in zip(keys, names, strict=True))
+    ]
 
 
 @dataclass(frozen=True)
