@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -58,10 +58,14 @@ class Mistakes:
         if mistake not in self._mistakes:
             self._mistakes.append(mistake)
 
-    def add_error(self, prefix: Key, error: InputError) -> None:
-        """The mistakes that an InputError tells of, in the table at `prefix`."""
-        for part in error.parts:
-            self.add((*prefix, *part.key), str(part))
+    @contextmanager
+    def at(self, *prefix: str | int) -> Iterator[None]:
+        """Note the mistakes that an InputError of the block tells of, in the table at `prefix`."""
+        try:
+            yield
+        except InputError as error:
+            for part in error.parts:
+                self.add((*prefix, *part.key), str(part))
 
     def add_validation(self, prefix: Key, error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> None:
         """What pydantic found in the table at `prefix`, which is a `model`, in our words."""

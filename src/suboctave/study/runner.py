@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -117,14 +117,42 @@ def run_study(
     if resume and not journal_at.exists() and targets[0].exists():
         return _complete(study, place, targets, overwrite)
     _prepare(place, targets, journal_at, overwrite, resume)
-    journal = Journal.reopen(journal_at) if resume and journal_at.exists() else Journal.create(journal_at)
-    for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
-        torn.unlink(missing_ok=True)
-    try:
-        return _run(study, place, targets, journal, watch, report, study.seconds if seconds is None else seconds)
-    except BaseException:
-        journal.close()
-        raise
+    seconds = study.seconds if seconds is None else seconds
+    outcome, results, details = Outcome(), dict[str, Result](), dict[str, dict[str, Any]]()
+    unfinished: set[str] = set()
+    opened = Journal.reopen if resume and journal_at.exists() else Journal.create
+    with closing(opened(journal_at)) as journal:
+        for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
+            torn.unlink(missing_ok=True)
+        journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
+        with time_limit(seconds) as limit:
+            for step in study.steps:
+                whole = not any(name in unfinished for _, name in step.needs())
+                done, interruption = _one(study, step, results, journal, watch, whole)
+                if interruption is not None or not whole:
+                    unfinished.add(step.name)
+                if done is not None:
+                    outcome.finished.append(done)
+                    if done.result is not None:
+                        results[step.name] = done.result
+                        key = "" if step.name in unfinished else study.keys[step.name]
+                        arguments = step.model_dump_json(exclude_defaults=True)
+                        own = {"type": step.kind, "seconds": done.seconds, "key": key, "arguments": arguments}
+                        details[step.name] = own
+                    if report is not None:
+                        report(done)
+                if interruption is not None:
+                    outcome.interruption = interruption
+                    # the time limit of an analysis stops that one alone
+                    if interruption.seconds is None or (limit is not None and limit.reached):
+                        break
+        if results:
+            journal.extend([("output", {"file": path.name}, None) for path in targets])
+            everything = Results(results, _attributes(study, list(results)), details)
+            outcome.files = list(write_outputs(study.outputs, everything, place, study.title))
+        if not (outcome.interrupted or outcome.failed):  # else --resume goes on from here
+            journal.remove()
+    return outcome
 
 
 def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, resume: bool) -> None:
@@ -190,54 +218,6 @@ def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -
     return Outcome(finished, files, complete=path, left=left)
 
 
-def _run(
-    study: Study,
-    place: Path,
-    targets: list[Path],
-    journal: Journal,
-    watch: Watch | None,
-    report: Callable[[Finished], None] | None,
-    seconds: float | None,
-) -> Outcome:
-    journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
-    outcome = Outcome()
-    results: dict[str, Result] = {}
-    details: dict[str, dict[str, Any]] = {}
-    unfinished: set[str] = set()
-    with time_limit(seconds) as limit:
-        for step in study.steps:
-            whole = not any(name in unfinished for _, name in step.needs())
-            done, interruption = _one(study, step, results, journal, watch, whole)
-            if interruption is not None or not whole:
-                unfinished.add(step.name)
-            if done is not None:
-                outcome.finished.append(done)
-                if done.result is not None:
-                    results[step.name] = done.result
-                    details[step.name] = {
-                        "type": step.kind,
-                        "seconds": done.seconds,
-                        "key": "" if step.name in unfinished else study.keys[step.name],
-                        "arguments": step.model_dump_json(exclude_defaults=True),
-                    }
-                if report is not None:
-                    report(done)
-            if interruption is not None:
-                outcome.interruption = interruption
-                own = interruption.seconds is not None and not (limit is not None and limit.reached)
-                if not own:
-                    break
-    if results:
-        journal.extend([("output", {"file": path.name}, None) for path in targets])
-        everything = Results(results, _attributes(study, list(results)), details)
-        outcome.files = list(write_outputs(study.outputs, everything, place, study.title))
-    if outcome.interrupted or outcome.failed:
-        journal.close()  # --resume goes on from here
-    else:
-        journal.remove()
-    return outcome
-
-
 def _one(
     study: Study,
     step: Step,
@@ -261,7 +241,7 @@ def _one(
     interruption: Interruption | None = None
     outcome: Result | None = None
     failure, wrong = "", False
-    with (watch or _silent)(step) as progress:
+    with nullcontext() if watch is None else watch(step) as progress:
         try:
             system = study.system_of(step)
             keeper = BranchKeeper(journal, step, key, study.allow_code) if whole else None
@@ -286,10 +266,6 @@ def _one(
     if outcome is None and interruption is not None and not failure:
         return None, interruption
     return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interruption
-
-
-def _silent(step: Step) -> AbstractContextManager[Any]:
-    return nullcontext(None)
 
 
 # ------------------------------------------------------------------------------------------------------- the journal
@@ -405,26 +381,26 @@ def recovered(path: str | Path) -> list[Recovered]:
     analyses: dict[str, Recovered] = {}
     for record in read_journal(path):
         name = str(record.fields.get("name", ""))
+        if record.kind not in ("points", "part", "branch", "analysis"):
+            continue
+        if record.kind == "part" and record.fields["part"].startswith("result"):
+            continue  # of a table
+        item = analyses.setdefault(name, Recovered(name))
         if record.kind == "points":
             if not record.fields["from"]:
-                analyses[name] = Recovered(name)
-            item = analyses.setdefault(name, Recovered(name))
+                item = analyses[name] = Recovered(name)
             item.points += len(record.fields["omega"])
             item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.fields["bifurcations"]]
             item.bifurcations = len(item.events)
-        elif record.kind == "part" and record.fields["part"].startswith("result"):
-            continue  # of a table
-        elif record.kind in ("branch", "part"):
-            item = analyses.setdefault(name, Recovered(name))
-            sizes = record.dataset.sizes
-            item.branches = (item.branches or 0) + 1
-            item.points += int(sizes.get("point", 0))
-            item.bifurcations += int(sizes.get("event", 0))
-        elif record.kind == "analysis":
+            continue
+        sizes, whole = record.dataset.sizes, record.kind == "analysis"
+        if whole:
+            item.state = "finished"
             if record.dataset.attrs.get("contents") in ("diagram", "isolas"):
-                analyses.setdefault(name, Recovered(name)).state = "finished"
                 continue
-            sizes = record.dataset.sizes
-            count = int(sizes.get("point", sizes.get("row", 0)))
-            analyses[name] = Recovered(name, "finished", count, int(sizes.get("event", 0)))
+            item = analyses[name] = Recovered(name, "finished")
+        else:
+            item.branches = (item.branches or 0) + 1
+        item.points += int(sizes.get("point", sizes.get("row", 0) if whole else 0))
+        item.bifurcations += int(sizes.get("event", 0))
     return list(analyses.values())

@@ -6,7 +6,7 @@ Matrices are numbers and expressions inline, or files beside the study (.npy, .n
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,10 +61,12 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
         mistakes.add(("system", "arguments"), "belong to library")
     if section.library is not None:
         return _published(section, mistakes)
-    parts = {
-        family: list(_parts(getattr(section, f"{family}s"), family, mistakes, allow_code))
-        for family in ("element", "load")
-    }
+    parts: dict[str, list[tuple[Key, Any]]] = {"element": [], "load": []}
+    for family, built in parts.items():
+        for index, item in enumerate(getattr(section, f"{family}s")):
+            place = ("system", f"{family}s", index)
+            with mistakes.at(*place):
+                built.append((place, build_part(item, family, allow_code=allow_code)))
     if section.equations is not None:
         return _from_equations(section, parts, mistakes) if len(mistakes) == before else None
     matrices = _matrices(section, folder, mistakes)
@@ -144,7 +146,8 @@ def _from_equations(section: SystemSection, parts: dict[str, Any], mistakes: Mis
     try:
         return System.from_equations(section.equations or (), section.parameters, section.name)
     except InputError as error:
-        mistakes.add_error(("system",) if error.key else ("system", "equations"), error)
+        for part in error.parts:
+            mistakes.add(("system", *(part.key or ("equations",))), str(part))
         return None
 
 
@@ -164,15 +167,6 @@ def _matrices(section: SystemSection, folder: Path, mistakes: Mistakes) -> dict[
         if what == "mass":
             size = matrices[what].n
     return matrices
-
-
-def _parts(items: list[dict[str, Any]], family: str, mistakes: Mistakes, allow_code: bool) -> Iterator[tuple[Key, Any]]:
-    for index, item in enumerate(items):
-        place: Key = ("system", f"{family}s", index)
-        try:
-            yield place, build_part(item, family, allow_code=allow_code)
-        except InputError as error:
-            mistakes.add_error(place, error)
 
 
 # ----------------------------------------------------------------------------------------------------------- matrices
