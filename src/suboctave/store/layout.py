@@ -86,12 +86,8 @@ _BY_ANOTHER = frozenset({"R1", "R2", "LPPD", "LPNS", "PDNS", "NSNS"})
 class EventRow:
     """One located bifurcation, as a row of the dataset.
 
-    `after` is the index of the point after which it lies, `parameters` holds the parameters that differ from those of
-    the curve's fixed ones, `stable_after` says whether the motions right after it are stable (None: not known),
-    `uncertainty` is the half-width in the free parameter of what is not resolved, `contact` the contact that grazes (at
-    a grazing, or at a bifurcation that it brings about), `contact_at` the value of the free parameter where it does;
-    `multiplier_error` is the estimated error of `multiplier`, `stability_method` where it comes from; `extreme` says of
-    an extremum what it is ("maximum of j").
+    What the fields mean stands above; `stable_after` is None where it is not known, `parameters` holds those that
+    differ from the curve's fixed ones.
     """
 
     kind: str
@@ -218,12 +214,9 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
     dataset = curve_dataset(
         branch.omega,
         branch.amplitude,
-        stable=branch.stable,
-        harmonics=branch.harmonics,
+        **{name: getattr(branch, name) for name in ("stable", "harmonics", "multipliers", "multiplier_errors")},
         error=branch.truncation,
         residual=[orbit.residual for orbit in branch.orbits],
-        multipliers=branch.multipliers,
-        multiplier_errors=branch.multiplier_errors,
         stability_method=branch.stability_methods,
         parameters={name: branch.parameter(name) for name in names},
         free=branch.name,
@@ -269,26 +262,13 @@ def _event_rows(branch: Any, arclength: np.ndarray) -> list[EventRow]:
         after = min(max(place, 0), max(arclength.size - 2, 0))
         last = rows[-1].stable_after if rows and rows[-1].after == after else None
         before = bool(branch.stable[after]) if last is None else last
-        critical = event.critical_multiplier()
-        rows.append(
-            EventRow(
-                event.kind,
-                after,
-                event.omega,
-                event.amplitude,
-                residual=event.residual,
-                multiplier=critical,
-                multiplier_error=event.critical_error,
-                stability_method=event.stability_method,
-                criticality=event.criticality,
-                stable_after=_stable_after(branch, event, after, before, id(event) in own),
-                uncertainty=event.uncertainty,
-                contact="" if event.contact is None else str(event.contact),
-                contact_at=np.nan if event.contact is None else event.contact.parameter,
-                parameters=dict(event.parameters),
-                extreme=_extreme(event),
-            )
-        )
+        same = ("kind", "omega", "amplitude", "residual", "stability_method", "criticality", "uncertainty")
+        given: dict[str, Any] = {name: getattr(event, name) for name in same}
+        if event.contact is not None:
+            given |= {"contact": str(event.contact), "contact_at": event.contact.parameter}
+        given |= {"multiplier": event.critical_multiplier(), "multiplier_error": event.critical_error}
+        given |= {"stable_after": _stable_after(branch, event, after, before, id(event) in own)}
+        rows.append(EventRow(after=after, parameters=dict(event.parameters), extreme=_extreme(event), **given))
     return rows
 
 

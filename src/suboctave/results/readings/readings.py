@@ -42,28 +42,28 @@ class BranchReadings:
     def _over(self, read: Callable[[PeriodicOrbit], float]) -> Array:
         return np.array([read(orbit) for orbit in self.orbits], dtype=float)
 
-    def _dof(self, dof: int | None) -> int:
-        return self.observe if dof is None else dof
+    def _of(self, what: str, dof: int | None = None, number: float | None = None) -> Array:
+        return Reading(what, dof, number).of(self.orbits, self.observe)
 
     def rms(self, dof: int | None = None) -> Array:
         """Root mean square of the displacement over a period, its mean included."""
-        return self._over(lambda orbit: orbit.rms(self._dof(dof)))
+        return self._of("rms", dof)
 
     def velocity(self, dof: int | None = None) -> Array:
         """Largest |dx/dt| over a period."""
-        return self._over(lambda orbit: orbit.velocity_amplitude(self._dof(dof)))
+        return self._of("velocity", dof)
 
     def velocity_rms(self, dof: int | None = None) -> Array:
         """Root mean square of the velocity."""
-        return self._over(lambda orbit: orbit.rms(self._dof(dof), 1))
+        return self._of("velocity_rms", dof)
 
     def acceleration(self, dof: int | None = None) -> Array:
         """Largest acceleration, in modulus, over a period."""
-        return self._over(lambda orbit: orbit.acceleration_amplitude(self._dof(dof)))
+        return self._of("acceleration", dof)
 
     def acceleration_rms(self, dof: int | None = None) -> Array:
         """Root mean square of the acceleration."""
-        return self._over(lambda orbit: orbit.rms(self._dof(dof), 2))
+        return self._of("acceleration_rms", dof)
 
     def phase(self, k: float = 1, dof: int | None = None) -> Array:
         """Phase of the component at `k omega` in radians, continuous along the branch from a value in (-pi, pi].
@@ -71,22 +71,19 @@ class BranchReadings:
         The component is `|c| cos(k omega t + phase)`: negative where the response lags behind `cos(k omega t)`. nan
         where there is no such component.
         """
-        return _phases(np.array([orbit.harmonic(k, self._dof(dof)) for orbit in self.orbits]))
+        return self._of("phase", dof, k)
 
     def peak_force(self, element: int | None = None) -> Array:
         """Largest |f| of an element over a period (`element`: its index; not needed where there is one)."""
-        chosen = contacts.check_element(self.system, element)
-        return self._over(lambda orbit: contacts.peak_force(orbit, chosen))
+        return self._of("peak_force", None, contacts.check_element(self.system, element))
 
     def contact_share(self, element: int | None = None) -> Array:
         """Contact duration of an element with a gap, as a share of the period (0 to 1)."""
-        chosen = self._gapped(element)
-        return self._over(lambda orbit: contacts.contact_of(orbit, chosen)[0])
+        return self._of("contact_share", None, self._gapped(element))
 
     def impacts(self, element: int | None = None) -> Array:
         """How often contact begins at an element with a gap in one period of the motion (nu load periods)."""
-        chosen = self._gapped(element)
-        return self._over(lambda orbit: contacts.contact_of(orbit, chosen)[1])
+        return self._of("impacts", None, self._gapped(element))
 
     def _gapped(self, element: int | None) -> int:
         return contacts.check_element(self.system, element, contacts.gapped_elements(self.system))

@@ -121,7 +121,7 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
         why, goes_on = _what_ends(dataset, whole, run, end, step)
         if not goes_on:
             complete = sign * whole.x[end] >= limit - 1e-12 * max(1.0, abs(limit))
-            return _path(direction, name, values, amplitudes, jumps, why, complete)
+            break
         here, kind = float(whole.x[end]), why
         landings = _landings(whole, runs, run, here, sign)
         if len(landings) != 1:
@@ -129,8 +129,8 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
             target = (
                 f"are several stable motions (amplitudes {there})" if landings else "is no stable motion of this branch"
             )
-            why = f"at the fold at {name} = {here:.9g} the sweep jumps, and there {target} to jump to"
-            return _path(direction, name, values, amplitudes, jumps, why, False)
+            why, complete = f"at the fold at {name} = {here:.9g} the sweep jumps, and there {target} to jump to", False
+            break
         run, landed = landings[0]
         jumps.append(Jump(here, float(amplitudes[-1]), landed, kind))
         values.append(here)
@@ -138,6 +138,7 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
         inside = np.arange(run.first, run.last + 1)
         ahead = inside[sign * whole.x[inside] > sign * here]
         at = int(ahead[np.argmin(sign * whole.x[ahead])]) if ahead.size else _ends(run, sign)[1]
+    return SweepPath(direction, name, np.array(values), np.array(amplitudes), tuple(jumps), why, bool(complete))
 
 
 def hysteresis(dataset: xarray.Dataset) -> list[tuple[float, float]]:
@@ -162,18 +163,6 @@ def hysteresis(dataset: xarray.Dataset) -> list[tuple[float, float]]:
         else:
             joined.append((float(first), float(last)))
     return joined
-
-
-def _path(
-    direction: str,
-    name: str,
-    values: list[float],
-    amplitudes: list[float],
-    jumps: list[Jump],
-    ended: str,
-    complete: bool,
-) -> SweepPath:
-    return SweepPath(direction, name, np.array(values), np.array(amplitudes), tuple(jumps), ended, bool(complete))
 
 
 def _runs(whole: Line) -> list[_Run]:
