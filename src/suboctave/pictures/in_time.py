@@ -125,10 +125,9 @@ def plot_brute_force(
     dof = checked_dof(diagram, dof)
     varied = str(diagram.attrs["varied"])
     frame, entries = _beneath(curves, varied, View())
-    add = _add_amplitudes if quantity == "amplitude" else _add_sections
     marks: dict[str, Entry] = {}
     for start in shown:
-        marks |= add(frame, diagram.isel(start=known.index(start)), start, dof)
+        marks |= _add_motions(frame, diagram.isel(start=known.index(start)), start, dof, quantity == "section")
     # beside curves, whose periods have the same names, marks say that they are motions in time
     entries |= {f"{name}, in time" if curves is not None else name: mark for name, mark in marks.items()}
     symbol = symbol_of(diagram, dof, 0).strip("$")
@@ -210,30 +209,23 @@ def _beneath(curves: Any, x: str, view: View) -> tuple[Frame, dict[str, Entry]]:
     return response_frame(datasets_of(curves, view), Coordinates((x, None), view))
 
 
-def _add_amplitudes(frame: Frame, row: xarray.Dataset, start: str, dof: int) -> dict[str, Entry]:
+def _add_motions(frame: Frame, row: xarray.Dataset, start: str, dof: int, sections: bool) -> dict[str, Entry]:
+    """Add the motions of one way to start, their amplitudes or their `sections`, and give their entries."""
     entries: dict[str, Entry] = {}
     values, periods = row["value"].to_numpy(), row["period"].to_numpy()
-    largest = row["largest"].to_numpy()[..., dof]
+    table = row["displacement" if sections else "largest"].to_numpy()[..., dof]
     for period in sorted({int(p) for p in periods if p >= 0}):
-        here = np.flatnonzero(periods == period)
-        heights = largest[here][:, -period:].max(axis=1) if period else largest[here].max(axis=1)
-        mark = Mark(_POINTING.get(start, "s"), 3.2, "none", _colour(period), 0.7)
-        at = np.array([values[here], heights])
-        frame.items.append(Markers(at, mark, cut=True, role=f"{start} {_name(period)}", layer=4.0))
+        here, role = np.flatnonzero(periods == period), f"{start} {_name(period)}"
+        known = table[here][:, -period:] if period else table[here]
+        if sections:
+            at = np.array([np.repeat(values[here], known.shape[1]), known.ravel()])
+            frame.items.append(_points(at, period, 1.8 if period else 0.9, role))
+            mark = dot(_colour(period))  # large enough for its colour to be seen
+        else:
+            mark = Mark(_POINTING.get(start, "s"), 3.2, "none", _colour(period), 0.7)
+            at = np.array([values[here], known.max(axis=1)])
+            frame.items.append(Markers(at, mark, cut=True, role=role, layer=4.0))
         entries[_name(period)] = Entry(mark=mark)
-    return entries
-
-
-def _add_sections(frame: Frame, row: xarray.Dataset, start: str, dof: int) -> dict[str, Entry]:
-    entries: dict[str, Entry] = {}
-    values, periods = row["value"].to_numpy(), row["period"].to_numpy()
-    x = row["displacement"].to_numpy()[..., dof]
-    for period in sorted({int(p) for p in periods if p >= 0}):
-        here = np.flatnonzero(periods == period)
-        points = x[here][:, -period:] if period else x[here]
-        at = np.array([np.repeat(values[here], points.shape[1]), points.ravel()])
-        frame.items.append(_points(at, period, 1.8 if period else 0.9, f"{start} {_name(period)}"))
-        entries[_name(period)] = Entry(mark=dot(_colour(period)))  # large enough for its colour to be seen
     return entries
 
 

@@ -249,21 +249,9 @@ class Branch(CurveTables, BranchReadings):
         rows = []
         for item in sorted([*self.bifurcations.met, *self.events.met], key=lambda b: b.arclength):
             mu = item.critical_multiplier()
-            rows.append(
-                {
-                    **{names[name]: value for name, value in item.parameters.items() if name in names},
-                    "kind": item.kind,
-                    "omega": item.omega,
-                    "amplitude": item.amplitude,
-                    "multiplier_real": mu.real,
-                    "multiplier_imag": mu.imag,
-                    "criticality": item.criticality or "",
-                    "residual": item.residual,
-                    "uncertainty": item.uncertainty,
-                    "arclength": item.arclength,
-                    "remark": item.remark(),
-                }
-            )
+            row = {name: getattr(item, name, None) for name in own} | {"remark": item.remark()}
+            row |= {"multiplier_real": mu.real, "multiplier_imag": mu.imag, "criticality": item.criticality or ""}
+            rows.append({names[n]: value for n, value in item.parameters.items() if n in names} | row)
         return pd.DataFrame(rows, columns=[*own[:2], *names.values(), *own[2:]])
 
     def plot(self, path: Any = None, **options: Any) -> Any:

@@ -154,23 +154,27 @@ def _fits(key: str, value: Any) -> bool:
     return key != "seconds" and isinstance(value, str if key == "title" else dict)
 
 
+def _refused(source: Path, message: str, line: int = 0) -> StudyError:
+    return StudyError(str(source), [Mistake("", line, message)])
+
+
 def _text(source: Path) -> str:
     if source.is_dir():
-        raise StudyError(str(source), [Mistake("", 0, "this is a folder, not a study file")])
+        raise _refused(source, "this is a folder, not a study file")
     try:
         if source.exists() and not source.is_file():  # a pipe or a device never ends
-            raise StudyError(str(source), [Mistake("", 0, "this is no ordinary file")])
+            raise _refused(source, "this is no ordinary file")
         if source.stat().st_size > _LONGEST:
-            raise StudyError(str(source), [Mistake("", 0, "this is too long for a study file; keep matrices in files")])
+            raise _refused(source, "this is too long for a study file; keep matrices in files")
         return source.read_text(encoding="utf-8-sig")  # some editors put a mark in front
     except FileNotFoundError:
         near = [p.name for p in source.parent.glob("*.toml")] if source.parent.is_dir() else []
         hint = suggest(source.name, near) if near else "; `suboctave new` writes one"
-        raise StudyError(str(source), [Mistake("", 0, f"there is no such file{hint}")]) from None
+        raise _refused(source, f"there is no such file{hint}") from None
     except UnicodeDecodeError as error:
-        raise StudyError(str(source), [Mistake("", 0, f"this is no text in UTF-8 ({error.reason})")]) from None
+        raise _refused(source, f"this is no text in UTF-8 ({error.reason})") from None
     except OSError as error:
-        raise StudyError(str(source), [Mistake("", 0, f"cannot be read: {error.strerror}")]) from None
+        raise _refused(source, f"cannot be read: {error.strerror}") from None
 
 
 def _parsed(source: Path, text: str) -> dict[str, Any]:
@@ -184,7 +188,7 @@ def _parsed(source: Path, text: str) -> dict[str, Any]:
         line = int(place.group(1)) if place else text.count("\n") + 1 if "end of document" in reason else 0
         reason = reason.replace(place.group(0), f", in column {place.group(2)}") if place else reason
         reason = reason.replace(" (at end of document)", ": the file ends in the middle")
-    raise StudyError(str(source), [Mistake("", line, f"this is not TOML: {reason}")])
+    raise _refused(source, f"this is not TOML: {reason}", line)
 
 
 def _validated(model: type[Any], given: Mapping[str, Any], prefix: tuple[str | int, ...], mistakes: Mistakes) -> Any:

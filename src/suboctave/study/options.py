@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 from pydantic import AfterValidator
 
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.continuation import NewtonOptions, SteppingOptions
-from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, ExtendedSystem, Formulation, formulation_of
+from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, ExtendedSystem, formulation_of
 from suboctave.errors import InputError, suggest
-from suboctave.floquet import Hill, KoopmanHill, Monodromy, StabilityMethod, method_of
+from suboctave.floquet import Hill, KoopmanHill, Monodromy, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 
 _METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}
@@ -29,25 +30,10 @@ def read_by(read: Callable[[Any], Any]) -> AfterValidator:
     return AfterValidator(check)
 
 
-def as_newton(table: Mapping[str, Any] | None) -> NewtonOptions | None:
-    """The Newton options of a table, None where there is none."""
-    return _options(NewtonOptions, table, "newton")
-
-
-def as_stepping(table: Mapping[str, Any] | None) -> SteppingOptions | None:
-    """The stepping options of a table, None where there is none."""
-    return _options(SteppingOptions, table, "stepping")
-
-
-def as_seeds(table: Mapping[str, Any] | None) -> Seeds | None:
-    """How finely a search is done, of a table; None where there is none."""
-    return _options(Seeds, table, "seeds")
-
-
 def as_harmonics(given: Any) -> Any:
     """A whole number, "adaptive", or the options of adaptive harmonics as a table; None stays None."""
     if isinstance(given, Mapping):
-        return _options(AdaptiveHarmonics, given, "harmonics")
+        return _options(AdaptiveHarmonics, "harmonics", given)
     if given is None or given == "adaptive":
         return given
     if isinstance(given, bool) or not isinstance(given, int) or given < 1:
@@ -55,32 +41,21 @@ def as_harmonics(given: Any) -> Any:
     return given
 
 
-def as_stability(given: Any) -> StabilityMethod | None:
-    """A method by name, or `{method = name, option = value}`; None stays None."""
-    made: StabilityMethod | None = _named(given, "method", "method", _METHODS, method_of)
-    return made
-
-
-def as_formulation(given: Any) -> Formulation | None:
-    """A formulation by name, or `{name = name, option = value}`; None stays None."""
-    made: Formulation | None = _named(given, "formulation", "name", _FORMULATIONS, formulation_of)
-    return made
-
-
-def _named(given: Any, what: str, key: str, kinds: Mapping[str, Any], by_name: Callable[[str], Any]) -> Any:
-    """An object by its name, or by a table with its name at `key` beside its options."""
+def _named(what: str, key: str, kinds: Mapping[str, Any], by_name: Callable[[str], Any], given: Any) -> Any:
+    """An object by its name, or by a table with its name at `key` beside its options; None stays None."""
     if isinstance(given, Mapping):
         table = dict(given)
         name = table.pop(key, None)
         if name not in kinds:
             raise InputError(f"there is no {what} {name!r} that takes options{suggest(str(name), kinds)}")
-        return _options(kinds[name], table, name)
+        return _options(kinds[name], name, table)
     if given is not None and not isinstance(given, str):
         raise InputError(f"give the name of a {what}, or a table with {key} = ..., not {given!r}")
     return None if given is None else by_name(given)
 
 
-def _options(kind: Any, table: Mapping[str, Any] | None, what: str) -> Any:
+def _options(kind: Any, what: str, table: Mapping[str, Any] | None) -> Any:
+    """The options of a table as an object, each of the type of its default; None stays None."""
     if table is None:
         return None
     known = {f.name: f for f in fields(kind)}
@@ -94,3 +69,11 @@ def _options(kind: Any, table: Mapping[str, Any] | None, what: str) -> Any:
         if isinstance(default, int) and not isinstance(default, bool) and not isinstance(value, int):
             raise InputError(f"{what}, {name}: a whole number is needed, not {value!r}")
     return kind(**table)
+
+
+#: what the tables of a study file give, by the option: an object for a table, or a name, None where there is none
+as_newton = partial(_options, NewtonOptions, "newton")
+as_stepping = partial(_options, SteppingOptions, "stepping")
+as_seeds = partial(_options, Seeds, "seeds")
+as_stability = partial(_named, "method", "method", _METHODS, method_of)
+as_formulation = partial(_named, "formulation", "name", _FORMULATIONS, formulation_of)

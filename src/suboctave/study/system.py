@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -209,7 +210,7 @@ def read_matrix(path: Path, key: str | None) -> Any:
     if not path.is_file():
         raise InputError(f"there is no file {path}{suggest(path.name, _beside(path)) if _beside(path) else ''}")
     try:
-        matrix = _READERS[suffix](path, key)
+        matrix = _loaded(path, suffix, key)
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of its reader
@@ -226,40 +227,21 @@ def _beside(path: Path) -> list[str]:
     return [p.name for p in folder.iterdir() if p.suffix.lower() in SUFFIXES] if folder.is_dir() else []
 
 
-def _npy(path: Path, key: str | None) -> Any:
-    return np.load(path, allow_pickle=False)
-
-
-def _npz(path: Path, key: str | None) -> Any:
+def _loaded(path: Path, suffix: str, key: str | None) -> Any:
+    import scipy.io
     import scipy.sparse
 
-    with np.load(path, allow_pickle=False) as archive:
-        if {"format", "shape", "data"} <= set(archive.files):
-            sparse: Any = scipy.sparse.load_npz(path)
-            return sparse.tocsr()
-        return archive[_chosen(path, key, archive.files)]
-
-
-def _mtx(path: Path, key: str | None) -> Any:
-    import scipy.io
-
-    matrix = scipy.io.mmread(path)
+    if suffix == ".csv":
+        return np.loadtxt(path, delimiter=",", ndmin=2)
+    readers: dict[str, Any] = {".mtx": scipy.io.mmread, ".mat": scipy.io.loadmat}
+    matrix = readers.get(suffix, partial(np.load, allow_pickle=False))(path)
+    if suffix == ".npz":
+        with matrix as archive:
+            is_sparse = {"format", "shape", "data"} <= set(archive.files)
+            matrix = scipy.sparse.load_npz(path) if is_sparse else archive[_chosen(path, key, archive.files)]
+    elif suffix == ".mat":
+        matrix = matrix[_chosen(path, key, [name for name in matrix if not name.startswith("__")])]
     return matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
-
-
-def _mat(path: Path, key: str | None) -> Any:
-    import scipy.io
-
-    content = scipy.io.loadmat(path)
-    matrix = content[_chosen(path, key, [name for name in content if not name.startswith("__")])]
-    return matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
-
-
-def _csv(path: Path, key: str | None) -> Any:
-    return np.loadtxt(path, delimiter=",", ndmin=2)
-
-
-_READERS = {".npy": _npy, ".npz": _npz, ".mtx": _mtx, ".mat": _mat, ".csv": _csv}
 
 
 def _chosen(path: Path, key: str | None, names: list[str]) -> str:
