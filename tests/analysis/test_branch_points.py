@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 from suboctave.bifurcation.bordered import null_vectors, transversality
@@ -90,7 +91,7 @@ def test_a_pitchfork_is_one_branch_point_from_the_unsymmetric_motions(name):
             assert curve.audit.complete
 
 
-@pytest.mark.parametrize("max_step", [0.02, 0.04, 0.06, 0.08, 0.15, 0.3])
+@pytest.mark.parametrize("max_step", [0.06, 0.3, *slow(0.02, 0.04, 0.08, 0.15)])
 def test_a_pitchfork_at_any_step(max_step):
     """From the first motion that is found at omega = 0.9, which is unsymmetric."""
     curve = so.frequency_response(cubic(), (0.9, 0.75), max_step=max_step)

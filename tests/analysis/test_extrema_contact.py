@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 
@@ -45,7 +46,7 @@ def test_extrema_of_period_doublings_over_the_stops(sharpness, stiffness):
     assert np.abs(curve.multipliers + 1.0).min(axis=1).max() < 1e-4
 
 
-@pytest.mark.parametrize("max_step", [0.02, None, 0.2])
+@pytest.mark.parametrize("max_step", [None, *slow(0.02, 0.2)])
 def test_the_whole_curve_in_one_call_at_any_step(max_step):
     extremum = reference_extremum(3000.0)
     place = NUMBERS["s3000_Kc4.7_p0.55_over_j"]["extremum"]

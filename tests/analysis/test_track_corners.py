@@ -4,10 +4,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 
-STEPS = [{}, {"max_step": 0.02}, {"initial_step": 0.003}, {"initial_step": 0.02}, {"angle": 0.3}]
+STEPS = [{}, {"angle": 0.3}, *slow({"max_step": 0.02}, {"initial_step": 0.003}, {"initial_step": 0.02})]
 
 
 def options(stepping: dict[str, float]) -> so.SteppingOptions:

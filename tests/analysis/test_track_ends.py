@@ -10,6 +10,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 
@@ -40,7 +41,8 @@ def test_a_curve_that_closes_behind_corners_is_run_through_once():
         assert len(beside) == 2
 
 
-STEPS = [{}, {"max_step": 0.1}, {"max_step": 0.15}, {"angle": 0.3}, {"initial_step": 0.003}, {"initial_step": 0.02}]
+STEPS = [{}, {"max_step": 0.15}]
+STEPS += slow({"max_step": 0.1}, {"angle": 0.3}, {"initial_step": 0.003}, {"initial_step": 0.02})
 
 
 @cache
@@ -257,7 +259,9 @@ def test_a_curve_that_closes_the_other_way_is_whole(monkeypatch):
     assert [e.kind for e in curve.bifurcations] == [e.kind for e in expected.bifurcations][::-1]
 
 
-@pytest.mark.parametrize("stepping", [{}, {"max_step": 0.02}, {"max_step": 0.1}, {"initial_step": 0.02}], ids=str)
+@pytest.mark.parametrize(
+    "stepping", [{}, *slow({"max_step": 0.02}, {"max_step": 0.1}, {"initial_step": 0.02})], ids=str
+)
 def test_nothing_turns_falsely_where_doubled_limit_points_of_little_damping_come_to_their_end(stepping):
     # within 1e-6 of the end the parameters run as the tolerance of points would have them, were it all that is asked
     spring = so.PolynomialSpring(0, {2: "a2", 3: 0.5})
@@ -292,7 +296,7 @@ def entrained() -> list[so.Bifurcation]:
     return list(so.frequency_response(system, (0.3, 3.0)).bifurcations["NS"])
 
 
-STEPPINGS = [{}, {"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003}, {"angle": 0.3}]
+STEPPINGS = [{}, {"max_step": 0.15}, *slow({"max_step": 0.02}, {"initial_step": 0.003}, {"angle": 0.3})]
 
 
 @pytest.mark.parametrize("stepping", STEPPINGS, ids=str)

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 
-STEPS = [{}, {"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003}, {"initial_step": 0.02}, {"angle": 0.3}]
+STEPS = [{}, {"max_step": 0.15}]
+STEPS += slow({"max_step": 0.02}, {"initial_step": 0.003}, {"initial_step": 0.02}, {"angle": 0.3})
 
 
 def rattling(damping: float, **values: float) -> so.System:
@@ -96,7 +98,7 @@ def test_tip_of_a_tongue_over_the_load_has_one_extremum(which, stepping):
     assert abs(turns[0].parameter("F") - 0.00867985) < 1e-8
 
 
-@pytest.mark.parametrize("max_step", [None, 0.15])
+@pytest.mark.parametrize("max_step", [None, *slow(0.15)])
 @pytest.mark.parametrize("inside", [1e-3, 1e-6])
 def test_range_of_omega_that_ends_just_inside_a_turn_ends_the_curve(inside, max_step):
     # the tongue's least and greatest omega: a step may pass the bound and come back
@@ -126,7 +128,7 @@ def between_stops() -> list[so.Bifurcation]:
 
 
 @pytest.mark.parametrize(
-    "stepping", [{}, {"max_step": 0.1}, {"max_step": 0.15}, {"angle": 0.3}, {"initial_step": 0.02}]
+    "stepping", [{}, {"max_step": 0.15}, *slow({"max_step": 0.1}, {"angle": 0.3}, {"initial_step": 0.02})]
 )
 def test_two_turns_within_a_step_are_told_from_each_other(between_stops, stepping):
     # omega has a maximum and a minimum 2e-6 apart; more harmonics move the minimum by half of the way between
@@ -163,7 +165,7 @@ def rattle() -> so.Bifurcation:
 GAPS = [(0.5, "right"), (-0.5, "left")]
 
 
-@pytest.mark.parametrize("max_step", [None, 0.02, 0.15])
+@pytest.mark.parametrize("max_step", [None, *slow(0.02, 0.15)])
 def test_pair_that_passes_the_circle_just_before_it_splits_beside_the_critical_multiplier(rattle, max_step):
     # the one real multiplier of it goes on to +1 (R1), within a stride of points whose multipliers are computed
     curve = so.track(rattle, "k", (0.1, 6.0), omega=(0.3, 4.0), max_step=max_step)
@@ -175,7 +177,9 @@ def test_pair_that_passes_the_circle_just_before_it_splits_beside_the_critical_m
     assert (double.omega, double.parameter("k")) == pytest.approx((0.868686, 3.393689), abs=1e-4)
 
 
-@pytest.mark.parametrize("stepping", [{}, {"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003}], ids=str)
+@pytest.mark.parametrize(
+    "stepping", [{}, *slow({"max_step": 0.02}, {"max_step": 0.15}, {"initial_step": 0.003})], ids=str
+)
 def test_minimum_and_maximum_beside_a_cusp(stepping):
     # both parameters turn in the cusp 7e-6 before the extremum, within a step
     system = so.System.from_equations(

@@ -18,7 +18,15 @@ def test_there_are_examples():
     assert len(SCRIPTS) >= 6
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+#: longer than the others, each on a subject that has tests of its own
+LONG = ("ex21_damping_against_isolas", "ex22_regimes", "ex23_chaos")
+
+
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(path, marks=[pytest.mark.slow] if path.stem in LONG else []) for path in SCRIPTS],
+    ids=lambda path: path.stem,
+)
 def test_example(script, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)

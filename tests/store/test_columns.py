@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from rich.console import Console
+from slow import slow
 
 import suboctave as so
 from suboctave.store.columns import led_by, parameter_column
@@ -23,7 +24,8 @@ def along(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["amplitude", "stable", "arclength", "harmonics", "residual", "multiplier_real", "rms", "coefficients", "F"]
+    "name",
+    ["amplitude", "multiplier_real", "coefficients", *slow("stable", "arclength", "harmonics", "residual", "rms", "F")],
 )
 def test_free_parameters_are_in_tables_datasets_and_files(name, tmp_path):
     branch = along(name)
@@ -44,7 +46,7 @@ def test_free_parameters_are_in_tables_datasets_and_files(name, tmp_path):
     assert again.to_dataframe().equals(branch.to_dataframe())
 
 
-@pytest.mark.parametrize("name", ["amplitude", "kind", "criticality", "residual", "remark", "F"])
+@pytest.mark.parametrize("name", ["amplitude", "remark", *slow("kind", "criticality", "residual", "F")])
 def test_tables_of_bifurcations_have_every_parameter(name):
     system = so.System(1.0, 0.1, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, name)], parameters={name: 0.3})
     curve = so.frequency_response(system, (1.5, 1.2), 3)
