@@ -154,7 +154,9 @@ def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
         return None
     fraction = float((b.weights * (u - ua)) @ chord) / size**2
     for _ in range(_ROUNDS):
-        # the interpolating cubic runs at uneven speed along the chord
+        if not -1.0 <= fraction <= 2.0:  # the cubic says nothing of what lies so far outside
+            break
+        # it runs at uneven speed along the chord
         rest = float((b.weights * (u - between(a, b, fraction))) @ chord) / size**2
         fraction += rest
         if abs(rest) < _SETTLED:
