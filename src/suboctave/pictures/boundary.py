@@ -32,14 +32,13 @@ from suboctave.pictures.drawing import (
     plain,
 )
 from suboctave.pictures.isolas import CENTRE, MERGING, end_text, shade, split, with_ends
-from suboctave.pictures.layers import add_strokes, check_count, checked, events_of
+from suboctave.pictures.layers import add_strokes, check_count, checked, events_of, named_axis
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.periods import period_colour, period_name, period_of
 from suboctave.pictures.strokes import Line, line_through
 from suboctave.pictures.style import Mark, Pen, places_among, tinted
 from suboctave.pictures.words import differing, fixed_parameters
-from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -114,7 +113,9 @@ def boundary_drawing(
     group = [with_ends(dataset, heads) for dataset in _checked(given)]
     if projected and y is not None:
         raise InputError("y= names a parameter; with a quantity= that is what is drawn upwards")
-    axes = Coordinates((_first(group, x), None) if projected else plane_axes(group, x, y), view or View())
+    axes = Coordinates(
+        (named_axis(group, x) or plane_axes(group)[0], None) if projected else plane_axes(group, x, y), view or View()
+    )
     check_count("labels", labels, len(group), "curves")
     for dataset in group:
         axes.check(dataset)
@@ -300,10 +301,7 @@ def chosen_axes(
     group: Sequence[xarray.Dataset], pairs: set[tuple[str, str]], x: str | None, y: str | None, wrong: str
 ) -> tuple[str, str]:
     """The axes given, or those of the one pair there is; `wrong`: what an axis that is none of this pair is not."""
-    for name in (x, y):
-        if name is not None:
-            for dataset in group:
-                coordinate(dataset, name)
+    x, y = named_axis(group, x), named_axis(group, y)
     if x is not None and x == y:
         raise InputError(f"x and y are the same parameter {x!r}")
     if x is not None and y is not None:
@@ -318,11 +316,3 @@ def chosen_axes(
         raise InputError(f"{given!r} {wrong}{suggest(given, pair)}: give x= and y=")
     other = pair[1] if given == pair[0] else pair[0]
     return (given, other) if x is not None else (other, given)
-
-
-def _first(group: Sequence[xarray.Dataset], x: str | None) -> str:
-    if x is None:
-        return plane_axes(group)[0]
-    for dataset in group:
-        coordinate(dataset, x)
-    return x

@@ -15,7 +15,7 @@ from suboctave.pictures.options import Coordinates
 from suboctave.pictures.strokes import cut, line_through, without_repeats
 from suboctave.pictures.style import KindStyle, Pen
 from suboctave.pictures.words import Hover
-from suboctave.store.layout import check_layout
+from suboctave.store.layout import check_layout, coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -47,6 +47,13 @@ def checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
         if dataset.sizes["point"] == 0:
             raise InputError("a curve without points cannot be drawn")
     return list(curves)
+
+
+def named_axis(group: Sequence[xarray.Dataset], name: str | None) -> str | None:
+    """The parameter of an axis; InputError where a curve does not have it."""
+    for dataset in group if name is not None else ():
+        coordinate(dataset, str(name))
+    return name
 
 
 def check_count(name: str, given: Sequence[Any] | None, count: int, things: str) -> None:

@@ -16,13 +16,12 @@ from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, ordered, plain
-from suboctave.pictures.layers import Seen, add_strokes, check_count, checked, events_of
+from suboctave.pictures.layers import Seen, add_strokes, check_count, checked, events_of, named_axis
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
 from suboctave.pictures.style import Pen
 from suboctave.pictures.words import differing, fixed_parameters
-from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -200,10 +199,8 @@ def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.D
 
 
 def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:
-    if x is not None:
-        for dataset in datasets:
-            coordinate(dataset, x)
-        return x
+    if named_axis(datasets, x) is not None:
+        return str(x)
     free = list(dict.fromkeys(str(dataset.attrs["free"]) for dataset in datasets))
     if len(free) > 1:
         raise InputError(f"the curves were followed in different parameters ({', '.join(free)}): choose one with x=")

@@ -7,7 +7,6 @@ s = 3000, for the three cases of Figs 6 and 7 of Alcorta, Baguet, Prabel, Piteau
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +21,9 @@ from suboctave.model import System, library
 from suboctave.pictures import plot_boundaries, plot_panels, plot_response
 from suboctave.progress import bar
 from suboctave.results.branch import Branch
+from suboctave.store.layout import events_met
 from suboctave.study.screen import console, event_lines, print_events
+from suboctave.study.shown import to_json
 
 if TYPE_CHECKING:
     import xarray
@@ -164,19 +165,10 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
             figures.append(path)
     if json_wanted:
         listed = [
-            {
-                "p": c.case.p,
-                "j": c.case.j,
-                "points": len(c.branch),
-                "seconds": c.seconds,
-                "ended": c.branch.ended,
-                "events": [
-                    {"kind": str(kind), "omega": float(omega)}
-                    for kind, omega in zip(c.dataset["event_kind"].values, c.dataset["event_omega"].values, strict=True)
-                ],
-            }
+            {"p": c.case.p, "j": c.case.j, "points": len(c.branch), "seconds": c.seconds, "ended": c.branch.ended}
+            | {"events": [{"kind": event.kind, "omega": event.omega} for event in events_met(c.branch)]}
             for c in curves
         ]
-        print(json.dumps({"ok": not interrupted, "curves": listed, "files": [str(f) for f in figures]}))
+        print(to_json({"ok": not interrupted, "curves": listed, "files": figures}))
     if interrupted:
         raise KeyboardInterrupt

@@ -282,7 +282,7 @@ class BoundaryFigure(CurveFigure):
         for i, name in enumerate(self.analyses):
             if name in curves and curves[name] is None:
                 yield ("analyses", i), f"{name!r} is no curve of bifurcations{suggest(name, tracked)}"
-        planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
+        planes = {curves.get(name) for name in self.drawn(curves)} - {None}
         if self.projected and self.y is not None:
             yield ("y",), "is a parameter; with a quantity that is what is drawn upwards: leave one of them out"
         if len(planes) > 1 and (self.x is None or (self.y is None and not self.projected)):
@@ -322,7 +322,7 @@ class SpaceFigure(CurveFigure):
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
         yield from super().check(study)
         curves = study.planes
-        planes = {curves[name] for name in self.drawn(curves) if curves.get(name) is not None}
+        planes = {curves.get(name) for name in self.drawn(curves)} - {None}
         yield from _same(self.x, self.y)
         if self.x is not None and self.y is not None:
             return

@@ -35,7 +35,7 @@ from suboctave.model.system import System, build, describe
 from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch, tracked_points, tracked_record
 from suboctave.store.arrays import array_of, flat, padded
-from suboctave.store.layout import branch_dataset
+from suboctave.store.layout import branch_dataset, events_met
 from suboctave.store.plain import from_json, to_json
 from suboctave.store.registry import Codec, register
 from suboctave.store.systems import Prefixed, system_arrays
@@ -56,7 +56,6 @@ _MEANINGS = {
     "multiplier_errors": "estimated errors of the multipliers",
     "record": "system, options, warnings, audit and what motions share, as JSON",
 }
-_PLACES = {"bifurcations": 0, "events": 1}
 
 
 def branch_to_dataset(branch: Branch) -> xarray.Dataset:
@@ -74,15 +73,16 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
     }
     points = [p.orbit for p in branch.points]
     new |= _orbits("", "point", points, [p.floquet for p in branch.points])
-    located = _in_order(branch)
-    events = [event for _, _, event in located]
+    events = events_met(branch)
+    lists = enumerate((branch.bifurcations.met, branch.events.met))
+    listed = {id(event): (which, i) for which, items in lists for i, event in enumerate(items)}
     new |= _orbits("event_", "event", [e.orbit for e in events], [e.floquet for e in events])
     for side in ("right", "left"):
         rows = [() if e.null_vectors is None else getattr(e.null_vectors, side) for e in events]
         new[f"event_null_{side}"] = (("event", "null"), padded(rows, complex))
     record = {
         "points": [writer.motion(p.orbit, p.floquet) for p in branch.points],
-        "event_list": [(_PLACES[where], index) for where, index, _ in located],
+        "event_list": [listed[id(event)] for event in events],
         "events": [writer.event(event, branch) for event in events],
         "name": branch.name,
         "options": branch.options,
@@ -130,14 +130,6 @@ register(
         lambda groups, allow_code, linear: branch_from_dataset(groups[""], allow_code, linear),
     )
 )
-
-
-def _in_order(branch: Branch) -> list[tuple[str, int, Bifurcation]]:
-    """Every bifurcation, grazing and event with its list and place there, in the order of the layout's events."""
-    listed = {id(b): ("bifurcations", i, b) for i, b in enumerate(branch.bifurcations.met)}
-    listed |= {id(b): ("events", i, b) for i, b in enumerate(branch.events.met)}
-    met = sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda event: event.arclength)
-    return [listed[id(event)] for event in met]
 
 
 def _orbits(

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch
 from suboctave.store.table import Table
 from suboctave.study.options import as_stability
@@ -31,7 +30,6 @@ from suboctave.study.steps.base import (
     tried,
 )
 from suboctave.verification.motion import stability
-from suboctave.verification.result import BranchVerification
 from suboctave.verification.verify import verify
 
 
@@ -61,55 +59,41 @@ class Verify(BranchStep):
     def run(self, context: Context) -> Table:
         curve = as_curve(self.branch)
         branch = chosen_branch(curve, context.results)
-        whole = None if isinstance(branch, TrackedBranch) else _whole(self, branch, context)
-        rows = _one_by_one(self, branch, context) if whole is None else _rows(whole)
+        points = [] if self.what == "bifurcations" else range(0, len(branch), self.every)
+        bifurcations = self.what != "points"
+        if isinstance(branch, TrackedBranch):  # its points as motions, and its special points, one by one
+            things: list[tuple[str, Any]] = [(f"point {i}", branch.points[i]) for i in points]
+            things += [(item.kind, item) for item in branch.bifurcations.met] if bifurcations else []
+            whole, rows = None, []
+            for done, (name, thing) in enumerate(things):
+                if context.progress is not None:
+                    context.progress(done / len(things), name)
+                one = verify(thing, self.tolerance)
+                outcome = "agrees" if one.agrees else "disagrees"
+                rows.append(_row(name, one, one.multiplier_error, _word(one.stable), outcome, thing.orbit.omega))
+        else:
+            progress = context.progress
+            whole = verify(branch, self.tolerance, points=points, bifurcations=bifurcations, progress=progress)
+            rows = [
+                _row(f"point {p.index}", p, p.multiplier_error, _word(p.stable), p.outcome, p.omega)
+                for p in whole.points
+            ]
+            rows += [
+                _row(b.kind, b, float("nan"), "", "agrees" if b.agrees else "disagrees", b.omega)
+                for b in whole.bifurcations
+            ]
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "outcome", "reason")
         kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str, str)
         return Table(as_table(names, kinds, rows), f"{curve.words}, held against shooting", whole)
 
 
-def _whole(step: Verify, branch: Branch, context: Context) -> BranchVerification:
-    """A branch of motions, all at once."""
-    points = [] if step.what == "bifurcations" else range(0, len(branch), step.every)
-    return verify(branch, step.tolerance, points=points, bifurcations=step.what != "points", progress=context.progress)
-
-
-def _rows(whole: BranchVerification) -> list[tuple[Any, ...]]:
-    rows: list[tuple[Any, ...]] = [
-        (f"point {p.index}", p.omega, p.distance, p.multiplier_error, _word(p.stable), p.agrees, p.outcome, p.reason)
-        for p in whole.points
-    ]
-    return rows + [
-        (b.kind, b.omega, b.distance, float("nan"), "", b.agrees, _outcome(b.agrees), b.reason)
-        for b in whole.bifurcations
-    ]
-
-
-def _one_by_one(step: Verify, branch: Branch, context: Context) -> list[tuple[Any, ...]]:
-    """Rows of a curve of bifurcations: its points as motions, its special points."""
-    things: list[tuple[str, Any]] = []
-    if step.what != "bifurcations":
-        things += [(f"point {i}", branch.points[i]) for i in range(0, len(branch), step.every)]
-    if step.what != "points":
-        things += [(item.kind, item) for item in branch.bifurcations.met]
-    rows = []
-    for done, (name, thing) in enumerate(things):
-        if context.progress is not None:
-            context.progress(done / len(things), name)
-        one = verify(thing, step.tolerance)
-        stable, outcome = _word(one.stable), _outcome(one.agrees)
-        rows.append(
-            (name, thing.orbit.omega, one.distance, one.multiplier_error, stable, one.agrees, outcome, one.reason)
-        )
-    return rows
+def _row(what: str, check: Any, error: float, stable: str, outcome: str, omega: float) -> tuple[Any, ...]:
+    """What a table says of something that was held against shooting."""
+    return what, omega, check.distance, error, stable, check.agrees, outcome, check.reason
 
 
 def _word(stable: bool | None) -> str:
     return "" if stable is None else "yes" if stable else "no"
-
-
-def _outcome(agrees: bool) -> str:
-    return "agrees" if agrees else "disagrees"
 
 
 class Stability(BranchStep):
