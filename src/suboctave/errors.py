@@ -102,6 +102,14 @@ def check_numbers(**given: Any) -> None:
             raise InputError(f"{name}={shortened(value)}: give a finite number")
 
 
+def chosen_dof(given: Any, default: int, count: int, name: str = "dof") -> int:
+    """The degree of freedom that a user has given, or else the default; InputError where there is none."""
+    dof = default if given is None else given
+    if isinstance(dof, bool) or not isinstance(dof, numbers.Integral) or not 0 <= int(dof) < count:
+        raise InputError(f"{name}={shortened(dof)} is out of range: there are {count} DOFs, numbered from 0")
+    return int(dof)
+
+
 _shown = reprlib.Repr()
 _shown.maxstring = _shown.maxother = 60
 

@@ -10,8 +10,6 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated, Any, TypeVar, cast
 
-import numpy as np
-
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.curves.discretisation import Harmonics
@@ -22,6 +20,7 @@ from suboctave.floquet import StabilityMethod, method_of
 from suboctave.floquet.methods import METHODS
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS
+from suboctave.model.inputs import observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
 
@@ -83,16 +82,12 @@ def settings_of(system: System, options: Mapping[str, Any]) -> Settings:
         if max_step <= stepping.min_step:
             raise InputError(f"max_step={max_step:g} is below the smallest step that is taken, {stepping.min_step:g}")
         stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
-    given = options.get("observe")
-    dof = system.observed_dof if given is None else given
-    if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)) or not 0 <= dof < system.n:
-        raise InputError(f"observe={shortened(dof)} is out of range: the system has {system.n} DOFs, numbered from 0")
     return Settings(
         _instance(options, "newton", NewtonOptions),
         stepping,
         method_of(options.get("stability")),
         _events(options.get("events")),
-        int(dof),
+        observed_dof(system, options.get("observe")),
         formulation_of(options.get("formulation")),
     )
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.errors import InputError, chosen_dof, is_number, shortened, suggest
 from suboctave.model.system import System
 
 #: the largest count of anything
@@ -76,10 +76,27 @@ def check_count(name: str, value: Any, least: int = 1) -> int:
 
 def observed_dof(system: System, observe: Any) -> int:
     """The degree of freedom that is observed; by default the system's."""
-    dof = system.observed_dof if observe is None else observe
-    if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or not 0 <= dof < system.n:
-        raise InputError(f"observe={dof!r} is out of range: the system has {system.n} DOFs, numbered from 0")
-    return int(dof)
+    return chosen_dof(observe, system.observed_dof, system.n, "observe")
+
+
+def check_element(system: System, element: Any, gapped: Sequence[int] | None = None) -> int:
+    """The index of an element of a system; None stands for the only one (of those with a gap, if these are given)."""
+    known = range(len(system.elements)) if gapped is None else gapped
+    listed = "; ".join(f"{index}: {system.elements[index].label}" for index in known[:8])
+    what = "elements" if gapped is None else "elements with a gap"
+    if element is None:
+        if len(known) == 1:
+            return known[0]
+        raise InputError(
+            f"the system has no {what}" if not known else f"several {what}: choose one by its index ({listed})"
+        )
+    if isinstance(element, bool) or not isinstance(element, int | np.integer):
+        raise InputError(f"element must be an index, not {element!r} ({listed})")
+    if not 0 <= element < len(system.elements):
+        raise InputError(f"element={element} is out of range: {listed or 'the system has no elements'}")
+    if int(element) not in known:
+        raise InputError(f"{system.elements[element].label} has no gap; {what}: {listed or 'none'}")
+    return int(element)
 
 
 def check_omega(omega: Any) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, chosen_dof, suggest
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Polyline, dot, ordered, plain
 from suboctave.pictures.options import Coordinates, View, as_multiple, shown_multiple
@@ -281,8 +281,4 @@ def check_contents(dataset: Any, contents: str) -> None:
 
 def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
     """The degree of freedom that is drawn, default the observed one; InputError where there is none."""
-    count = int(dataset.attrs["dofs"])
-    chosen = int(dataset.attrs["observed"]) if dof is None else dof
-    if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer) or not 0 <= chosen < count:
-        raise InputError(f"dof={dof!r} is out of range: there are {count} DOFs, numbered from 0")
-    return int(chosen)
+    return chosen_dof(dof, int(dataset.attrs["observed"]), int(dataset.attrs["dofs"]))

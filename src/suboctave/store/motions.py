@@ -25,10 +25,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, chosen_dof
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.model.elements.coupled import reads
 from suboctave.model.elements.smoothness import levels
+from suboctave.model.inputs import check_element
 from suboctave.store.layout import LAYOUT
 from suboctave.version import __version__
 
@@ -136,9 +137,7 @@ def motion_dataset(
     import xarray
 
     system = orbit.balance.system
-    chosen = system.observed_dof if dof is None else dof
-    if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer) or not 0 <= chosen < system.n:
-        raise InputError(f"dof={dof!r} is out of range: the motion has {system.n}, numbered from 0")
+    chosen = chosen_dof(dof, system.observed_dof, system.n)
     nu, high = orbit.basis.nu, orbit.basis.harmonics
     multiples = orbit.basis.multiples
     c = np.array([orbit.harmonic(k / nu, chosen) for k in range(high + 1)])
@@ -158,9 +157,7 @@ def motion_dataset(
     unit = np.zeros(system.n)
     unit[chosen] = 1.0
     variables["amplitude_of_neglected"] = ("neglected", state.neglected @ orbit.balance.linear.retain(unit))
-    wanted = list(elements)
-    for index in wanted:
-        _check_element(orbit, index)
+    wanted = [check_element(system, index) for index in elements]
     force = [force_along(state, index)(tau) for index in wanted]
     variables["force"] = (("element", "sample"), np.reshape(force, (len(wanted), count + 1)))
     gaps = list(_gaps(orbit, chosen))
@@ -187,20 +184,13 @@ def motion_dataset(
         "kind": kind,
         "omega": float(orbit.omega),
         "period": nu,
-        "dof": int(chosen),
+        "dof": chosen,
         "dofs": system.n,
-        "amplitude": orbit.amplitude(int(chosen)),
+        "amplitude": orbit.amplitude(chosen),
         "residual": float(orbit.residual),
         "error": float(orbit.truncation),
     }
     return xarray.Dataset(variables, coords, attributes)
-
-
-def _check_element(orbit: PeriodicOrbit, index: Any) -> None:
-    known = orbit.balance.system.elements
-    if isinstance(index, bool) or not isinstance(index, int | np.integer) or not 0 <= index < len(known):
-        listed = "; ".join(f"{i}: {element.label}" for i, element in enumerate(known[:8]))
-        raise InputError(f"element={index!r} is out of range: {listed or 'the system has no elements'}")
 
 
 def _gaps(orbit: PeriodicOrbit, dof: int) -> Iterator[tuple[float, int]]:

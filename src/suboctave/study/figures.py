@@ -13,9 +13,10 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator
 
 from suboctave.curves.junction import period_name
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, chosen_dof, suggest
 from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isolas
+from suboctave.model.inputs import check_element
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum
 from suboctave.pictures.options import DERIVATIVES, MotionView, as_multiple
@@ -23,7 +24,7 @@ from suboctave.pictures.plot import datasets_of
 from suboctave.pictures.style import size_in_inches
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.results.readings.contacts import check_element, gapped_elements
+from suboctave.results.readings.contacts import gapped_elements
 from suboctave.store.motions import motion_datasets
 from suboctave.study.results import Result
 from suboctave.study.steps.base import (
@@ -87,8 +88,8 @@ class Figure(BaseModel):
         yield from tried("size", lambda: self.size is None or size_in_inches(self.size))
         if study.system is None:
             return
-        if self.dof is not None and not 0 <= self.dof < study.system.n:
-            yield ("dof",), f"dof={self.dof} is out of range: the system has {study.system.n}, numbered from 0"
+        count = study.system.n
+        yield from tried("dof", lambda: chosen_dof(self.dof, 0, count))
 
     def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where what it shows is not there.

@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from suboctave.bifurcation.gaps import contact_side, levels
-from suboctave.errors import InputError
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.trigonometric import crossings, extrema
@@ -29,26 +28,6 @@ def gapped_elements(system: System) -> list[int]:
     """Indices of the elements that have a gap: a displacement at which contact begins."""
     coefficients = [(element, element.coefficient_values(system.parameters)) for element in system.elements]
     return [index for index, (element, c) in enumerate(coefficients) if levels_of(element.sampling(c), c)]
-
-
-def check_element(system: System, element: int | None, gapped: list[int] | None = None) -> int:
-    """The index of an element of a system; None stands for the only one (of those with a gap, if these are given)."""
-    known = list(range(len(system.elements))) if gapped is None else gapped
-    listed = "; ".join(f"{index}: {system.elements[index].label}" for index in known[:8])
-    what = "elements" if gapped is None else "elements with a gap"
-    if element is None:
-        if len(known) == 1:
-            return known[0]
-        raise InputError(
-            f"the system has no {what}" if not known else f"several {what}: choose one by its index ({listed})"
-        )
-    if isinstance(element, bool) or not isinstance(element, int | np.integer):
-        raise InputError(f"element must be an index, not {element!r} ({listed})")
-    if not 0 <= element < len(system.elements):
-        raise InputError(f"element={element} is out of range: {listed or 'the system has no elements'}")
-    if int(element) not in known:
-        raise InputError(f"{system.elements[element].label} has no gap; {what}: {listed or 'none'}")
-    return int(element)
 
 
 def contact_of(orbit: PeriodicOrbit, element: int) -> tuple[float, int]:

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from suboctave.continuation.problem import Array
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.inputs import check_element
 from suboctave.model.system import System
 from suboctave.results.readings import contacts, transmission
 from suboctave.store.columns import parameter_column
@@ -75,7 +76,7 @@ class BranchReadings:
 
     def peak_force(self, element: int | None = None) -> Array:
         """Largest |f| of an element over a period (`element`: its index; not needed where there is one)."""
-        return self._of("peak_force", None, contacts.check_element(self.system, element))
+        return self._of("peak_force", None, check_element(self.system, element))
 
     def contact_share(self, element: int | None = None) -> Array:
         """Contact duration of an element with a gap, as a share of the period (0 to 1)."""
@@ -86,7 +87,7 @@ class BranchReadings:
         return self._of("impacts", None, self._gapped(element))
 
     def _gapped(self, element: int | None) -> int:
-        return contacts.check_element(self.system, element, contacts.gapped_elements(self.system))
+        return check_element(self.system, element, contacts.gapped_elements(self.system))
 
     def transmitted_force(self, direction: ArrayLike | None = None) -> Array:
         """Largest |F| over a period of the force that springs, dampers and elements pass on to the ground.
@@ -170,7 +171,7 @@ class Reading:
         if self.what in _OF_AN_ELEMENT and len(orbits):
             system = orbits[0].balance.system
             gapped = contacts.gapped_elements(system) if self.what in _OF_A_GAP else None
-            contacts.check_element(system, int(self.number or 0), gapped)
+            check_element(system, int(self.number or 0), gapped)
         values = np.array([kind.read(orbit, dof, self.number or 0.0) for orbit in orbits])
         return _phases(values) if self.what == "phase" else values.astype(float)
 

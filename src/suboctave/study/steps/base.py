@@ -218,18 +218,28 @@ def check_branch(curve: Curve, key: tuple[str | int, ...], around: CheckContext)
     if name not in around.before:
         yield key, f"there is no analysis {name!r} before this one{suggest(name, around.before)}"
         return
-    step = around.before[name]
+    step, place = around.before[name], key[:-1]
+    given = [choice for choice in ("branch", "label", "isola", "at") if getattr(curve, choice) is not None]
+    wrong, why = ("isola", "at"), "looks for no isolas"
     if step.gives_isolas:
-        yield from _check_isola(curve, key)
-        return
-    for given in ("isola", "at"):
-        if getattr(curve, given) is not None:
-            yield (*key[:-1], given), f"the analysis {name!r} looks for no isolas: leave {given} out"
-    choice = curve.branch is not None, curve.label is not None
-    if step.gives_diagram:
-        if all(choice):
+        wrong, why = ("branch", "label"), "gives isolas, not a diagram"
+    for choice in given:
+        if choice in wrong:
+            yield (*place, choice), f"the analysis {name!r} {why}: leave {choice} out"
+    own = [choice for choice in given if choice not in wrong]
+    if step.gives_isolas:
+        if curve.isola is None:
+            yield (
+                key,
+                f'the analysis {name!r} gives isolas: say which, and at which value, {{ analysis = "{name}", isola = '
+                "0, at = 0.3 }; without at it is its curve of limit points",
+            )
+        elif curve.at is not None and getattr(curve, "bifurcation", None) in _ENDS:
+            yield (*place, "at"), "an end of an isola has a value of its own: leave at out"
+    elif step.gives_diagram:
+        if len(own) == 2:
             yield key, "choose a branch of the diagram by its number or by its label, not by both"
-        elif not any(choice):
+        elif not own:
             yield (
                 key,
                 f"the analysis {name!r} gives a diagram: say which of its branches, "
@@ -237,24 +247,8 @@ def check_branch(curve: Curve, key: tuple[str | int, ...], around: CheckContext)
             )
     elif not step.gives_branch:
         yield key, f"the analysis {name!r} gives no branch to start from"
-    elif any(choice):
-        given = "branch" if choice[0] else "label"
-        yield (*key[:-1], given), f"the analysis {name!r} gives one branch, not a diagram: leave {given} out"
-
-
-def _check_isola(curve: Curve, key: tuple[str | int, ...]) -> Iterator[Complaint]:
-    name = curve.analysis
-    for given in ("branch", "label"):
-        if getattr(curve, given) is not None:
-            yield (*key[:-1], given), f"the analysis {name!r} gives isolas, not a diagram: leave {given} out"
-    if curve.isola is None:
-        yield (
-            key,
-            f'the analysis {name!r} gives isolas: say which, and at which value, {{ analysis = "{name}", isola = 0, '
-            "at = 0.3 }; without at it is its curve of limit points",
-        )
-    elif curve.at is not None and getattr(curve, "bifurcation", None) in _ENDS:
-        yield (*key[:-1], "at"), "an end of an isola has a value of its own: leave at out"
+    elif own:
+        yield (*place, own[0]), f"the analysis {name!r} gives one branch, not a diagram: leave {own[0]} out"
 
 
 def _isola(curve: Curve, isolas: Isolas) -> Isola:
