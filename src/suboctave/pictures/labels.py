@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.transforms import Bbox
 
-
-Box: TypeAlias = "tuple[float, float, float, float]"
 
 #: where a legend is tried inside a frame
 _PLACES: tuple[Any, ...] = ("upper left", "upper right", "center left", "center right", "lower left", "lower right")
@@ -92,7 +90,7 @@ def _is_free(figure: Figure, axes: Axes, legend: Legend, pixels: np.ndarray) -> 
     frame = axes.get_window_extent()
     if box.x0 < frame.x0 - 1 or box.x1 > frame.x1 + 1 + 2 * style.MARKER_SIZE or box.height > 0.7 * frame.height:
         return False
-    return not _covered(_corners(box), pixels)
+    return not box.count_contains(pixels)
 
 
 def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str], look: style.Look) -> None:
@@ -105,9 +103,9 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
     points = axes.transData.transform(np.asarray(places, dtype=float))
     pixels = _pixels(axes)
     unit, window = figure.dpi / 72.0, axes.get_window_extent()
-    frame, within = _corners(window), _corners(window.padded(-_TICKS * unit))
+    within = window.padded(-_TICKS * unit)
     legend = axes.get_legend()
-    boxes = [] if legend is None else [_corners(legend.get_window_extent())]
+    boxes = [] if legend is None else [legend.get_window_extent()]
     gap, clear = 0.75 * style.MARKER_SIZE * look.marker, _CLEAR * unit
     done: list[tuple[str, np.ndarray]] = []
     for text, point in zip(texts, points, strict=True):
@@ -121,9 +119,8 @@ def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str
         for distance, (rank, side) in product(_DISTANCES, enumerate(_SIDES)):
             reach = distance * gap
             box = _beside(point, side, size.width, size.height, reach * unit)
-            wide = box[0] - clear, box[1] - clear, box[2] + clear, box[3] + clear
-            cost = 2.0 * _covered(box, pixels) + 400.0 * sum(_overlap(wide, other) for other in boxes)
-            cost += 400.0 * _leaves(box, frame) + 25.0 * _leaves(box, within) + 0.1 * rank + 5.0 * (distance - 1.0)
+            cost = 2.0 * box.count_contains(pixels) + 400.0 * box.padded(clear).count_overlaps(boxes)
+            cost += 400.0 * _leaves(box, window) + 25.0 * _leaves(box, within) + 0.1 * rank + 5.0 * (distance - 1.0)
             if best is None or cost < best[0]:
                 best = (cost, side, reach)
         assert best is not None
@@ -149,16 +146,14 @@ def _offset(side: tuple[int, int], gap: float) -> tuple[float, float]:
     return side[0] * gap * share, side[1] * gap * share
 
 
-def _beside(point: np.ndarray, side: tuple[int, int], width: float, height: float, gap: float) -> Box:
-    """The box (x0, y0, x1, y1) of a text on one side of a point."""
+def _beside(point: np.ndarray, side: tuple[int, int], width: float, height: float, gap: float) -> Bbox:
+    """The box of a text on one side of a point."""
+    from matplotlib.transforms import Bbox
+
     across, up = _offset(side, gap)
     x = point[0] + across - (0.5, 0.0, 1.0)[side[0]] * width
     y = point[1] + up - (0.5, 0.0, 1.0)[side[1]] * height
-    return x, y, x + width, y + height
-
-
-def _corners(box: Bbox) -> Box:
-    return box.x0, box.y0, box.x1, box.y1
+    return Bbox.from_bounds(x, y, width, height)
 
 
 def _pixels(axes: Axes) -> np.ndarray:
@@ -179,15 +174,5 @@ def _pixels(axes: Axes) -> np.ndarray:
     return np.concatenate(pixels)
 
 
-def _covered(box: Box, pixels: np.ndarray) -> int:
-    """How many of the pixels are inside a box."""
-    x, y = pixels.T
-    return int(np.count_nonzero((x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])))
-
-
-def _overlap(one: Box, other: Box) -> bool:
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
-
-
-def _leaves(box: Box, frame: Box) -> bool:
-    return box[0] < frame[0] or box[1] < frame[1] or box[2] > frame[2] or box[3] > frame[3]
+def _leaves(box: Bbox, frame: Bbox) -> bool:
+    return not (frame.contains(*box.min) and frame.contains(*box.max))

@@ -37,6 +37,7 @@ from suboctave.pictures.strokes import bent
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Bbox
 
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -317,26 +318,22 @@ def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) 
         axes.set_position((*corner, 1.0, top))
         axes.set_box_aspect(_ASPECT, zoom=zoom)
         figure.draw_without_rendering()
-        low, high = _corners(figure, axes)
-        corner = corner + (0.5 * (room - low - high)) / figure.bbox.size
-        zoom *= float(np.clip((0.97 * room / (high - low)).min(), 0.5, 1.5))
+        drawn = _extent(figure, axes)
+        corner = corner + (0.5 * (room - drawn.min - drawn.max)) / figure.bbox.size
+        zoom *= float(np.clip((0.97 * room / drawn.size).min(), 0.5, 1.5))
     axes.set_position((*corner, 1.0, top))
 
 
-def _corners(figure: Figure, axes: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The lower left and the upper right corner of the frame with its labels, pixels."""
+def _extent(figure: Figure, axes: Any) -> Bbox:
+    """The box of the frame with its labels, pixels."""
+    from matplotlib.transforms import Bbox
     from mpl_toolkits.mplot3d import proj3d
 
-    limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
-    cube = np.array(list(product(*limits))).T
-    flat = np.array(proj3d.proj_transform(*cube, axes.get_proj())[:2]).T
-    corners = [axes.transData.transform(flat)]
+    cube = np.array(list(product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))).T
+    flat = axes.transData.transform(np.array(proj3d.proj_transform(*cube, axes.get_proj())[:2]).T)
     canvas: Any = figure.canvas
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        box = axis.get_tightbbox(canvas.get_renderer())
-        corners.append(np.array([[box.x0, box.y0], [box.x1, box.y1]]))
-    every = np.concatenate(corners)
-    return every.min(axis=0), every.max(axis=0)
+    labels = [axis.get_tightbbox(canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    return Bbox.union([Bbox([flat.min(axis=0), flat.max(axis=0)]), *labels])
 
 
 # --------------------------------------------------------------------------------------------------------------- saving
