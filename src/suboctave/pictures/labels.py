@@ -33,12 +33,12 @@ def place_legend(
 ) -> None:
     """Put the legend, names with their handles, into the first of `frames` that has room for it, else above them all.
 
-    Where it stands above, `grow` adds its height to the figure's.
+    Where it stands above, `grow` adds its height to the figure's. Everything on the figure has its place then.
     """
+    arrange(figure)  # a legend inside one of the frames moves nothing
     if not entries:
         return
     drawing = _frame_of(look, tight=grow)
-    arrange(figure)  # a legend inside one of the frames moves nothing
     for axes in frames:
         pixels = _pixels(axes)
         legend = axes.legend(list(entries.values()), list(entries), **drawing)
@@ -54,6 +54,7 @@ def place_legend(
     legend = fitting_legend(figure, entries, look, tight=grow, loc="outside upper center")
     if grow:
         figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
+        arrange(figure)
 
 
 def arrange(figure: Figure) -> None:

@@ -93,8 +93,7 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
     _set_axis("y", frames[0], upwards)
     if drawing.title:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK)
-    _place(figure, frames, drawing, sheet)
-    arrange(figure)  # the frames have their places: what is spaced on paper comes now
+    _place(figure, frames, drawing, sheet)  # the frames have their places: what is spaced on paper comes now
     for axes, frame in zip(frames, drawing.frames, strict=True):
         _add_spaced(axes, frame, look)
         known = [label for label in frame.labels if np.isfinite(label.at).all()]
