@@ -131,11 +131,9 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    check_time()
     u = guess.copy()
     last: Evaluation | None = None
-    way = before = contraction = first = 0.0
-    previous = np.inf
+    way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
     factor = known
     nearest: Solved | None = None
     for iteration in range(options.iterations + 1):
@@ -162,11 +160,7 @@ def correct(
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         before = error
-        rhs = evaluation.residual
-        if row is not None:
-            rhs = np.empty(len(u))
-            rhs[:-1], rhs[-1] = evaluation.residual, row.dot(weights * (u - guess))
-        step = factor.solve(rhs)
+        step = factor.solve(_right_side(evaluation, row, weights * (u - guess)))
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
             nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
@@ -177,19 +171,27 @@ def correct(
             first = size
         else:
             rate, contraction = contraction, size / previous if previous > 0.0 else 0.0
+            lost = (contraction > 2.0 and size > first) or min(rate, contraction) > STALLED
             if row is None:
                 lost = _leads_away(iteration, size, contraction, previous)
-            else:
-                lost = (contraction > 2.0 and size > first) or min(rate, contraction) > STALLED
             if lost and not options.damped and nearest is None:
                 break
-        previous = size if share == 1.0 else np.inf
+        previous = size if share == 1.0 else math.inf
     if nearest is not None:
         return nearest
     raise ConvergenceError(
         f"Newton's method did not converge near {curve.where(guess)} "
         f"(residual {error:.1e} after {iteration} iterations)"
     )
+
+
+def _right_side(evaluation: Evaluation, row: Array | None, away: Array) -> Array:
+    """What a correction is solved for, `away` from the guess in scaled variables."""
+    if row is None:
+        return evaluation.residual
+    rhs = np.empty(len(away))
+    rhs[:-1], rhs[-1] = evaluation.residual, row.dot(away)
+    return rhs
 
 
 def _leads_away(iteration: int, size: float, contraction: float, previous: float) -> bool:
