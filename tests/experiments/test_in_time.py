@@ -202,6 +202,13 @@ def test_pictures_show_every_period(oscillator, tmp_path):
     figure = diagram.plot(tmp_path / "over.png", curves=curve)
     drawn = {line.get_gid() for line in figure.axes[0].lines}
     assert any("T" in str(gid) for gid in drawn)
+    # bifurcations beyond the range would hang outside the frame, and squeeze it
+    wide = so.frequency_response(oscillator, omega=(4.2, 1.3), harmonics=9)
+    assert any(not 2.0 <= item.omega <= 2.4 for item in wide.bifurcations)
+    axes = diagram.plot(curves=wide).axes[0]
+    low, high = axes.get_xlim()
+    marked = [line.get_xdata() for line in axes.lines if line.get_linestyle() == "None"]
+    assert all(low <= x <= high for places in marked for x in places)
     assert (tmp_path / "over.png").stat().st_size > 1000
     sections = diagram.plot(quantity="section", starts=["up"])
     shown = sum(len(line.get_xdata()) for line in sections.axes[0].lines)

@@ -124,7 +124,10 @@ def plot_brute_force(
             raise InputError(f"there is no start {name!r}{suggest(str(name), known)}")
     dof = checked_dof(diagram, dof)
     varied = str(diagram.attrs["varied"])
-    frame, entries = _beneath(curves, varied, View())
+    values = diagram["value"].to_numpy()
+    margin = _MARGIN * (np.ptp(values) or abs(values[0]) or 1.0)
+    low, high = float(values.min() - margin), float(values.max() + margin)
+    frame, entries = _beneath(curves, varied, View(xlim=(low, high)))
     marks: dict[str, Entry] = {}
     for start in shown:
         marks |= _add_motions(frame, diagram.isel(start=known.index(start)), start, dof, quantity == "section")
@@ -132,9 +135,7 @@ def plot_brute_force(
     entries |= {f"{name}, in time" if curves is not None else name: mark for name, mark in marks.items()}
     symbol = symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
-    values = diagram["value"].to_numpy()
-    margin = _MARGIN * (np.ptp(values) or abs(values[0]) or 1.0)
-    across = Axis(r"$\omega$" if varied == "omega" else plain(varied), values[0] - margin, values[-1] + margin)
+    across = Axis(r"$\omega$" if varied == "omega" else plain(varied), low, high)
     frame.title = style.checked_text(title)
     return figure_of(Drawing((across, Axis(upwards)), [frame], ordered(entries)), style.sheet_of(size), path)
 
@@ -176,8 +177,12 @@ def plot_stepped_sine(
     listed = _measured(measured, harmonic)
     limits = View(xlim=xlim, ylim=ylim)
     values = _component(test, harmonic, dof)
-    frame, entries = _beneath(curves, "omega", View("harmonic", harmonic, None, dof))
     omega, periods = test["omega"].to_numpy(), test["period"].to_numpy()
+    every = np.concatenate([omega, *(one.omega for one in listed)])
+    margin = _MARGIN * (np.ptp(every) or abs(every[0]))
+    low, high = limits.xlim or (float(every.min() - margin), float(every.max() + margin))
+    shown = View("harmonic", harmonic, None, dof, xlim=(low, high), ylim=limits.ylim)
+    frame, entries = _beneath(curves, "omega", shown)
     for s, direction in enumerate(test["direction"].to_numpy()):
         for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
             here = periods[s] == period
@@ -192,9 +197,6 @@ def plot_stepped_sine(
         frame.items.append(Markers(at, mark, cut=True, role="measured", layer=4.2))
         entries[plain(one.label)] = Entry(mark=mark)
     symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
-    every = np.concatenate([omega, *(one.omega for one in listed)])
-    margin = _MARGIN * (np.ptp(every) or abs(every[0]))
-    low, high = limits.xlim or (every.min() - margin, every.max() + margin)
     axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", *(limits.ylim or (0.0, None)))
     frame.title = style.checked_text(title)
     return figure_of(Drawing(axes, [frame], ordered(entries)), style.sheet_of(size), path)
