@@ -11,6 +11,7 @@ from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import between, make_point, point_between, solve_at
+from suboctave.curves.events.finder import position
 from suboctave.errors import ConvergenceError, InputError
 
 NEWTON = NewtonOptions()
@@ -380,3 +381,14 @@ def test_a_bound_that_is_passed_and_passed_back_within_a_step(max_step, start):
     assert u[-1, 1] == 1.0 - 2e-4
     assert u[-1, 0] == pytest.approx(math.sqrt(1.0 - (1.0 - 2e-4) ** 2), abs=1e-9)
     assert u[:, 1].max() == 1.0 - 2e-4
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_point_far_beside_a_step_lies_on_no_part_of_it():
+    """The cubic between two neighbours runs away outside of them: searching along it would leave the numbers."""
+    curve = circle()
+    a, b = (start(curve, math.cos(angle), math.sin(angle)) for angle in (0.2, 0.3))
+    assert position(a, b, np.array([math.cos(0.23), math.sin(0.23)])) == pytest.approx(0.3, abs=1e-3)
+    for distance in (2.0, 1e3, 1e6):
+        assert position(a, b, np.array([1.0, distance])) is None
+        assert position(a, b, np.array([1.0, -distance])) is None
