@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from suboctave.compiled import kernel
-
 Array = NDArray[np.float64]
 
 
@@ -87,7 +85,8 @@ class Factor:
         """Sign of the determinant of a real matrix; 0 if singular."""
         if self.singular:
             return 0.0
-        return float(_determinant_sign(self.lu, self.pivots))
+        swaps = np.count_nonzero(self.pivots != np.arange(len(self.pivots)))
+        return -1.0 if (swaps + np.count_nonzero(self.lu.diagonal() < 0.0)) % 2 else 1.0
 
     @property
     def log_determinant(self) -> float:
@@ -134,32 +133,10 @@ def bordered(matrix: NDArray[Any], scale: Array, columns: Array, border: NDArray
     """LU factors of `[S A C, border; row]`, S and C the diagonal matrices of `scale` and `columns`; the border has as
     many columns (m, k) as the matrix lacks.
     """
-    return Factor.of(_bordered_transposed(matrix, scale, columns, border, row).T, overwrite=True)
-
-
-@kernel()
-def _bordered_transposed(matrix, scale, columns, border, row):
-    """The transpose, so that its own lies in memory as LAPACK wants it."""
     m, n = matrix.shape
-    more = border.shape[1]
-    out = np.empty((n + more, m + 1), dtype=matrix.dtype)
-    for j in range(n):
-        for i in range(m):
-            out[j, i] = matrix[i, j] * (scale[i] * columns[j])
-    for j in range(more):
-        for i in range(m):
-            out[n + j, i] = border[i, j]
-    out[:, m] = row
-    return out
-
-
-@kernel()
-def _determinant_sign(lu, pivots):
-    """Sign of the determinant of a factorised matrix (`lapack.dgetrf`, pivots counted from 0)."""
-    sign = 1.0
-    for i in range(pivots.shape[0]):
-        if pivots[i] != i:
-            sign = -sign
-        if lu[i, i] < 0.0:
-            sign = -sign
-    return sign
+    # as LAPACK wants it in memory, so that no copy is made
+    out = np.empty((m + 1, n + border.shape[1]), dtype=matrix.dtype, order="F")
+    np.multiply(matrix, np.multiply.outer(scale, columns), out=out[:m, :n])
+    out[:m, n:] = border
+    out[m] = row
+    return Factor.of(out, overwrite=True)
