@@ -98,7 +98,8 @@ class Linearised:
             for g, points, widths in laws.singularities
         ]
         passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
-        self.events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
+        events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
+        self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
         parts, total = self._evaluated(panels)
         while len(panels) < total <= _MOST:

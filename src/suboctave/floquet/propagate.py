@@ -85,7 +85,10 @@ def structure(spans, stiffness, damping, left, right):
         once = INTEGRATION * spans[p]
         rate = ADJOINT * spans[p]
         twice = once @ rate
-        time = once.sum(axis=1)
+        time = np.zeros(m)
+        for j in range(m):
+            for l in range(m):
+                time[j] += once[j, l]
         # unknowns are the accelerations, mode by mode
         a = np.eye(n * m)
         b = np.zeros((n * m, columns))
@@ -270,7 +273,7 @@ def response(start, nodes, active, path, largest):
 
 @kernel()
 def multipliers_and_shifts(real, imaginary, left, right, phi, before):
-    """Eigenvalues of phi (N, N) by descending modulus, and how far each may have moved from those of `before`, and by
+    """Eigenvalues of phi (N, N), and how far each may have moved from those of `before`, and by
     rounding of the entries; both (N,).
 
     real, imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
@@ -306,5 +309,4 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before):
             by_rounding += abs(u[i]) * rounded
         first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
         moved[j] = min(first, most) + 1e-14
-    order = np.argsort(-np.abs(mu), kind="mergesort")
-    return mu[order], moved[order]
+    return mu, moved

@@ -16,8 +16,8 @@ import numpy as np
 from suboctave.compiled import kernel
 from suboctave.harmonic.aft.polynomial import add_values
 from suboctave.harmonic.aft.steps import add_step
-from suboctave.harmonic.basis import Array
-from suboctave.harmonic.trigonometric import crossings_of, displacement, jet, motion, slope
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.trigonometric import crossings_of, displacement, jet
 
 #: nodes per panel, both ends among them: quadrature of order 12
 ORDER = 7
@@ -69,7 +69,7 @@ LOWER = _lower()
 
 @kernel()
 def events_along(c, pieces, owner, passages, zr, zi):
-    """What happens along a motion, ascending in tau: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
+    """What happens along a motion, in any order: rows (tau, depth, du/dtau, d2u/dtau2, miss, piece).
 
     A crossing of the gap of a piece has infinite depth; an extremum that falls short of it has the distance `miss`. A
     passage of a sharp law has the distance of its complex singularity for depth, and -1 for piece.
@@ -83,13 +83,16 @@ def events_along(c, pieces, owner, passages, zr, zi):
     count = 0
     last = -1
     size = 0.0
-    values = np.empty((2, 0))
+    values = np.empty((2, n))
     for q in range(pieces.shape[0]):
         g = owner[q]
         gap = pieces[q, 1]
         if g != last:
-            values = motion(c[g], zr, zi)
-            size = values[0].max() - values[0].min()
+            displacement(c[g], zr, zi, values)
+            low = high = values[0, 0]
+            for j in range(n):
+                low, high = min(low, values[0, j]), max(high, values[0, j])
+            size = high - low
             last = g
         at, _above = crossings_of(c[g], gap, values)
         for tau in at:
@@ -119,7 +122,7 @@ def events_along(c, pieces, owner, passages, zr, zi):
     for i in range(passages.shape[1]):
         rows[count] = np.array((passages[0, i], passages[1, i], 0.0, 0.0, 0.0, -1.0))
         count += 1
-    return rows[np.argsort(rows[:count, 0], kind="mergesort")]
+    return rows[:count]
 
 
 @kernel()
@@ -203,16 +206,11 @@ def split(panels: Array, start: np.ndarray, parts: np.ndarray) -> tuple[Array, n
     return rows, (ends - parts)[start]
 
 
-@kernel()
-def longest_panel(c, degree):
+def longest_panel(c: ComplexArray, degree: int) -> float:
     """Longest panel in tau for a tangent that is a polynomial of this degree in the motion c (G, H + 1)."""
-    top = 1
-    for g in range(c.shape[0]):
-        size = np.abs(c[g])
-        for k in range(c.shape[1] - 1, top, -1):
-            if size[k] > _RELEVANT * size.max():
-                top = k
-                break
+    size = np.abs(c)
+    relevant = (size > _RELEVANT * size.max(axis=1, keepdims=True)).any(axis=0)
+    top = int(np.flatnonzero(relevant).max(initial=1))
     # quarters of a period at most: the least that a polynomial of degree six follows
     return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
 
@@ -258,9 +256,10 @@ def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step
     for g in range(groups):
         for k in range(c.shape[1]):
             within[k] = (-2.0 if k > 0 else -1.0) * forces[g, k]
-        displacement(c[g], cos, sin, path[g, 0])
-        displacement(slope(c[g], rate), cos, sin, path[g, 1])
-        displacement(within, cos, sin, law[g, 0])
+        displacement(c[g], cos, sin, path[g])
+        displacement(within, cos, sin, law[g, :1])
+        for j in range(total):
+            path[g, 1, j] *= rate
         add_values(polynomial[g], path[g, 0], law[g, 0], law[g, 1])
         for j in range(total):
             law[g, 0, j] += line[g, 0] + line[g, 1] * path[g, 0, j]

@@ -26,7 +26,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.trigonometric import FAST, displacement, jet, motion, slope
+from suboctave.harmonic.trigonometric import FAST, displacement, jet
 
 #: fewest and most uniform samples per period of laws of unknown smoothness
 FEWEST, MOST = 32, 1 << 15
@@ -167,10 +167,10 @@ def singular_instants(c, points, widths, reach, zr, zi):
     cell = 2.0 * math.pi / n
     instants = np.empty((2, 8 * n))
     count = 0
-    values, bends = motion(c, zr, zi), np.empty(n)
-    displacement(slope(slope(c, 1.0), 1.0), zr, zi, bends)
+    values = np.empty((3, n))
+    displacement(c, zr, zi, values)
     for j in range(n):
-        x, d, s = values[0, j], values[1, j], bends[j]
+        x, d, s = values[0, j], values[1, j], values[2, j]
         most = abs(d) * 1.5 * reach + abs(s) * reach * reach
         for m in range(points.shape[0]):
             if abs(x - points[m]) > most + abs(d) * cell + widths[m]:
@@ -347,7 +347,5 @@ def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
     # one array, since handing arrays over costs more than filling them
     out = np.empty((5 if moving else 4, count))
     out[0], out[1], out[2] = out_r[:count], out_i[:count], w[:count]
-    displacement(c, out[0], out[1], out[3])
-    if moving:
-        displacement(slope(c, 1.0), out[0], out[1], out[4])
+    displacement(c, out[0], out[1], out[3:])
     return out

@@ -21,58 +21,50 @@ _STRETCH = 256
 
 
 @kernel(fastmath=FAST)
-def _horner(c, co, si, x, y):
-    """`sum_k c_k z^k` at the points z into x + i y, but for the last step where the number of harmonics is odd.
-
-    Returns 1 if that step, `z (x + i y) + c_0`, is left to the caller, who may need its real part only; else 0.
-    """
-    top = c.shape[0] - 1
-    a, b = c[top].real, c[top].imag
-    for j in range(x.shape[0]):
-        x[j] = a
-        y[j] = b
-    # two harmonics at a time: what is between them stays in registers
-    k = top - 1
-    while k > 0:
-        a, b, d, e = c[k].real, c[k].imag, c[k - 1].real, c[k - 1].imag
-        for j in range(x.shape[0]):
-            t = x[j] * co[j] - y[j] * si[j] + a
-            u = x[j] * si[j] + y[j] * co[j] + b
-            x[j] = t * co[j] - u * si[j] + d
-            y[j] = t * si[j] + u * co[j] + e
-        k -= 2
-    return k + 1
-
-
-@kernel(fastmath=FAST)
 def displacement(c, zr, zi, out):
-    """Values of `Re sum_k c_k z^k` at the points z, into `out` (N,)."""
-    imaginary = np.empty(_STRETCH)
-    for begin in range(0, zr.shape[0], _STRETCH):
-        x, co, si = out[begin : begin + _STRETCH], zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH]
-        y = imaginary[: x.shape[0]]
-        if _horner(c, co, si, x, y) == 1:
-            a = c[0].real
+    """`Re sum_k c_k z^k` and its first derivatives by tau at the points z, into the rows of `out` (D, N)."""
+    factors, imaginary = c.copy(), np.empty(_STRETCH)
+    top = c.shape[0] - 1
+    for order in range(out.shape[0]):
+        for begin in range(0, zr.shape[0], _STRETCH):
+            end = begin + _STRETCH
+            x, co, si = out[order, begin:end], zr[begin:end], zi[begin:end]
+            y = imaginary[: x.shape[0]]
+            a, b = factors[top].real, factors[top].imag
             for j in range(x.shape[0]):
-                x[j] = x[j] * co[j] - y[j] * si[j] + a
+                x[j] = a
+                y[j] = b
+            # two harmonics at a time: what is between them stays in registers
+            for k in range(top - 1, 0, -2):
+                a, b, d, e = factors[k].real, factors[k].imag, factors[k - 1].real, factors[k - 1].imag
+                for j in range(x.shape[0]):
+                    t = x[j] * co[j] - y[j] * si[j] + a
+                    u = x[j] * si[j] + y[j] * co[j] + b
+                    x[j] = t * co[j] - u * si[j] + d
+                    y[j] = t * si[j] + u * co[j] + e
+            if top % 2 == 1:
+                a = factors[0].real
+                for j in range(x.shape[0]):
+                    x[j] = x[j] * co[j] - y[j] * si[j] + a
+        for k in range(top + 1):
+            factors[k] = complex(-k * factors[k].imag, k * factors[k].real)
 
 
-@kernel()
-def slope(c, factor):
-    """Complex coefficients `factor i k c_k` of the derivative with respect to tau, times a factor."""
-    out = np.empty_like(c)
-    for k in range(c.shape[0]):
-        out[k] = complex(-factor * k * c[k].imag, factor * k * c[k].real)
-    return out
-
-
-@kernel()
-def motion(c, zr, zi):
+def motion(c: ComplexArray, zr: Array, zi: Array) -> Array:
     """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
-    out = np.empty((2, zr.shape[0]))
-    displacement(c, zr, zi, out[0])
-    displacement(slope(c, 1.0), zr, zi, out[1])
+    out = np.empty((2, len(zr)))
+    displacement(c, zr, zi, out)
     return out
+
+
+def wave_sums(coefficients: ComplexArray, zr: Array, zi: Array) -> ComplexArray:
+    """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
+    parts = np.empty((len(coefficients), 2, 1, len(zr)))
+    for c, (real, imaginary) in zip(coefficients, parts, strict=True):
+        displacement(c, zr, zi, real)
+        displacement(-1j * c, zr, zi, imaginary)
+    sums: ComplexArray = parts[:, 0, 0] + 1j * parts[:, 1, 0]
+    return sums
 
 
 @kernel(fastmath=FAST)
@@ -122,27 +114,6 @@ def spectra(values, weights, zr, zi, top):
                     out[r, q + 1] += complex(hr, -hi)
                     if s > r:
                         out[s, q + 1] += complex(kr, -ki)
-    return out
-
-
-@kernel(fastmath=FAST)
-def wave_sums(coefficients, zr, zi):
-    """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
-    rows, n = coefficients.shape[0], zr.shape[0]
-    out = np.empty((rows, n), dtype=np.complex128)
-    real, imaginary = np.empty(_STRETCH), np.empty(_STRETCH)
-    for r in range(rows):
-        c = coefficients[r]
-        for begin in range(0, n, _STRETCH):
-            co, si, sums = zr[begin : begin + _STRETCH], zi[begin : begin + _STRETCH], out[r, begin : begin + _STRETCH]
-            x, y = real[: co.shape[0]], imaginary[: co.shape[0]]
-            if _horner(c, co, si, x, y) == 1:
-                a, b = c[0].real, c[0].imag
-                for j in range(x.shape[0]):
-                    sums[j] = complex(x[j] * co[j] - y[j] * si[j] + a, x[j] * si[j] + y[j] * co[j] + b)
-            else:
-                for j in range(x.shape[0]):
-                    sums[j] = complex(x[j], y[j])
     return out
 
 
@@ -298,29 +269,6 @@ def peak(c: ComplexArray, samples: int) -> tuple[float, float, float]:
 
 
 @kernel()
-def _turn(c, lo, hi, rises, first):
-    """The extremum in (lo, hi), before which the motion rises or falls: tau, value, second derivative."""
-    t = first
-    x = s = 0.0
-    for _ in range(60):
-        x, d, s = jet(c, math.cos(t), math.sin(t))
-        if (d > 0.0) == rises:
-            lo = t
-        else:
-            hi = t
-        new = t - d / s if s != 0.0 else 0.5 * (lo + hi)
-        if not (lo <= new <= hi):
-            new = 0.5 * (lo + hi)
-        # an error e of the instant is one of s e^2 / 2 in the value
-        done = abs(new - t) < 1e-9
-        t = new
-        if done:
-            break
-    # the sign that alternates, where rounding hides it
-    return t, x, -abs(s) if rises else abs(s)
-
-
-@kernel()
 def extrema(c, zr, zi):
     """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative, (3, m); ascending in
     tau.
@@ -330,63 +278,55 @@ def extrema(c, zr, zi):
     """
     n = zr.shape[0]
     h = 2.0 * math.pi / n
-    values = motion(c, zr, zi)
-    turns = np.empty((3, 2 * n))
-    tau, value, curve = turns[0], turns[1], turns[2]
-    count = 0
+    values, turns = np.empty((2, n)), np.empty((3, 2 * n))
+    displacement(c, zr, zi, values)
+    ends, count = np.empty(3), 0
     for j in range(n):
         d0 = values[1, j]
         d1 = values[1, (j + 1) % n]
         lo = j * h
-        hi = lo + h
-        if (d0 > 0.0) != (d1 > 0.0):
-            tau[count], value[count], curve[count] = _turn(c, lo, hi, d0 > 0.0, lo + h * d0 / (d0 - d1))
-            count += 1
-            continue
-        # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
-        mean = (values[0, (j + 1) % n] - values[0, j]) / h
-        a = 3.0 * (d0 + d1 - 2.0 * mean)
-        b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
-        if not (a * d0 > 0.0 and 0.0 < -b / a < 2.0) or abs(d0) - b * b / (4.0 * abs(a)) > 0.5 * min(abs(d0), abs(d1)):
-            continue
-        middle = lo - 0.5 * h * b / a
-        _, d, s = jet(c, math.cos(middle), math.sin(middle))
-        new = middle - 0.5 * h * h * s / a
-        if lo < new < hi:
-            middle = new
+        ends[0], ends[1] = lo, lo + h
+        turning = 1
+        if (d0 > 0.0) == (d1 > 0.0):
+            # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
+            mean = (values[0, (j + 1) % n] - values[0, j]) / h
+            a = 3.0 * (d0 + d1 - 2.0 * mean)
+            b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
+            near = a * d0 > 0.0 and 0.0 < -b / a < 2.0
+            if not near or abs(d0) - b * b / (4.0 * abs(a)) > 0.5 * min(abs(d0), abs(d1)):
+                continue
+            middle = lo - 0.5 * h * b / a
             _, d, s = jet(c, math.cos(middle), math.sin(middle))
-        if d * d0 < 0.0:
-            for first, last, rises in ((lo, middle, d0 > 0.0), (middle, hi, d0 <= 0.0)):
-                tau[count], value[count], curve[count] = _turn(c, first, last, rises, 0.5 * (first + last))
-                count += 1
+            new = middle - 0.5 * h * h * s / a
+            if lo < new < lo + h:
+                middle = new
+                _, d, s = jet(c, math.cos(middle), math.sin(middle))
+            if d * d0 >= 0.0:
+                continue
+            ends[1], ends[2] = middle, lo + h
+            turning = 2
+        for i in range(turning):
+            first, last, rises = ends[i], ends[i + 1], (d0 > 0.0) == (i == 0)
+            t = lo + h * d0 / (d0 - d1) if turning == 1 else 0.5 * (first + last)
+            x = s = 0.0
+            for _ in range(60):
+                x, d, s = jet(c, math.cos(t), math.sin(t))
+                if (d > 0.0) == rises:
+                    first = t
+                else:
+                    last = t
+                new = t - d / s if s != 0.0 else 0.5 * (first + last)
+                if not (first <= new <= last):
+                    new = 0.5 * (first + last)
+                # an error e of the instant is one of s e^2 / 2 in the value
+                done = abs(new - t) < 1e-9
+                t = new
+                if done:
+                    break
+            # the sign that alternates, where rounding hides it
+            turns[0, count], turns[1, count], turns[2, count] = t, x, -abs(s) if rises else abs(s)
+            count += 1
     return turns[:, :count].copy()
-
-
-@kernel()
-def _smoothed(x, wanted):
-    """Indices of `wanted` extrema: neighbouring pairs are dropped, the least different first, ripples that have just
-    come or are about to go.
-    """
-    m = x.shape[0]
-    index = np.empty(m, dtype=np.int64)
-    for i in range(m):
-        index[i] = i
-    while m > wanted:
-        best = 0
-        least = np.inf
-        for i in range(m):
-            difference = abs(x[index[i]] - x[index[(i + 1) % m]])
-            if difference < least:
-                least = difference
-                best = i
-        other = (best + 1) % m
-        kept = 0
-        for i in range(m):
-            if i != best and i != other:
-                index[kept] = index[i]
-                kept += 1
-        m = kept
-    return index
 
 
 @kernel()
@@ -407,8 +347,28 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     count = 0
     if wanted == 0:
         return pairs, count, crossed_a, crossed_b
-    ia = _smoothed(xa, wanted)
-    ib = _smoothed(xb, wanted)
+    kept = np.empty((2, max(xa.shape[0], xb.shape[0])), dtype=np.int64)
+    for side in range(2):
+        # neighbouring pairs are dropped, the least different first: ripples that have just come or are about to go
+        x, index = (xa, kept[0]) if side == 0 else (xb, kept[1])
+        m = x.shape[0]
+        for i in range(m):
+            index[i] = i
+        while m > wanted:
+            best = 0
+            least = np.inf
+            for i in range(m):
+                difference = abs(x[index[i]] - x[index[(i + 1) % m]])
+                if difference < least:
+                    least = difference
+                    best = i
+            other, left = (best + 1) % m, 0
+            for i in range(m):
+                if i != best and i != other:
+                    index[left] = index[i]
+                    left += 1
+            m = left
+    ia, ib = kept[0], kept[1]
     # maxima to maxima
     first = 0 if (sa[ia[0]] < 0.0) == (sb[ib[0]] < 0.0) else 1
     best = first

@@ -16,7 +16,7 @@ from suboctave.compiled import kernel
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import search_grid
-from suboctave.harmonic.trigonometric import FAST, crossings_of, jet, motion, spectra
+from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, motion, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.smoothness import PiecewiseLinear
 
@@ -42,8 +42,7 @@ class Pieces(LawAlong):
     @lazy
     def _corners(self) -> Array:
         grid = search_grid(self.along.high)
-        corners: Array = corner_weights(self.along.motion, self.pieces, grid.zr, grid.zi)
-        return corners
+        return corner_weights(self.along.motion, self.pieces, motion(self.along.motion, grid.zr, grid.zi))
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
@@ -69,7 +68,7 @@ class Pieces(LawAlong):
             tau, above = crossings_of(along.motion, gap, values)
             whole = contact_spectrum(tau, above, piece.side, along.top + along.high)
             chi = whole[: along.top + 1]
-            zr, zi, weights, _, _ = corner_weights(along.motion, np.array([[1.0, gap, 1.0]]), grid.zr, grid.zi)
+            zr, zi, weights, _, _ = corner_weights(along.motion, np.array([[1.0, gap, 1.0]]), values)
             comb = piece.side * c[i] * spectra(np.ones((1, len(zr))), weights, zr, zi, along.top)[0]
             force[i] += product_spectrum(along.motion, gap, whole, along.top)
             force[j] -= c[i] * chi
@@ -90,7 +89,8 @@ class Pieces(LawAlong):
                 rows += [(own[p.stiffness], own[p.gap], p.side, by[p.stiffness], by[p.gap]) for p in member.kind.pieces]
         if rows:
             grid = search_grid(self.along.high)
-            add_changed_pieces(self.along.motion, np.array(rows), grid.zr, grid.zi, out[0], out[1])
+            values = motion(self.along.motion, grid.zr, grid.zi)
+            add_changed_pieces(self.along.motion, np.array(rows), values, out[0], out[1])
 
 
 @kernel()
@@ -175,7 +175,8 @@ def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
     """
     top = force.shape[0] - 1
     high = c.shape[0] - 1
-    values = motion(c, grid_r, grid_i)
+    values = np.empty((2, grid_r.shape[0]))
+    displacement(c, grid_r, grid_i, values)
     slope = np.zeros(top + high + 1, dtype=np.complex128)
     touching = False
     for p in range(pieces.shape[0]):
@@ -196,67 +197,41 @@ def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
             stiffness[q] += slope[q]
 
 
-@kernel()
-def add_changed_pieces(c, pieces, grid_r, grid_i, force, stiffness):
+def add_changed_pieces(
+    c: ComplexArray, pieces: Array, values: Array, force: ComplexArray, stiffness: ComplexArray
+) -> None:
     """Add what changes of piecewise-linear laws do to the spectra of force and stiffness (top + 1,), in place.
 
     c: complex coefficients of the displacement (H + 1,); pieces: stiffness, gap, side, rates of stiffness and gap
-    (P, 5); grid: equidistant points on the circle for the search for crossings.
+    (P, 5); values: see `crossings_of`.
     """
-    top, high = force.shape[0] - 1, c.shape[0] - 1
-    values = motion(c, grid_r, grid_i)
-    largest = 1e-300
-    for h in range(high + 1):
-        largest = max(largest, abs(c[h]))
-    for p in range(pieces.shape[0]):
-        k, gap, side, by_stiffness, by_gap = pieces[p]
+    top, high = len(force) - 1, len(c) - 1
+    for k, gap, side, by_stiffness, by_gap in pieces.tolist():
         crossed, above = crossings_of(c, gap, values)
-        if crossed.shape[0] == 0 and above != (side > 0):
-            continue
         chi = contact_spectrum(crossed, above, side, top + high)
-        for q in range(top + 1):
-            force[q] -= k * by_gap * chi[q]
-            stiffness[q] += by_stiffness * chi[q]
-        if by_stiffness != 0.0:
-            product = product_spectrum(c, gap, chi, top)
-            for q in range(top + 1):
-                force[q] += by_stiffness * product[q]
-        if by_gap == 0.0:
-            continue
-        for i in range(crossed.shape[0]):
-            zr, zi = math.cos(crossed[i]), math.sin(crossed[i])
-            _value, speed, _bend = jet(c, zr, zi)
-            # kept from zero where the motion grazes: the derivative does not exist there
-            weight = side * k * by_gap / (2.0 * math.pi * max(abs(speed), 1e-12 * largest))
-            pr, pi = weight, 0.0
-            for q in range(top + 1):
-                stiffness[q] -= complex(pr, pi)
-                pr, pi = pr * zr + pi * zi, pi * zr - pr * zi
+        force += by_stiffness * product_spectrum(c, gap, chi, top) - k * by_gap * chi[: top + 1]
+        stiffness += by_stiffness * chi[: top + 1]
+        if by_gap != 0.0:
+            weights = side * k * by_gap / (2.0 * math.pi * np.abs(_rates(c, crossed)[0]))
+            stiffness -= weights @ np.exp(-1j * np.multiply.outer(crossed, np.arange(top + 1)))
 
 
-@kernel()
-def corner_weights(c, pieces, grid_r, grid_i):
+def corner_weights(c: ComplexArray, pieces: Array, values: Array) -> Array:
     """Instants at which the gaps of piecewise-linear pieces (stiffness, gap, side) are crossed: cosines, sines, and the
-    weights there, (5, N); `f_uu` has `side stiffness / |u'|`, |u'| kept from zero where the motion grazes.
+    weights there, (5, N); `f_uu` has `side stiffness / |u'|`.
     """
-    values = motion(c, grid_r, grid_i)
-    largest = 1e-300
-    for h in range(c.shape[0]):
-        largest = max(largest, abs(c[h]))
-    out = np.empty((5, 4 * grid_r.shape[0] * max(1, pieces.shape[0])))
-    count = 0
-    for p in range(pieces.shape[0]):
-        crossed, _above = crossings_of(c, pieces[p, 1], values)
-        for i in range(crossed.shape[0]):
-            zr, zi = math.cos(crossed[i]), math.sin(crossed[i])
-            _value, speed, bend = jet(c, zr, zi)
-            if abs(speed) < 1e-12 * largest:
-                speed = 1e-12 * largest
-            weight = pieces[p, 2] * pieces[p, 0] / abs(speed)
-            out[0, count] = zr
-            out[1, count] = zi
-            out[2, count] = weight
-            out[3, count] = weight * bend / (speed * speed)
-            out[4, count] = -weight / speed
-            count += 1
-    return np.ascontiguousarray(out[:, :count])
+    corners = []
+    for k, gap, side in pieces.tolist():
+        tau, _ = crossings_of(c, gap, values)
+        speed, bend = _rates(c, tau)
+        weight = side * k / np.abs(speed)
+        corners.append((np.cos(tau), np.sin(tau), weight, weight * bend / speed**2, -weight / speed))
+    return np.concatenate(corners, axis=1)
+
+
+def _rates(c: ComplexArray, tau: Array) -> tuple[Array, Array]:
+    """First and second derivative of the motion, the first kept from zero where the motion grazes."""
+    k = np.arange(len(c))
+    waves = c * np.exp(1j * np.multiply.outer(tau, k))
+    speed, least = -(waves.imag @ k), max(1e-12 * float(np.abs(c).max()), 1e-300)
+    return np.where(np.abs(speed) < least, np.copysign(least, speed), speed), -(waves.real @ (k * k))

@@ -81,9 +81,9 @@ def add_values(coefficients, u, force, stiffness):
 @kernel()
 def add_polynomial(c, coefficients, weights, zr, zi, force, stiffness):
     """Add the Fourier coefficients of a polynomial of the motion and of its slope to force and stiffness (top + 1,)."""
-    values, u = np.zeros((2, zr.shape[0])), np.empty(zr.shape[0])
+    values, u = np.zeros((2, zr.shape[0])), np.empty((1, zr.shape[0]))
     displacement(c, zr, zi, u)
-    add_values(coefficients, u, values[0], values[1])
+    add_values(coefficients, u[0], values[0], values[1])
     sums = spectra(values, weights, zr, zi, force.shape[0] - 1)
     for q in range(force.shape[0]):
         force[q] += sums[0, q]

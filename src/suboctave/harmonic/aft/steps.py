@@ -152,37 +152,25 @@ def add_step(u, point, width, factor, force, stiffness):
         force[j] -= 0.5 * factor * width * math.log(1.0 + ratio * ratio)
 
 
-@kernel()
-def stepped(u, steps, line):
+def stepped(u: Array, steps: Array, line: Array) -> Array:
     """Force and stiffness (2, N) of arctan steps (place, width, size), (S, 3), with `line` their constant and slope."""
-    out = np.empty((2, u.shape[0]))
-    for j in range(u.shape[0]):
-        out[0, j] = line[0] + line[1] * u[j]
-        out[1, j] = line[1]
-    for s in range(steps.shape[0]):
-        add_step(u, steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, out[0], out[1])
+    out = np.empty((2, len(u)))
+    out[0], out[1] = line[0] + line[1] * u, line[1]
+    for place, width, size in steps.tolist():
+        add_step(u, place, width, size / math.pi, out[0], out[1])
     return out
 
 
-@kernel(error_model="numpy")
-def changed_steps(u, steps, line):
+def changed_steps(u: Array, steps: Array, line: Array) -> Array:
     """Changes of force and stiffness (2, N) of arctan steps with the rates of their numbers, (S, 6); `line`: rates of
     constant and slope.
     """
-    out = stepped(u, steps[:0], line)
-    for s in range(steps.shape[0]):
-        place, width, size, by_place, by_width, by_size = steps[s]
+    out = stepped(u, steps[:0, :3], line)
+    for place, width, size, by_place, by_width, by_size in steps.tolist():
         if by_size != 0.0:
             add_step(u, place, width, by_size / math.pi, out[0], out[1])
-        if by_place == 0.0 and by_width == 0.0:
-            continue
-        factor, sharpness = size / math.pi, 1.0 / width
-        for j in range(u.shape[0]):
-            ratio = (u[j] - place) * sharpness
-            out[0, j] -= factor * by_place * arctangent(ratio)
-            out[1, j] -= factor * sharpness * (by_place + by_width * ratio) / (1.0 + ratio * ratio)
-        if by_width != 0.0:
-            for j in range(u.shape[0]):
-                ratio = (u[j] - place) * sharpness
-                out[0, j] -= 0.5 * factor * by_width * math.log1p(ratio * ratio)
+        if by_place != 0.0 or by_width != 0.0:
+            ratio, factor = (u - place) / width, size / math.pi
+            out[0] -= factor * (by_place * np.arctan(ratio) + 0.5 * by_width * np.log1p(ratio * ratio))
+            out[1] -= factor / width * (by_place + by_width * ratio) / (1.0 + ratio * ratio)
     return out

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import NamedTuple
@@ -10,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.compiled import kernel
 from suboctave.harmonic.aft.law import Along, LawAlong, Member
 from suboctave.harmonic.aft.pieces import Pieces, add_pieces
 from suboctave.harmonic.aft.polynomial import Polynomial, add_polynomial, polynomial_nodes
@@ -230,26 +228,12 @@ class PackedLaws(NamedTuple):
         """
         high = motions.shape[1] - 1
         grid, nodes = search_grid(high), polynomial_nodes(self.polynomial.shape[1] - 1, high, table.shape[2] - 1)
-        finite: bool = add_exact(
-            motions, self.exact, self.pieces, self.first, self.polynomial, grid.zr, grid.zi, nodes.weights, nodes.zr,
-            nodes.zi, table,
-        )  # fmt: skip
-        return finite
-
-
-@kernel()
-def add_exact(motions, exact, pieces, first, polynomial, grid_r, grid_i, weights, zr, zi, table):
-    """See `PackedLaws.add_spectra`; grid: points on the circle for searches; weights, z: `polynomial_nodes`."""
-    finite = True
-    for g in range(motions.shape[0]):
-        if not exact[g]:
-            continue
-        force, stiffness = table[0, g], table[1, g]
-        if first[g + 1] > first[g]:
-            add_pieces(motions[g], pieces[first[g] : first[g + 1]], grid_r, grid_i, force, stiffness)
-        if polynomial.shape[1] > 0:
-            add_polynomial(motions[g], polynomial[g], weights, zr, zi, force, stiffness)
+        for g in np.flatnonzero(self.exact).tolist():
+            begin, end = self.first[g : g + 2].tolist()
+            if end > begin:
+                add_pieces(motions[g], self.pieces[begin:end], grid.zr, grid.zi, table[0, g], table[1, g])
+            if self.polynomial.shape[1]:
+                polynomial = self.polynomial[g]
+                add_polynomial(motions[g], polynomial, nodes.weights, nodes.zr, nodes.zi, table[0, g], table[1, g])
         # a number that is not finite at any instant is in all coefficients
-        total = force[0] + stiffness[0]
-        finite = finite and math.isfinite(total.real) and math.isfinite(total.imag)
-    return finite
+        return bool(np.isfinite(table[:2, :, 0]).all())
