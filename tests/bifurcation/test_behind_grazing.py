@@ -126,11 +126,14 @@ def guess_at(orbit, name="omega", span=0.35):
     return Guess(orbit.balance, orbit.coefficients, orbit.omega, orbit.values, name, span)
 
 
-@pytest.mark.parametrize(("Kc", "zeta", "share"), [(1000.0, 0.01, 0.5), (30.0, 0.05, 0.5), (200.0, 0.01, 0.999)])
-def test_newton_starts_right_behind_the_grazing(Kc, zeta, share):
+@pytest.mark.parametrize(
+    ("Kc", "zeta", "share", "rounding"),
+    [(1000.0, 0.01, 0.5, 1e-8), (30.0, 0.05, 0.5, 1e-9), (200.0, 0.01, 0.999, 1e-9)],
+)
+def test_newton_starts_right_behind_the_grazing(Kc, zeta, share, rounding):
     """From before the grazing no gradient leads to the fold; from right behind it Newton's method finds it.
 
-    With the stiffest stop the fold lies 2e-11 behind its grazing, where the last digit of omega decides.
+    With the stiffest stop the fold lies 2e-11 behind its grazing: 1e-14 of omega are 1e-9 of the residual.
     """
     curve, fold = first_fold(oscillator(Kc, zeta, share), harmonics=9)
     orbit = curve.grazings[0].orbit
@@ -144,7 +147,7 @@ def test_newton_starts_right_behind_the_grazing(Kc, zeta, share):
             assert found is not None, (size, sign)
             assert found.state.omega == pytest.approx(fold.omega, abs=1e-12)
             assert abs(found.state.omega - fold.omega) < 0.01 * abs(behind(fold))
-            assert found.residual < 1e-9
+            assert found.residual < rounding
 
 
 def test_newton_does_not_take_any_standstill_for_convergence():

@@ -60,14 +60,12 @@ def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetR
         return _no_numbers(state, motion.along.size)
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays
-    values = mu.tolist()
+    values, shifts = mu.tolist(), shift.tolist()
     largest = max(1.0, abs(values[0]))
-    distance, nearest = math.inf, 0
-    for i, value in enumerate(values):
-        away = abs(1.0 - value)
-        if away < distance:
-            distance, nearest = away, i
-    moved = float(shift[nearest]) / share if share > 0.0 else math.inf
+    # that nearest to +1 before the correction, which may have carried it off
+    nearest = min(range(len(values)), key=lambda i: abs(1.0 - values[i]) - shifts[i])
+    distance = abs(1.0 - values[nearest])
+    moved = shifts[nearest] / share if share > 0.0 else math.inf
     if moved > _DOUBTFUL * distance:
         mu, shift, share = _beside_fold(motion, moved, shift)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
