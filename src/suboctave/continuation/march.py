@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -207,6 +208,11 @@ class March:
                 fine = fine and taken <= 1.000001 * self.stepping.max_step
                 if step <= self.stepping.min_step:
                     fine = self._leads_on(point, new)
+                    back = new.tangent[curve.parameter] * point.tangent[curve.parameter] < 0.0
+                    if fine and back and turn >= self.stepping.sharpest:
+                        # it comes back, or turned by more than a right angle, and its tangent points back wrongly
+                        with suppress(ConvergenceError):
+                            return self._around_corner(point, ConvergenceError("the curve has a corner"))
                 elif fine and self.inspect is not None:
                     fine = self.inspect(point, new)
                 if fine:
