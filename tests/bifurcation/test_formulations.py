@@ -19,7 +19,7 @@ from suboctave.curves.events.locate import Guess, locate_singular
 from suboctave.curves.kinds.extended import ExtendedOperator
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
-from suboctave.harmonic.galerkin import toeplitz
+from suboctave.harmonic.assembly import toeplitz
 from suboctave.harmonic.perturbation import Kind
 
 #: period doublings of the reference oscillator at p = 0.55 by shooting: exact law, arctan law of sharpness 3000

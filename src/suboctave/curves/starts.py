@@ -31,8 +31,9 @@ from suboctave.continuation.problem import Array
 from suboctave.continuation.stepping import SteppingOptions
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.assembly import apply_blocks, block_diagonal
 from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
-from suboctave.harmonic.evaluation import BalanceState, apply_blocks
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.lazy import lazy
@@ -301,7 +302,7 @@ class _Held(MotionProblem):
         multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
         blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
         blocks[:] = np.diag(rest.omega**2 * balance.scales()[0] ** 2)
-        return rest.block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None])
+        return block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None], True)
 
     def first(self) -> Array:
         """The held motion without a share of its own: linear."""

@@ -32,9 +32,9 @@ import numpy as np
 from suboctave.continuation.linear import Factor
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.variational import Variational, liouville, refined, two_sided
+from suboctave.harmonic.assembly import galerkin
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.galerkin import galerkin
 
 #: harmonics reach this many times the highest natural frequency, or the eigenvalues are not good
 _REACH = 2.0
@@ -59,13 +59,11 @@ def exponents(system: Variational, harmonics: int) -> ComplexArray:
     first = np.kron(2.0 * derivative, each) + np.kron(one, system.damping / rate)
     zeroth = np.kron(derivative @ derivative, each) + np.kron(derivative, system.damping / rate)
     zeroth += np.kron(one, system.stiffness / rate**2)
-    nothing = np.zeros(0, dtype=complex)
     for left, right, k, c in zip(system.left, system.right, system.k, system.c, strict=True):
         outer = np.outer(left, right)
-        moving = c if c.any() else nothing
-        zeroth += np.kron(galerkin(k / rate**2, moving / rate, 1.0, True, harmonics + 1), outer)
-        if moving.size:
-            first += np.kron(galerkin(moving / rate, nothing, 0.0, True, harmonics + 1), outer)
+        zeroth += np.kron(galerkin(k / rate**2, c / rate, 1.0, True, harmonics + 1), outer)
+        if c.any():
+            first += np.kron(galerkin(c / rate, None, 0.0, True, harmonics + 1), outer)
     companion = np.block([[np.zeros_like(zeroth), np.eye(size * n)], [-zeroth, -first]])
     values: ComplexArray = np.linalg.eigvals(companion).astype(complex)
     return values

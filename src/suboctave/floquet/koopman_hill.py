@@ -26,9 +26,9 @@ from scipy.linalg import expm
 
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.variational import Variational, liouville, refined
+from suboctave.harmonic.assembly import galerkin
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.galerkin import galerkin
 from suboctave.interruption import check_time
 
 #: size of Hill's matrix above which its exponential acts on the start by its Taylor series, never formed
@@ -45,7 +45,6 @@ _LADDER = ((0.5, 1.0, 1.5, 2.0, 3.0), (0.5, 1.0, 1.5, 2.0))
 _ACCURACY = 1e-4
 #: share of parts that cancel by which they are taken not to
 _CANCELLED = 0.02
-_NOTHING = np.zeros(0, dtype=complex)
 
 
 def transition(system: Variational, harmonics: int, subharmonic: bool) -> Array:
@@ -97,7 +96,7 @@ def _projected(spectrum: np.ndarray, doubled: np.ndarray, kept: int) -> Array:
     count = min(kept + 1, len(padded), len(spectrum))
     padded[:count] = spectrum[:count]
     mean = bool(doubled[0] == 0)
-    return galerkin(padded, _NOTHING, 0.0, mean, len(doubled))
+    return galerkin(padded, None, 0.0, mean, len(doubled))
 
 
 def _by_taylor(

@@ -1,32 +1,109 @@
-"""Forces along directions and linear blocks, summed into the equations and the operators of a whole motion."""
+"""What laws along directions and the linear part make of a whole motion: its residual, and operators on changes of it.
+
+Between the functions of the integer basis (the mean, cosines and sines of tau, 2 tau, ..) or of the half-odd one (of
+tau / 2, 3 tau / 2, ..) the Galerkin matrix T(g) of the product with a periodic g depends on the Fourier coefficients of
+g at sums and differences of frequencies only.
+"""
 
 from __future__ import annotations
 
 import math
 
-from suboctave.compiled import kernel
-from suboctave.harmonic.galerkin import add_galerkin
-from suboctave.harmonic.linear_part import add_linear, multiply_blocks
+import numpy as np
 
-__all__ = ["add_operator", "along_directions", "balance_residual"]
+from suboctave.compiled import kernel
+from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+
+__all__ = [
+    "Sparse",
+    "add_operator",
+    "apply_blocks",
+    "balance_residual",
+    "block_diagonal",
+    "galerkin",
+    "sparse",
+    "toeplitz",
+]
+
+#: directions by what is not zero of them: where each begins, its DOFs, its entries there
+Sparse = tuple[np.ndarray, np.ndarray, Array]
+
+
+def sparse(directions: Array) -> Sparse:
+    """Directions (G, n) by their entries that are not zero."""
+    owner, dofs = np.nonzero(directions)
+    return np.searchsorted(owner, np.arange(len(directions) + 1)), dofs, directions[owner, dofs]
+
+
+_ALONE = sparse(np.ones((1, 1)))
+_NO_BLOCKS = np.zeros((0, 1, 1), dtype=complex)
+
+
+def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
+    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
+    waves = np.matmul(blocks, to_complex(x)[:, :, None])[:, :, 0]
+    waves[1:] *= 0.5
+    return spectrum_to_real(waves, len(waves) - 1)
+
+
+def galerkin(stiffness: ComplexArray, damping: ComplexArray | None, rate: float, mean: bool, count: int) -> Array:
+    """`T(f_u) + T(f_v) d/dt` between all functions of `count` harmonics of the integer (mean) or half-odd basis."""
+    spectra = np.zeros((3, 1, len(stiffness)), dtype=complex)
+    spectra[1, 0] = stiffness
+    if damping is not None:
+        spectra[2, 0] = damping
+    size = 2 * count - (1 if mean else 0)
+    out = np.zeros((size, size))
+    add_operator(out, spectra, 1, damping is not None, rate, mean, _ALONE, _ALONE, _NO_BLOCKS)
+    return out
+
+
+def toeplitz(spectrum: ComplexArray, harmonics: int) -> Array:
+    """T(g) in the integer basis 0 .. H."""
+    return galerkin(spectrum, None, 0.0, True, harmonics + 1)
+
+
+def block_diagonal(blocks: ComplexArray, mean: bool) -> Array:
+    """A linear operator given by its blocks, one a harmonic, in the integer (mean) or the half-odd basis."""
+    rows = blocks.shape[1] * (2 * len(blocks) - (1 if mean else 0))
+    out = np.zeros((rows, rows))
+    add_operator(out, np.zeros((3, 0, 1), dtype=complex), 0, False, 0.0, mean, _ALONE, _ALONE, blocks)
+    return out
 
 
 @kernel()
-def balance_residual(x, blocks, force, load, starts, dofs, shape, weight, parts, sizes):
+def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
     """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n), and |R|, |A X|, |F|, |P| into `sizes` (4,).
 
-    blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions, whose non-zero
-    entries are `shape[starts[g] : starts[g + 1]]` at `dofs`. Sizes are weighted by `weight` per DOF.
+    blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions (`sparse`). Sizes are
+    weighted by `weight` per DOF.
     """
     rows, n = x.shape
     linear, forces, residual = parts[0], parts[1], parts[2]
+    for h in range(blocks.shape[0]):
+        for i in range(n):
+            re = 0.0
+            im = 0.0
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                # amplitude a - i b of a cos + b sin
+                a = x[0, j] if h == 0 else x[2 * h - 1, j]
+                b = 0.0 if h == 0 else -x[2 * h, j]
+                re += p * a - q * b
+                im += p * b + q * a
+            if h == 0:
+                linear[0, i] = re
+            else:
+                linear[2 * h - 1, i] = re
+                linear[2 * h, i] = -im
     for r in range(rows):
         for i in range(n):
             forces[r, i] = 0.0
-    multiply_blocks(blocks, x, linear)
+    starts, dofs, entries = directions
     for g in range(force.shape[0]):
         for s in range(starts[g], starts[g + 1]):
-            i, d = dofs[s], shape[s]
+            i, d = dofs[s], entries[s]
             forces[0, i] += d * force[g, 0].real
             for h in range(1, blocks.shape[0]):
                 forces[2 * h - 1, i] += 2.0 * d * force[g, h].real
@@ -46,33 +123,72 @@ def balance_residual(x, blocks, force, load, starts, dofs, shape, weight, parts,
 
 
 @kernel()
-def add_operator(out, spectra, groups, moving, rate, mean, starts, dofs, shape, blocks):
-    """Add the Galerkin matrix of the tangents along the first `groups` directions and linear blocks to a real matrix of
-    the integer (mean) or the half-odd basis.
+def add_operator(out, spectra, groups, moving, rate, mean, outgoing, incoming, blocks):
+    """Add `A + sum_g out_g [T(f_u) + T(f_v) d/dt] in_g^T`, g the first `groups` channels, in the integer (mean) or the
+    half-odd basis to a real matrix.
 
     spectra (3, C, top + 1): of force, stiffness, damping; moving: whether any has damping; rate: base frequency;
-    starts, dofs, shape: directions, as in `balance_residual`; blocks: (H + 1, n, n), or (0, n, n).
+    outgoing, incoming: directions (`sparse`); blocks: A, one per harmonic, (H + 1, n, n), or none, (0, n, n).
     """
     n = blocks.shape[1]
     count = (out.shape[0] // n + 1) // 2
+    first = 0 if mean else 1
+    # the mean has a cosine only: what follows it lies one place further to the left
+    shift = 1 - first
+    # a complex amplitude `a - i b` stands for `a cos + b sin`: the block of a matrix `P + i Q` is [[P, Q], [-Q, P]]
+    for h in range(blocks.shape[0]):
+        at = max(0, 2 * h - shift) * n
+        for i in range(n):
+            for j in range(n):
+                p = blocks[h, i, j].real
+                q = blocks[h, i, j].imag
+                out[at + i, at + j] += p
+                if not (mean and h == 0):
+                    out[at + n + i, at + n + j] += p
+                    out[at + i, at + n + j] += q
+                    out[at + n + i, at + j] -= q
+    high = spectra.shape[2] - 1
+    both, lines = np.empty((4, 2 * high + 1)), np.empty((2, count, 2))
     for g in range(groups):
-        at, entries = dofs[starts[g] : starts[g + 1]], shape[starts[g] : starts[g + 1]]
-        damping = spectra[2, g] if moving else spectra[2, g, :0]
-        add_galerkin(out, spectra[1, g], damping, rate, mean, count, at, entries, at, entries, n)
-    add_linear(out, blocks, mean)
-
-
-@kernel()
-def along_directions(x, starts, dofs, shape, motions):
-    """Complex coefficients of the displacement along every direction, into `motions` (G, H + 1)."""
-    for g in range(motions.shape[0]):
-        for h in range(motions.shape[1]):
-            re = 0.0
-            im = 0.0
-            for s in range(starts[g], starts[g + 1]):
-                if h == 0:
-                    re += shape[s] * x[0, dofs[s]]
-                else:
-                    re += shape[s] * x[2 * h - 1, dofs[s]]
-                    im -= shape[s] * x[2 * h, dofs[s]]
-            motions[g, h] = complex(re, im)
+        stiffness, damping = spectra[1, g], spectra[2, g]
+        # of all orders -high .. high, and seen through views: no index has to be asked for its sign
+        for q in range(high + 1):
+            both[0, high + q] = both[0, high - q] = stiffness[q].real
+            both[1, high + q], both[1, high - q] = stiffness[q].imag, -stiffness[q].imag
+            if moving:
+                both[2, high + q] = both[2, high - q] = damping[q].real
+                both[3, high + q], both[3, high - q] = damping[q].imag, -damping[q].imag
+        for i in range(count):
+            # the orders j - i and i + j
+            low, top = both[:, high - i :], both[:, high + i + first :]
+            for j in range(count):
+                gr, gi = low[0, j], -low[1, j]
+                pr, pi = top[0, j], top[1, j]
+                a = gr + pr
+                b = gi - pi
+                e = -gi - pi
+                d = gr - pr
+                if moving:
+                    # d/dt turns cos into -w sin and sin into w cos
+                    w = (j + 0.5 * first) * rate
+                    gr, gi = low[2, j], -low[3, j]
+                    pr, pi = top[2, j], top[3, j]
+                    a -= w * (gi - pi)
+                    b += w * (gr + pr)
+                    e -= w * (gr - pr)
+                    d += w * (-gi - pi)
+                lines[0, j, 0], lines[0, j, 1] = a, b
+                lines[1, j, 0], lines[1, j, 1] = e, d
+            # the row of the mean holds halves, and has no sine beside it
+            parts, half = (1, 0.5) if mean and i == 0 else (2, 1.0)
+            row = max(0, 2 * i - shift)
+            for s in range(outgoing[0][g], outgoing[0][g + 1]):
+                for t in range(incoming[0][g], incoming[0][g + 1]):
+                    v = half * outgoing[2][s] * incoming[2][t]
+                    for part in range(parts):
+                        target, line = out[(row + part) * n + outgoing[1][s], incoming[1][t] :], lines[part]
+                        if mean:
+                            target[0] += v * line[0, 0]
+                        for j in range(shift, count):
+                            target[(2 * j - shift) * n] += v * line[j, 0]
+                            target[(2 * j - shift + 1) * n] += v * line[j, 1]

@@ -20,10 +20,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.assembly import apply_blocks, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.galerkin import toeplitz
-from suboctave.harmonic.linear_part import apply_blocks
 from suboctave.harmonic.trigonometric import motion, spectra, wave_sums
 from suboctave.harmonic.waves import Frequencies, Kind, Waves, fourier
 

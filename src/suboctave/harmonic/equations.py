@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.harmonic.aft.channel import Group
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
+from suboctave.harmonic.assembly import Sparse, sparse
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum
@@ -109,14 +109,9 @@ class Equations:
         return Group(out, inputs, (i,), element.depends_on_velocity)
 
     @lazy
-    def directions(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """Where forces act, packed channel by channel: where each begins, its DOFs, its entries there."""
-        packed = [group.outgoing for group in self.all_groups]
-        return (
-            np.cumsum([0] + [len(dofs) for dofs, _ in packed]),
-            np.concatenate([np.zeros(0, dtype=np.int64)] + [dofs for dofs, _ in packed]),
-            np.concatenate([np.zeros(0)] + [entries for _, entries in packed]),
-        )
+    def directions(self) -> Sparse:
+        """Where the forces of all channels act, as the kernels want it."""
+        return sparse(self.acting)
 
     @lazy
     def acting(self) -> Array:

@@ -19,11 +19,10 @@ from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, LocalMotion
 from suboctave.harmonic.aft.sampled import settled_samples
 from suboctave.harmonic.aft.table import PackedLaws
-from suboctave.harmonic.assembly import add_operator, along_directions, balance_residual
+from suboctave.harmonic.assembly import add_operator, apply_blocks, balance_residual, block_diagonal, sparse, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
 from suboctave.harmonic.equations import Equations, Laws
-from suboctave.harmonic.galerkin import add_galerkin, toeplitz
-from suboctave.harmonic.linear_part import LinearPart, add_linear, apply_blocks
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.lazy import lazy
 
 __all__ = ["BalanceState", "HarmonicBalance", "length"]
@@ -125,8 +124,7 @@ class BalanceState:
     @lazy
     def motions(self) -> ComplexArray:
         """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
-        motions = np.empty((len(self.balance.groups), self.basis.harmonics + 1), dtype=complex)
-        along_directions(self.x, *self.balance.directions, motions)
+        motions: ComplexArray = self.balance.acting[: len(self.balance.groups)] @ to_complex(self.x).T
         return motions
 
     @lazy
@@ -203,7 +201,7 @@ class BalanceState:
         parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
         load = balance.load(self.values, self.omega)
         weight = balance.scales()[1]
-        balance_residual(self.x, self.blocks, self.force_spectra, load, *balance.directions, weight, parts, sizes)
+        balance_residual(self.x, self.blocks, self.force_spectra, load, balance.directions, weight, parts, sizes)
         return parts, sizes
 
     @property
@@ -239,13 +237,16 @@ class BalanceState:
         (H + 1, size, size) or none, to `out`.
         """
         balance = self.balance
-        count, groups = self.basis.harmonics + 1, len(balance.groups)
-        add_operator(out, self._spectra, groups, balance.any_moving, self.rate, mean, *balance.directions, blocks)
+        at, groups = balance.directions, len(balance.groups)
+        add_operator(out, self._spectra, groups, balance.any_moving, self.rate, mean, at, at, blocks)
         for channel in self.own_channels:
-            for i, incoming in enumerate(channel.group.incoming):
-                stiffness, damping = channel.stiffness(i), channel.damping(i)
-                outgoing = channel.group.outgoing
-                add_galerkin(out, stiffness, damping, self.rate, mean, count, *outgoing, *incoming, balance.size)
+            q = channel.spectra[1:].reshape(-1, channel.count, balance.top + 1)
+            # one input after the other, each with the force along the same direction
+            spectra = np.zeros((3, *q.shape[1:]), dtype=complex)
+            spectra[1 : 1 + len(q)] = q
+            outgoing = sparse(np.tile(channel.out, (channel.count, 1)))
+            moving, none = channel.moving, blocks[:0]
+            add_operator(out, spectra, channel.count, moving, self.rate, mean, outgoing, sparse(channel.ins), none)
         return out
 
     @lazy
@@ -275,22 +276,14 @@ class BalanceState:
         """Add `A + B dF/dX` to zeros, whose first columns it takes."""
         if compliance is None:
             return self._add_tangent(out, blocks, mean)
-        expanded = np.zeros((len(out), len(out)))
-        add_linear(expanded, compliance, mean)
-        out = expanded @ self._add_tangent(out, blocks[:0], mean)
-        add_linear(out, blocks, mean)
+        out = block_diagonal(compliance, mean) @ self._add_tangent(out, blocks[:0], mean)
+        out[:, : len(out)] += block_diagonal(blocks, mean)
         return out
 
     @property
     def linear_jacobian(self) -> Array:
         """The part of R_X that stays without elements: A on the block diagonal."""
-        return self.block_diagonal(self.blocks)
-
-    def block_diagonal(self, blocks: ComplexArray) -> Array:
-        """A linear operator given by its blocks (H + 1, size, size), one a harmonic, in the unknowns, as R_X is."""
-        out = np.zeros((self.x.size, self.x.size))
-        add_linear(out, blocks, True)
-        return out
+        return block_diagonal(self.blocks, True)
 
     def residual_by(self, name: str) -> Array:
         """R differentiated by "omega" or a parameter, shape (dimension,)."""

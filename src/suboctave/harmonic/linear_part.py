@@ -115,13 +115,6 @@ class StructuralMatrices:
         return direction
 
 
-def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
-    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
-    result = np.empty(x.shape)
-    multiply_blocks(np.ascontiguousarray(blocks, dtype=complex), np.ascontiguousarray(x), result)
-    return result
-
-
 @kernel()
 def dynamic_stiffness(mass, damping, stiffness, frequency, order):
     """`K - Omega^2 M + i Omega C` at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
@@ -138,50 +131,3 @@ def dynamic_stiffness(mass, damping, stiffness, frequency, order):
                 else:
                     out[f, i, j] = complex(-2.0 * mass[i, j], 0.0)
     return out
-
-
-@kernel()
-def multiply_blocks(blocks, x, out):
-    """Complex matrices per harmonic (H + 1, n, n) times real coefficients, into `out` (2 H + 1, n)."""
-    n = x.shape[1]
-    for h in range(blocks.shape[0]):
-        for i in range(n):
-            re = 0.0
-            im = 0.0
-            for j in range(n):
-                p = blocks[h, i, j].real
-                q = blocks[h, i, j].imag
-                # amplitude a - i b of a cos + b sin
-                a = x[0, j] if h == 0 else x[2 * h - 1, j]
-                b = 0.0 if h == 0 else -x[2 * h, j]
-                re += p * a - q * b
-                im += p * b + q * a
-            if h == 0:
-                out[0, i] = re
-            else:
-                out[2 * h - 1, i] = re
-                out[2 * h, i] = -im
-
-
-@kernel()
-def add_linear(out, blocks, mean):
-    """Add complex blocks (h, n, n), one per harmonic, to the block diagonal of a real matrix of the sine/cosine basis.
-
-    A complex amplitude `a - i b` stands for `a cos + b sin`: the block of a matrix `P + i Q` is [[P, Q], [-Q, P]].
-    """
-    n = blocks.shape[1]
-    for h in range(blocks.shape[0]):
-        if mean and h == 0:
-            for i in range(n):
-                for j in range(n):
-                    out[i, j] += blocks[0, i, j].real
-            continue
-        at = (2 * h - 1 if mean else 2 * h) * n
-        for i in range(n):
-            for j in range(n):
-                p = blocks[h, i, j].real
-                q = blocks[h, i, j].imag
-                out[at + i, at + j] += p
-                out[at + n + i, at + n + j] += p
-                out[at + i, at + n + j] += q
-                out[at + n + i, at + j] -= q

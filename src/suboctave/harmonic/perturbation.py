@@ -25,11 +25,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.assembly import apply_blocks, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.derivatives import Direction, change_at, second_derivative
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.galerkin import toeplitz
-from suboctave.harmonic.linear_part import apply_blocks
 from suboctave.harmonic.trigonometric import motion, wave_sums
 from suboctave.harmonic.waves import Frequencies, Kind, Waves, along_basis, as_waves, fourier
 
@@ -60,13 +59,13 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
     out = np.zeros((count, size, count, size), dtype=complex)
     lag = np.arange(count)[:, None] - np.arange(count)
     for channel in state.channels:
-        for i, (columns, entries) in enumerate(channel.group.incoming):
+        for i, d in enumerate(channel.ins):
             matrix = _two_sided(channel.stiffness(i), lag)
             if channel.moving:
                 matrix = matrix + _two_sided(channel.damping(i), lag) * (1j * frequency)
-            for row, first in zip(*channel.group.outgoing, strict=True):
-                for column, second in zip(columns, entries, strict=True):
-                    out[:, row, :, column] += first * second * matrix
+            for row in np.flatnonzero(channel.out):
+                for column in np.flatnonzero(d):
+                    out[:, row, :, column] += channel.out[row] * d[column] * matrix
     compliance = state.linear.compliance(frequency)
     if compliance is not None:
         out = np.einsum("fij,fjkl->fikl", compliance, out)

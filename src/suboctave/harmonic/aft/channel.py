@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -22,11 +21,6 @@ from suboctave.lazy import lazy
 __all__ = ["Channel", "Group"]
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
-
-
-def _packed(direction: Array) -> tuple[NDArray[np.intp], Array]:
-    dofs = np.flatnonzero(direction)
-    return dofs, direction[dofs].copy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +39,6 @@ class Group:
     inputs: Array
     members: tuple[int, ...]
     moving: bool
-
-    @lazy
-    def outgoing(self) -> tuple[NDArray[np.intp], Array]:
-        """Where the direction is not zero, and its entries there."""
-        return _packed(self.direction)
-
-    @lazy
-    def incoming(self) -> list[tuple[NDArray[np.intp], Array]]:
-        """The same of every input."""
-        return [_packed(one) for one in self.inputs]
 
 
 class Channel:
