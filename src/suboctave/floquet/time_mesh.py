@@ -14,8 +14,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.harmonic.aft.polynomial import add_values
-from suboctave.harmonic.aft.steps import add_step
+from suboctave.harmonic.aft.closed_form import add_step, add_values
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.trigonometric import crossings_of, displacement, jet
 

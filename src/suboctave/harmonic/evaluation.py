@@ -128,9 +128,9 @@ class BalanceState:
         return motions
 
     @lazy
-    def _exact(self) -> ComplexArray:
-        """Spectra of force, stiffness and damping along all groups and of the force of all other elements, (3, C,
-        top + 1), so far with directions that have pieces and polynomials alone.
+    def _closed_form(self) -> ComplexArray:
+        """Spectra of force, stiffness and damping along all channels, (3, C, top + 1), of the laws known in closed
+        form.
         """
         table = np.zeros((3, len(self.balance.all_groups), self.balance.top + 1), dtype=complex)
         if not self.packed.add_spectra(self.motions, table):
@@ -142,11 +142,11 @@ class BalanceState:
     def channels(self) -> list[Channel]:
         """All elements along the motion: the groups of one displacement, then those with channels of their own."""
         balance, nu, top = self.balance, self.basis.nu, self.balance.top
-        table, exact = self._exact, self.packed.exact.tolist()
+        table = self._closed_form
         channels = []
         for g, (group, laws) in enumerate(zip(balance.groups, self.laws.groups, strict=True)):
             along = Along(self.motions[g : g + 1], self.rate, nu, group.moving, top)
-            channels.append(Channel(group, along, laws.along(along), table[: 1 + along.size, g] if exact[g] else None))
+            channels.append(Channel(group, along, laws.along(along), table[: 1 + along.size, g]))
         for group in balance.own:
             motions = np.ascontiguousarray((to_complex(self.x) @ group.inputs.T).T)
             along = Along(motions, self.rate, nu, group.moving, top)
@@ -167,14 +167,15 @@ class BalanceState:
 
     @lazy
     def _spectra(self) -> ComplexArray:
-        """`_exact` with all elements."""
-        table, packed = self._exact, self.packed
-        if packed.all_exact and not self.balance.own:
+        """`_closed_form` with all elements; of those with channels of their own the force alone."""
+        table, groups = self._closed_form, len(self.balance.groups)
+        if self.packed.closed_form and not self.balance.own:
             return table
+        table = table.copy()
         for c, channel in enumerate(self.channels):
-            if c >= len(packed.exact) or not packed.exact[c]:
+            if c >= groups or not self.laws.groups[c].in_closed_form:
                 self._require_finite(channel.spectra, channel.group)
-                rows = 1 if c >= len(packed.exact) else 1 + channel.along.size
+                rows = 1 if c >= groups else 1 + channel.along.size
                 table[:rows, c] = channel.spectra[:rows]
         return table
 

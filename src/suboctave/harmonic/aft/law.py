@@ -141,6 +141,9 @@ class LocalMotion(NamedTuple):
 class LawAlong(ABC):
     """A law, or the sum of laws that are integrated together, along a motion; a new kind of law is a new subclass."""
 
+    #: whether `closed_form` has its spectra
+    in_closed_form = False
+
     def __init__(self, along: Along, members: tuple[Member, ...]) -> None:
         self.along = along
         self.members = members

@@ -12,19 +12,21 @@ import math
 
 import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.harmonic.aft.closed_form import add_law, contact_spectrum, product_spectrum
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import search_grid
-from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, motion, spectra
+from suboctave.harmonic.trigonometric import crossings_of, motion, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.smoothness import PiecewiseLinear
 
-__all__ = ["Pieces", "contact_spectrum", "product_spectrum"]
+__all__ = ["Pieces"]
 
 
 class Pieces(LawAlong):
     """All pieces along one direction: stiffness, gap, side, (P, 3)."""
+
+    in_closed_form = True
 
     def __init__(self, along: Along, members: tuple[Member, ...], pieces: Array) -> None:
         super().__init__(along, members)
@@ -36,8 +38,7 @@ class Pieces(LawAlong):
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
-        grid = search_grid(self.along.high)
-        add_pieces(self.along.motion, self.pieces, grid.zr, grid.zi, out[0], out[1])
+        add_law(self.along, out, pieces=self.pieces)
 
     @lazy
     def _corners(self) -> Array:
@@ -91,110 +92,6 @@ class Pieces(LawAlong):
             grid = search_grid(self.along.high)
             values = motion(self.along.motion, grid.zr, grid.zi)
             add_changed_pieces(self.along.motion, np.array(rows), values, out[0], out[1])
-
-
-@kernel()
-def contact_spectrum(tau, above, side, top):
-    """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
-
-    chi_q = 1/(2 pi) int chi exp(-i q tau): sums of exp(-i q tau_i) / q over the ends of the contact intervals.
-    """
-    out = np.zeros(top + 1, dtype=np.complex128)
-    active = above == (side > 0)
-    n = tau.shape[0]
-    if n == 0:
-        out[0] = 1.0 if active else 0.0
-        return out
-    scale = 1.0 / (2.0 * math.pi)
-    length = 2.0 * math.pi if active else 0.0
-    state = active
-    for i in range(n):
-        sign = 1.0 if state else -1.0  # +1: a contact ends here, -1: one begins
-        length += sign * tau[i]
-        zr = math.cos(tau[i])
-        zi = -math.sin(tau[i])
-        pr = zr
-        pi = zi
-        for q in range(1, top + 1):
-            f = sign * scale / q
-            out[q] += complex(-f * pi, f * pr)  # i/q * exp(-i q tau), the antiderivative at an end
-            t = pr * zr - pi * zi
-            pi = pr * zi + pi * zr
-            pr = t
-        state = not state
-    out[0] = length * scale
-    return out
-
-
-@kernel(fastmath=FAST)
-def product_spectrum(c, shift, chi, top):
-    """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
-    H.
-    """
-    high = c.shape[0] - 1
-    # chi_q for q = -H .. top + H, negative ones by conjugation
-    xr = np.empty(top + 2 * high + 1)
-    xi = np.empty(top + 2 * high + 1)
-    for q in range(-high, top + high + 1):
-        xr[q + high] = chi[q].real if q >= 0 else chi[-q].real
-        xi[q + high] = chi[q].imag if q >= 0 else -chi[-q].imag
-    re = np.empty(top + 1)
-    im = np.empty(top + 1)
-    mean = c[0].real - shift
-    for k in range(top + 1):
-        re[k] = mean * xr[k + high]
-        im[k] = mean * xi[k + high]
-    for m in range(1, high + 1):
-        # x_m = c_m / 2 and x_-m its conjugate
-        a = 0.5 * c[m].real
-        b = 0.5 * c[m].imag
-        # views, whose indices the compiler knows to be positive
-        pr, pi = xr[high - m : high - m + top + 1], xi[high - m : high - m + top + 1]
-        qr, qi = xr[high + m : high + m + top + 1], xi[high + m : high + m + top + 1]
-        for k in range(top + 1):
-            re[k] += a * (pr[k] + qr[k]) + b * (qi[k] - pi[k])
-            im[k] += a * (pi[k] + qi[k]) + b * (pr[k] - qr[k])
-    out = np.empty(top + 1, dtype=np.complex128)
-    for k in range(top + 1):
-        out[k] = complex(re[k], im[k])
-    return out
-
-
-@kernel()
-def add_pieces(c, pieces, grid_r, grid_i, force, stiffness):
-    """Add the Fourier coefficients of piecewise-linear laws to force and stiffness (top + 1,), in place.
-
-    Parameters
-    ----------
-    c
-        Complex coefficients of the relative displacement (H + 1,).
-    pieces
-        Stiffness, gap and side of every piece, (P, 3).
-    grid_r, grid_i
-        Equidistant points on the circle for the search for crossings.
-    """
-    top = force.shape[0] - 1
-    high = c.shape[0] - 1
-    values = np.empty((2, grid_r.shape[0]))
-    displacement(c, grid_r, grid_i, values)
-    slope = np.zeros(top + high + 1, dtype=np.complex128)
-    touching = False
-    for p in range(pieces.shape[0]):
-        k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-        crossed, above = crossings_of(c, gap, values)
-        if crossed.shape[0] == 0 and above != (side > 0):
-            continue
-        touching = True
-        chi = contact_spectrum(crossed, above, side, top + high)
-        for q in range(top + high + 1):
-            slope[q] += k * chi[q]
-        for q in range(top + 1):
-            force[q] -= k * gap * chi[q]
-    if touching:
-        product = product_spectrum(c, 0.0, slope, top)
-        for q in range(top + 1):
-            force[q] += product[q]
-            stiffness[q] += slope[q]
 
 
 def add_changed_pieces(

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.harmonic.aft.closed_form import NO_LINE, NO_ROWS, NONE, add_laws
 from suboctave.harmonic.aft.law import Along, LawAlong, Member
-from suboctave.harmonic.aft.pieces import Pieces, add_pieces
-from suboctave.harmonic.aft.polynomial import Polynomial, add_polynomial, polynomial_nodes
+from suboctave.harmonic.aft.pieces import Pieces
+from suboctave.harmonic.aft.polynomial import Polynomial
 from suboctave.harmonic.aft.sampled import GradedLaw, UniformLaw
 from suboctave.harmonic.aft.steps import ArctanSteps
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import FEWEST, search_grid
+from suboctave.harmonic.quadrature import FEWEST
 from suboctave.lazy import lazy
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
@@ -26,10 +27,6 @@ from suboctave.model.elements.smoothness import (
 )
 
 __all__ = ["DirectionLaws", "PackedLaws"]
-
-_NONE = np.zeros(0)
-_NO_ROWS = np.zeros((0, 3))
-_NO_LINE = np.zeros(2)
 
 
 @dataclass(eq=False)
@@ -53,17 +50,17 @@ class DirectionLaws:
         All elements.
     """
 
-    pieces: Array = field(default_factory=lambda: _NO_ROWS)
-    polynomial: Array = field(default_factory=lambda: _NONE)
-    steps: Array = field(default_factory=lambda: _NO_ROWS)
-    line: Array = field(default_factory=lambda: _NO_LINE)
+    pieces: Array = field(default_factory=lambda: NO_ROWS)
+    polynomial: Array = field(default_factory=lambda: NONE)
+    steps: Array = field(default_factory=lambda: NO_ROWS)
+    line: Array = field(default_factory=lambda: NO_LINE)
     graded: tuple[Member, ...] = ()
     uniform: tuple[Member, ...] = ()
     exact: tuple[Member, ...] = ()
     polynomials: tuple[Member, ...] = ()
     stepped: tuple[Member, ...] = ()
-    points: Array = field(default_factory=lambda: _NONE)
-    widths: Array = field(default_factory=lambda: _NONE)
+    points: Array = field(default_factory=lambda: NONE)
+    widths: Array = field(default_factory=lambda: NONE)
     degree: int = 0
     members: tuple[Member, ...] = ()
 
@@ -102,17 +99,17 @@ class DirectionLaws:
                     degree = max(degree, kind.degree)
         total = [sum(parts) for parts in zip_longest(*sums, fillvalue=0.0)]
         return cls(
-            np.array(pieces, dtype=float) if pieces else _NO_ROWS,
-            np.array(total, dtype=float) if total else _NONE,
-            np.array(steps, dtype=float) if steps else _NO_ROWS,
+            np.array(pieces, dtype=float) if pieces else NO_ROWS,
+            np.array(total, dtype=float) if total else NONE,
+            np.array(steps, dtype=float) if steps else NO_ROWS,
             np.array((constant, slope)),
             tuple(graded),
             tuple(uniform),
             tuple(exact),
             tuple(polynomials),
             tuple(stepped),
-            np.array(points, dtype=float) if points else _NONE,
-            np.array(widths, dtype=float) if widths else _NONE,
+            np.array(points, dtype=float) if points else NONE,
+            np.array(widths, dtype=float) if widths else NONE,
             degree,
             members,
         )
@@ -170,13 +167,10 @@ class PackedLaws(NamedTuple):
         direction's begin, (G + 1,).
     polynomial
         Coefficients of u^0, u^1, ... along every direction (G, D).
-    steps, step_owner, line
-        Place, width, size of arctan steps (S, 3), their directions (S,); constant and slope of the laws that they
-        belong to, (G, 2).
+    steps, step_owner, step_first, line
+        Place, width, size of arctan steps (S, 3), likewise; constant and slope of the laws that they belong to, (G, 2).
     closed_form
         Whether that is all of them.
-    exact, all_exact
-        Which directions have pieces and polynomials alone, (G,), and whether all have.
     singularities
         Direction, places and widths of where laws are sharp.
     degree, unknown_samples
@@ -189,10 +183,9 @@ class PackedLaws(NamedTuple):
     polynomial: Array
     steps: Array
     step_owner: NDArray[np.int64]
+    step_first: NDArray[np.int64]
     line: Array
     closed_form: bool
-    exact: NDArray[np.bool_]
-    all_exact: bool
     singularities: list[tuple[int, Array, Array]]
     degree: int
     unknown_samples: int
@@ -205,18 +198,17 @@ class PackedLaws(NamedTuple):
         for g, law in enumerate(laws):
             polynomial[g, : len(law.polynomial)] = law.polynomial
         counts = [len(law.pieces) for law in laws]
-        exact = [law.in_closed_form and not len(law.steps) for law in laws]
+        step_counts = [len(law.steps) for law in laws]
         return cls(
-            np.concatenate([_NO_ROWS] + [law.pieces for law in laws]),
+            np.concatenate([NO_ROWS] + [law.pieces for law in laws]),
             np.repeat(number, counts),
             np.cumsum([0, *counts]),
             polynomial,
-            np.concatenate([_NO_ROWS] + [law.steps for law in laws]),
-            np.repeat(number, [len(law.steps) for law in laws]),
+            np.concatenate([NO_ROWS] + [law.steps for law in laws]),
+            np.repeat(number, step_counts),
+            np.cumsum([0, *step_counts]),
             np.array([law.line for law in laws]).reshape(-1, 2),
             all(law.in_closed_form for law in laws),
-            np.array(exact, dtype=bool),
-            all(exact),
             [(g, *pair) for g, law in enumerate(laws) for pair in law.singularities],
             max([law.tangent_degree for law in laws], default=0),
             max([law.unknown_samples for law in laws], default=0),
@@ -224,16 +216,8 @@ class PackedLaws(NamedTuple):
 
     def add_spectra(self, motions: ComplexArray, table: ComplexArray) -> bool:
         """Add the Fourier coefficients of force and stiffness along motions (G, H + 1) to `table` (>= 2, >= G,
-        top + 1), of directions that have pieces and polynomials alone; returns whether they are finite.
+        top + 1); returns whether they are finite.
         """
-        high = motions.shape[1] - 1
-        grid, nodes = search_grid(high), polynomial_nodes(self.polynomial.shape[1] - 1, high, table.shape[2] - 1)
-        for g in np.flatnonzero(self.exact).tolist():
-            begin, end = self.first[g : g + 2].tolist()
-            if end > begin:
-                add_pieces(motions[g], self.pieces[begin:end], grid.zr, grid.zi, table[0, g], table[1, g])
-            if self.polynomial.shape[1]:
-                polynomial = self.polynomial[g]
-                add_polynomial(motions[g], polynomial, nodes.weights, nodes.zr, nodes.zi, table[0, g], table[1, g])
+        add_laws(motions, self.pieces, self.first, self.polynomial, self.steps, self.step_first, self.line, table)
         # a number that is not finite at any instant is in all coefficients
         return bool(np.isfinite(table[:2, :, 0]).all())
