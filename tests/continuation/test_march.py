@@ -10,7 +10,7 @@ from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, Step
 from suboctave.continuation.events import locate_zero
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
-from suboctave.continuation.point import between, make_point, point_between, solve_at
+from suboctave.continuation.point import between, make_point, point_between
 from suboctave.curves.events.finder import position
 from suboctave.errors import ConvergenceError, InputError
 
@@ -72,8 +72,12 @@ def cubic():
     return Plane(lambda x, p: p - x + x**3, lambda x, p: (3 * x**2 - 1.0, 1.0))
 
 
+def solve_at(curve, u):
+    return correct(curve, u, curve.parameter, curve.weights(u, 0.0), NEWTON)
+
+
 def start(curve, x, p):
-    return make_point(solve_at(curve, np.array([x, p]), 0.0, NEWTON), curve, None, 0.0)
+    return make_point(solve_at(curve, np.array([x, p])), curve, None, 0.0)
 
 
 def march(curve, x, p, direction, bounds, inspect=None, **stepping):
@@ -273,12 +277,12 @@ def test_a_flat_or_steep_function_has_its_zero_too(power):
 
 def test_newton_converges_quadratically_and_stops_when_it_may():
     curve = circle()
-    solved = solve_at(curve, np.array([0.9, 0.6]), 0.0, NEWTON)
+    solved = solve_at(curve, np.array([0.9, 0.6]))
     assert solved.u == pytest.approx([0.8, 0.6], abs=1e-12)
     assert solved.u[1] == 0.6
     assert solved.iterations <= 5
     assert solved.distance == pytest.approx(0.1, rel=1e-9)
-    assert solve_at(curve, solved.u, 0.0, NEWTON).iterations == 0
+    assert solve_at(curve, solved.u).iterations == 0
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,7 @@ def test_in_a_study_file_and_saved(response, tmp_path):
     np.testing.assert_array_equal(curve.omega, response.omega)
     again = so.load(response.save(tmp_path / "response.nc"))
     assert repr(again.system) == repr(response.system)
-    assert again.points[0].orbit.state().residual_size() == response.points[0].orbit.state().residual_size()
+    assert again.points[0].orbit.state().balanced.size == response.points[0].orbit.state().balanced.size
 
 
 def test_mistakes():

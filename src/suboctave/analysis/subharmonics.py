@@ -23,8 +23,7 @@ from suboctave.analysis.options import CurveOptions, SearchOptions, settings_of
 from suboctave.analysis.run import CurveRun
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length, one_thread
-from suboctave.continuation.newton import Solved
-from suboctave.continuation.point import solve_at
+from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import Harmonics, make_curve
 from suboctave.curves.identity import lies_on, relation
@@ -277,7 +276,7 @@ def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) 
         met: list[PeriodicOrbit] = []
         for guess in _guesses(curve, float(value), seeds):
             try:
-                solved: Solved = solve_at(curve, guess, 0.0, patient)
+                solved = correct(curve, guess, curve.parameter, curve.weights(guess, 0.0), patient)
             except ConvergenceError:
                 continue
             x = curve.split(solved.u)[0]

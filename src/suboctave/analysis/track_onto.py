@@ -230,9 +230,7 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
         try:
             curve, u = curve_through(beside, balance, None, names, spans_of(item, names, box))
             weights = curve.weights(u, 0.0)
-            held = np.zeros(len(u))
-            held[curve.balance.dimension] = 1.0
-            solved = correct(curve, u, held, weights, newton)
+            solved = correct(curve, u, curve.balance.dimension, weights, newton)
         except ConvergenceError as failure:
             reason = str(failure)
             continue

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
@@ -79,10 +77,8 @@ class Bounds:
             low, high = (low, middle) if beyond else (middle, high)
         guess = between(a, b, high)
         guess[index] = bound
-        row = np.zeros(len(guess))
-        row[index] = 1.0
         try:
-            solved = correct(b.curve, guess, row, b.weights, newton)
+            solved = correct(b.curve, guess, index, b.weights, newton)
         except ConvergenceError:
             return None
         u = solved.u

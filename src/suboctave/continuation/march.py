@@ -226,7 +226,7 @@ class March:
             order = max(1, order - 1)
             step = max(0.5 * step, self.stepping.min_step)
 
-    def _solved(self, curve: Curve, guess: Array, row: Array, weights: Array, step: float) -> Solved:
+    def _solved(self, curve: Curve, guess: Array, row: Array | int, weights: Array, step: float) -> Solved:
         """The point beside a prediction; of a short step, or where the curve asks for it, more closely: what the
         tolerance leaves open may be as long as the step, or as a sharp turn is wide.
         """
@@ -244,7 +244,7 @@ class March:
 
     def _predicted(
         self, point: CurvePoint, points: Array, tangents: Array, step: float
-    ) -> tuple[Array, Array, float | None]:
+    ) -> tuple[Array, Array | int, float | None]:
         """A prediction and the row to solve with: one step ahead, or on the bound (returned) that it would pass."""
         guess, index = np.empty(len(point.u)), point.curve.parameter
         predict(points, tangents, point.weights, step, guess)
@@ -258,9 +258,7 @@ class March:
             predict(points, tangents, point.weights, middle, guess)
             near, far = (near, middle) if (guess[index] - bound) * (point.parameter - bound) < 0.0 else (middle, far)
         guess[index] = bound
-        row = np.zeros(len(guess))
-        row[index] = 1.0
-        return guess, row, bound
+        return guess, index, bound
 
     def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float, float]:
         """A point beyond a corner of the equations, where no tangent leads on but the parameter does.

@@ -106,7 +106,7 @@ def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
 def correct(
     curve: Problem,
     guess: Array,
-    row: Array | None,
+    row: Array | int | None,
     weights: Array,
     options: NewtonOptions,
     known: Factor | None = None,
@@ -117,8 +117,8 @@ def correct(
     Parameters
     ----------
     row
-        Scaled row, shape (N + 1,): the unit tangent in scaled variables, or a unit vector to keep a parameter. None
-        where there are as many equations as unknowns.
+        Scaled row, shape (N + 1,): the unit tangent in scaled variables; or which unknown keeps its value. None where
+        there are as many equations as unknowns.
     known
         Factors of a point close by with the same row and weights: for a first correction, which is then made however
         good the guess is.
@@ -131,6 +131,9 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
+    if isinstance(row, int):
+        kept, row = row, np.zeros(len(guess))
+        row[kept] = 1.0
     u = guess.copy()
     last: Evaluation | None = None
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from suboctave.continuation.linear import Factor, cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 
-__all__ = ["CurvePoint", "between", "make_point", "point_between", "solve_at", "solved_again"]
+__all__ = ["CurvePoint", "between", "make_point", "point_between", "solved_again"]
 
 
 @dataclass(eq=False, slots=True)
@@ -47,13 +45,6 @@ def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: flo
     return CurvePoint(
         curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations, solved.factor
     )
-
-
-def solve_at(curve: Curve, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
-    """Solve at the guess's own parameter value."""
-    row = np.zeros(len(guess))
-    row[curve.parameter] = 1.0
-    return correct(curve, guess, row, curve.weights(guess, largest), newton)
 
 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:

@@ -107,7 +107,7 @@ def mirrored(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
         return None
     state = image.state()
     # by the symmetry the residual is the motion's own; without it that of a motion that solves nothing
-    solves = state.residual_size() <= TOLERANCE * state.force_scale()
+    solves = state.balanced.size <= TOLERANCE * state.balanced.scale
     return image if solves else None
 
 

@@ -113,11 +113,11 @@ class MotionEvaluation:
         """
         state, addition = self.state, self.equations.addition
         if addition is None:
-            size = state.residual_size()
+            size = state.balanced.size
         else:
             shaped = (state.residual + addition).reshape(state.x.shape)
             size = length(shaped * state.balance.scales()[1])
-        worst = size / max(state.force_scale(), self.curve.least_force(state.omega), _TINY)
+        worst = size / max(state.balanced.scale, self.curve.least_force(state.omega), _TINY)
         for value in self.equations.values.tolist():
             worst = max(worst, abs(value))
         return worst
@@ -291,7 +291,7 @@ class MotionProblem:
         self.cache[balance.basis] = balance
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
-        force = max(state.force_scale(), self.least_force(state.omega))
+        force = max(state.balanced.scale, self.least_force(state.omega))
         return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
 
     def _basis(self, evaluation: MotionEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:

@@ -25,8 +25,8 @@ import numpy as np
 
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import March
-from suboctave.continuation.newton import NewtonOptions, Solved, correct
-from suboctave.continuation.point import CurvePoint, make_point, solve_at
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array
 from suboctave.continuation.stepping import SteppingOptions
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
@@ -94,7 +94,7 @@ def start_point(
             if isinstance(given, PeriodicOrbit):
                 # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
                 with suppress(ConvergenceError):
-                    return _settled(curve, guess, newton, largest, _solve_nearest)
+                    return _settled(curve, guess, newton, largest, nearest=True)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
@@ -165,15 +165,20 @@ def _like(curve: MotionProblem, adaptive: AdaptiveHarmonics | None, reference: f
 
 
 def _settled(
-    curve: MotionProblem, u: Array, newton: NewtonOptions, largest: float, solve: Callable[..., Solved] = solve_at
+    curve: MotionProblem, u: Array, newton: NewtonOptions, largest: float, nearest: bool = False
 ) -> CurvePoint:
-    """Solve at the guess's parameter value (unless told otherwise), again with more harmonics while the motion asks."""
+    """Solve at the guess's parameter value, or for the nearest point of the curve whatever its value; again with more
+    harmonics while the motion asks.
+    """
     for _ in range(12):
         x, omega, values = curve.split(u)
         settled = curve.balance.settle(x, omega, values)
         if settled is not curve.balance:
             curve = curve.with_balance(settled)
-        solved = solve(curve, u, largest, newton)
+        weights, row = curve.weights(u, largest), curve.parameter
+        if nearest:
+            row = np.linalg.svd(curve.evaluate(u).jacobian / weights)[2][-1]
+        solved = correct(curve, u, row, weights, newton)
         adapted = curve.adapted(solved.u, solved.evaluation)
         if adapted is curve:
             break
@@ -181,13 +186,6 @@ def _settled(
         assert isinstance(adapted, MotionProblem)
         curve = adapted
     return make_point(solved, curve, None, 0.0)
-
-
-def _solve_nearest(curve: MotionProblem, guess: Array, largest: float, newton: NewtonOptions) -> Solved:
-    """The point of the curve nearest to a guess close to it, whatever its parameter value."""
-    weights = curve.weights(guess, largest)
-    row = np.linalg.svd(curve.evaluate(guess).jacobian / weights)[2][-1]
-    return correct(curve, guess, row, weights, newton)
 
 
 def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
@@ -267,7 +265,7 @@ class _HeldEvaluation(MotionEvaluation):
         """Residual in units of the forces that balance."""
         balance = self.state.balance
         size = length(self.residual * balance.row_weights(balance.dimension))
-        return size / max(self.state.force_scale(), np.finfo(float).tiny)
+        return size / max(self.state.balanced.scale, np.finfo(float).tiny)
 
 
 @dataclass(eq=False, repr=False)
@@ -339,7 +337,7 @@ def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tupl
     u = problem.first()
     # the size of this motion, not of a linear response that a free body or a resonance makes large
     problem = _Held.of(_like(curve, curve.adaptive, curve.size(u)), value)
-    point = make_point(solve_at(problem, u, 0.0, newton), problem, None, 0.0)
+    point = make_point(correct(problem, u, problem.parameter, problem.weights(u, 0.0), newton), problem, None, 0.0)
     # where the orientation changes a step may have gone over to another path
     march = March(point, 1.0, (0.0, 1.0), newton, _STEPPING, lambda a, b: a.orientation == b.orientation)
     # of all its points the last alone is kept: with many harmonics the matrices of hundreds would fill the memory

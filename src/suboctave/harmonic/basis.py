@@ -138,8 +138,8 @@ def to_complex(coefficients: NDArray[Any]) -> ComplexArray:
     """
     result = np.empty((coefficients.shape[0] // 2 + 1,) + coefficients.shape[1:], dtype=complex)
     result[0] = coefficients[0]
-    result[1:] = coefficients[1::2]
-    result[1:] -= 1j * coefficients[2::2]
+    result.real[1:] = coefficients[1::2]
+    np.negative(coefficients[2::2], out=result.imag[1:])
     return result
 
 

@@ -7,16 +7,17 @@ in the notation of `equations`.
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.aft.channel import Channel, Group
+from suboctave.harmonic.aft.closed_form import add_spectra, places
 from suboctave.harmonic.aft.general import GeneralLaw
-from suboctave.harmonic.aft.law import Along, LocalMotion
+from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.sampled import settled_samples
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import add_operator, apply_blocks, balance_residual, block_diagonal, sparse, toeplitz
@@ -82,6 +83,17 @@ class HarmonicBalance(Equations):
         return self.with_samples(tuple(samples))
 
 
+class Balanced(NamedTuple):
+    """Element forces F and residual R, (2 H + 1, size) each; the size of R, and of the forces that balance, `|A X| + |B
+    F| + |B P|`, with residual weights: residuals are held against it.
+    """
+
+    force: Array
+    residual: Array
+    size: float
+    scale: float
+
+
 class BalanceState:
     """One evaluated motion: residual, Jacobian and derivatives, each computed when first needed."""
 
@@ -128,36 +140,34 @@ class BalanceState:
         return motions
 
     @lazy
-    def _closed_form(self) -> ComplexArray:
-        """Spectra of force, stiffness and damping along all channels, (3, C, top + 1), of the laws known in closed
-        form.
-        """
-        table = np.zeros((3, len(self.balance.all_groups), self.balance.top + 1), dtype=complex)
-        if not self.packed.add_spectra(self.motions, table):
-            for c, group in enumerate(self.balance.groups):
-                self._require_finite(table[:2, c], group)
-        return table
+    def _along(self) -> list[tuple[Along, list[LawAlong]]]:
+        """The laws of every group along the motion."""
+        balance = self.balance
+        alongs = [
+            Along(self.motions[g : g + 1], self.rate, self.basis.nu, group.moving, balance.top)
+            for g, group in enumerate(balance.groups)
+        ]
+        return [(along, laws.along(along)) for along, laws in zip(alongs, self.laws.groups, strict=True)]
 
     @lazy
     def channels(self) -> list[Channel]:
         """All elements along the motion: the groups of one displacement, then those with channels of their own."""
-        balance, nu, top = self.balance, self.basis.nu, self.balance.top
-        table = self._closed_form
+        spectra, groups = self._spectra, zip(self.balance.groups, self._along, strict=True)
+        shared = [
+            Channel(group, along, laws, spectra[: 1 + along.size, g]) for g, (group, (along, laws)) in enumerate(groups)
+        ]
+        return shared + self.own_channels
+
+    @lazy
+    def own_channels(self) -> list[Channel]:
+        """The channels of elements with several inputs, corners, or time."""
         channels = []
-        for g, (group, laws) in enumerate(zip(balance.groups, self.laws.groups, strict=True)):
-            along = Along(self.motions[g : g + 1], self.rate, nu, group.moving, top)
-            channels.append(Channel(group, along, laws.along(along), table[: 1 + along.size, g]))
-        for group in balance.own:
+        for group in self.balance.own:
             motions = np.ascontiguousarray((to_complex(self.x) @ group.inputs.T).T)
-            along = Along(motions, self.rate, nu, group.moving, top)
+            along = Along(motions, self.rate, self.basis.nu, group.moving, self.balance.top)
             members = tuple([self.laws.members[i] for i in group.members])
             channels.append(Channel(group, along, [GeneralLaw(along, members)]))
         return channels
-
-    @property
-    def own_channels(self) -> list[Channel]:
-        """The channels of elements with several inputs, corners, or time."""
-        return self.channels[len(self.balance.groups) :] if self.balance.own else []
 
     def local(self, index: int) -> LocalMotion:
         """One of the system's elements on the motion."""
@@ -167,16 +177,25 @@ class BalanceState:
 
     @lazy
     def _spectra(self) -> ComplexArray:
-        """`_closed_form` with all elements; of those with channels of their own the force alone."""
-        table, groups = self._closed_form, len(self.balance.groups)
-        if self.packed.closed_form and not self.balance.own:
-            return table
-        table = table.copy()
-        for c, channel in enumerate(self.channels):
-            if c >= groups or not self.laws.groups[c].in_closed_form:
-                self._require_finite(channel.spectra, channel.group)
-                rows = 1 if c >= groups else 1 + channel.along.size
-                table[:rows, c] = channel.spectra[:rows]
+        """Spectra of force, stiffness and damping along all channels, (3, C, top + 1); of elements with channels of
+        their own the force alone.
+        """
+        balance, packed, motions = self.balance, self.packed, self.motions
+        table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
+        at = places(self.basis.harmonics, balance.top, packed.polynomial.shape[1] - 1)
+        add_spectra(motions, packed.known, *at, table)
+        if not packed.closed_form:
+            for g, (along, laws) in enumerate(self._along):
+                for law in laws:
+                    if not law.in_closed_form:
+                        law.add_spectra(table[: 1 + along.size, g])
+        for c, channel in enumerate(self.own_channels, len(balance.groups)):
+            table[0, c] = channel.spectra[0]
+            self._require_finite(channel.spectra, channel.group)
+        # a number that is not finite at any instant is in all coefficients
+        if not np.isfinite(table[:, :, 0]).all():
+            for g, group in enumerate(balance.groups):
+                self._require_finite(table[:, g], group)
         return table
 
     @property
@@ -186,8 +205,7 @@ class BalanceState:
         return force
 
     def _require_finite(self, spectra: ComplexArray, group: Group) -> None:
-        # a number that is not finite at any instant is in all coefficients
-        if cmath.isfinite(spectra[:, 0].sum()):
+        if np.isfinite(spectra[:, 0]).all():
             return
         labels = ", ".join(self.laws.members[i].element.label for i in group.members)
         raise ConvergenceError(
@@ -196,14 +214,19 @@ class BalanceState:
         )
 
     @lazy
-    def _parts(self) -> tuple[Array, Array]:
-        """A X, F, `A X + F - P`, and the sizes of the latter, A X, F and P with residual weights."""
-        balance = self.balance
+    def balanced(self) -> Balanced:
+        """What balances: see `Balanced`."""
+        balance, compliance = self.balance, self.compliance
         parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
-        load = balance.load(self.values, self.omega)
-        weight = balance.scales()[1]
-        balance_residual(self.x, self.blocks, self.force_spectra, load, balance.directions, weight, parts, sizes)
-        return parts, sizes
+        load, weight = balance.load(self.values, self.omega), balance.scales()[1]
+        balance_residual(self.x, self.blocks, self._spectra[0], load, balance.directions, weight, parts, sizes)
+        linear, force, residual = parts
+        size, *forces = sizes.tolist()
+        if compliance is not None:
+            residual = linear + apply_blocks(compliance, force - load)
+            size = length(residual * weight)
+            forces[1:] = [length(apply_blocks(compliance, part) * weight) for part in (force, load)]
+        return Balanced(force, residual, size, sum(forces))
 
     @property
     def unknowns(self) -> Array:
@@ -213,20 +236,17 @@ class BalanceState:
     @property
     def force(self) -> Array:
         """Element forces F, shape (2 H + 1, size)."""
-        force: Array = self._parts[0][1]
-        return force
+        return self.balanced.force
 
     @lazy
     def unbalanced(self) -> Array:
         """S = F - P, shape (2 H + 1, size)."""
         return self.force - self.load
 
-    @lazy
+    @property
     def residual(self) -> Array:
         """R, shape (dimension,)."""
-        if self.compliance is None:
-            return self._parts[0][2].ravel()
-        return (self._parts[0][0] + apply_blocks(self.compliance, self.unbalanced)).ravel()
+        return self.balanced.residual.ravel()
 
     @lazy
     def force_jacobian(self) -> Array:
@@ -408,24 +428,6 @@ class BalanceState:
         x[self.basis.size :: 2] = self.neglected.real
         x[self.basis.size + 1 :: 2] = -self.neglected.imag
         return basis, x
-
-    def force_scale(self) -> float:
-        """Size of the forces that balance, `|A X| + |F| + |P|` with residual weights: residuals are held against it."""
-        sizes = self._parts[1]
-        if self.compliance is None:
-            _, linear, force, load = sizes.tolist()
-            return float(linear + force + load)
-        weight = self.balance.scales()[1]
-        load = self.load
-        return float(sizes[1]) + sum(
-            length(apply_blocks(self.compliance, part) * weight) for part in (self.force, load)
-        )
-
-    def residual_size(self) -> float:
-        """Size of R with residual weights."""
-        if self.compliance is None:
-            return float(self._parts[1][0])
-        return length(self.residual.reshape(-1, self.balance.size) * self.balance.scales()[1])
 
 
 def length(vector: Array) -> float:

@@ -162,7 +162,7 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     state = grazing.state
     weights = _weights(state, guess)
     dimension = state.balance.dimension
-    rows = residual_scale(state) / max(state.force_scale(), np.finfo(float).tiny)
+    rows = residual_scale(state) / max(state.balanced.scale, np.finfo(float).tiny)
     matrix = np.zeros((dimension + 1, dimension + 1), order="F")
     matrix[:-1, :-1] = state.jacobian * rows[:, None] / weights[:-1]
     matrix[:-1, -1] = state.residual_by(guess.name) * rows / weights[-1]

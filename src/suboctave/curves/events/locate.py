@@ -104,7 +104,7 @@ class Singular:
     @property
     def balance_residual(self) -> float:
         """Residual of the equations of motion alone, in units of the forces that balance."""
-        return min(self.residual, self.state.residual_size() / max(self.state.force_scale(), _TINY))
+        return min(self.residual, self.state.balanced.size / max(self.state.balanced.scale, _TINY))
 
     @lazy
     def floquet(self) -> FloquetResult:
@@ -124,7 +124,7 @@ def solve(guess: Guess, begin: BalanceState, augmentation: Augmentation, extra: 
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
-    problem = guess.problem(augmentation, begin.force_scale())
+    problem = guess.problem(augmentation, begin.balanced.scale)
     u = problem.join(guess.x, guess.parameter, extra)
     solved = correct(problem, u, None, problem.weights(u, 0.0), NEWTON)
     evaluation = solved.evaluation

@@ -45,7 +45,7 @@ class BranchPointUnfolded(Augmentation):
     @staticmethod
     def _force(state: BalanceState) -> float:
         """Size of the forces; at rest, where there are none, that of a motion of unit size."""
-        return state.force_scale() or state.omega**2
+        return state.balanced.scale or state.omega**2
 
     @classmethod
     def through(

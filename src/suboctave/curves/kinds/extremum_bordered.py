@@ -60,7 +60,7 @@ class BorderedExtremal(Extremal):
         weight = state.balance.per_unknown(state.balance.scales()[0])
         size = length(weight * state.x.ravel()) or 1.0
         blank = np.zeros(state.balance.dimension + base.extras + 1)
-        own = cls(base, beside, blank, blank, state.force_scale() or 1.0, size, dict(sizes), extra_sizes, turning)
+        own = cls(base, beside, blank, blank, state.balanced.scale or 1.0, size, dict(sizes), extra_sizes, turning)
         matrix = own.at(state, extra, tuple(sizes)).matrix
         u, _, vt = np.linalg.svd(matrix)
         return replace(own, right=vt[-1], left=u[:, -1])
@@ -191,7 +191,7 @@ class BorderedExtremalEquations(ExtremalEquations):
         state = self.state
         weight = state.balance.per_unknown(state.balance.scales()[0])
         size = length(weight * state.x.ravel()) or 1.0
-        force = state.force_scale() or 1.0
+        force = state.balanced.scale or 1.0
         return replace(
             self.of,
             base=self.base.renewed(),

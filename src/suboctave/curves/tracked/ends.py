@@ -198,14 +198,14 @@ def _symmetry_gained(a: Sample, b: Sample) -> End | None:
     symmetric = state.balance.at(x, state.omega, state.values)
     # what is missing without the even harmonics is of their order where the system has no such symmetry, else of its
     # square
-    if symmetric.residual_size() > _UNSYMMETRIC * before * symmetric.force_scale():
+    if symmetric.balanced.size > _UNSYMMETRIC * before * symmetric.balanced.scale:
         return None
     # a system may be symmetric at one value of a parameter that the curve passes
     for name, width in zip(a.curve.names, a.curve.spans, strict=True):
         if name != "omega":
             values = {**state.values, name: state.values[name] + _ASIDE * width}
             aside = state.balance.at(x, state.omega, values)
-            if np.abs(_even(aside.residual.reshape(x.shape))).max() > _NO_PARITY * aside.force_scale():
+            if np.abs(_even(aside.residual.reshape(x.shape))).max() > _NO_PARITY * aside.balanced.scale:
                 return None
     return End(
         f"the motions become symmetric at {b.where}, x(t + T/2) = -x(t): what follows are branch "

@@ -91,7 +91,7 @@ def curve_through(
     balance = balance.settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
     augmentation, extra = formulation.equations(kind_of(item)).through(item, state, names)
-    force = state.force_scale()
+    force = state.balanced.scale
     curve = MotionProblem(
         balance,
         names,
@@ -119,7 +119,7 @@ def with_extremum(curve: MotionProblem, u: np.ndarray, turning: str, plane: tupl
     base = curve.augmentation.own
     augmentation: Augmentation
     if isinstance(base, SingularOperator) and base.name == "LP":
-        augmentation = LimitPointExtremal(base, beside, state.force_scale() / sizes[beside], turning)
+        augmentation = LimitPointExtremal(base, beside, state.balanced.scale / sizes[beside], turning)
     else:
         augmentation = BorderedExtremal.of(base, state, extra, beside, turning, sizes, extra_spans)
     return replace(curve, augmentation=augmentation)
@@ -151,9 +151,7 @@ def solved_start(
         for _ in range(8):
             weights = curve.weights(u, 0.0)
             row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
-            if abs(row[-1]) > 1e-2:
-                row = np.eye(1, len(row), len(row) - 1)[0]
-            solved = correct(curve, u, row, weights, settings.newton)
+            solved = correct(curve, u, len(u) - 1 if abs(row[-1]) > 1e-2 else row, weights, settings.newton)
             adapted = curve.adapted(solved.u, solved.evaluation)
             same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
             if same:

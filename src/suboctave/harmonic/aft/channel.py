@@ -45,7 +45,7 @@ class Channel:
     """The laws of a group along a motion.
 
     known
-        Fourier coefficients of f and f_q, (1 + Q, top + 1), of what is known in closed form, where they are known.
+        Fourier coefficients of f and f_q, (1 + Q, top + 1), where they are known.
     """
 
     def __init__(self, group: Group, along: Along, laws: list[LawAlong], known: ComplexArray | None = None) -> None:
@@ -56,11 +56,11 @@ class Channel:
     @lazy
     def spectra(self) -> ComplexArray:
         """Fourier coefficients of f and f_q, (1 + Q, top + 1)."""
-        known = self._known
-        out = np.zeros((1 + self.along.size, self.along.top + 1), dtype=complex) if known is None else known.copy()
+        if self._known is not None:
+            return self._known
+        out = np.zeros((1 + self.along.size, self.along.top + 1), dtype=complex)
         for law in self.laws:
-            if known is None or not law.in_closed_form:
-                law.add_spectra(out)
+            law.add_spectra(out)
         return out
 
     def stiffness(self, i: int) -> ComplexArray:

@@ -11,6 +11,7 @@ p the polynomial of degree 10 that agrees at the Chebyshev nodes, with an error 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,16 +21,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import Nodes, even, rule_tables, search_grid, sharp_nodes, uniform_nodes
 from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, spectra
 
-__all__ = [
-    "NONE",
-    "NO_LINE",
-    "NO_ROWS",
-    "add_law",
-    "add_laws",
-    "contact_spectrum",
-    "polynomial_nodes",
-    "product_spectrum",
-]
+__all__ = ["NONE", "NO_LINE", "NO_ROWS", "add_law", "add_spectra", "add_step", "add_values", "places"]
 
 #: no coefficients of polynomials, no pieces or steps, no constant and slope
 NONE, NO_ROWS, NO_LINE = np.zeros(0), np.zeros((0, 3)), np.zeros(2)
@@ -44,6 +36,15 @@ def polynomial_nodes(degree: int, high: int, top: int) -> Nodes:
     return uniform_nodes(even(degree * high + top + 1))
 
 
+@lru_cache(maxsize=64)
+def places(high: int, top: int, degree: int) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:
+    """Where laws are looked at, as `add_spectra` wants it, for motions of harmonics up to `high`, Fourier coefficients
+    up to `top`, polynomials of that degree.
+    """
+    grid, nodes = search_grid(high), polynomial_nodes(degree, high, top)
+    return (grid.zr, grid.zi), (nodes.zr, nodes.zi, nodes.weights), rule_tables()
+
+
 def add_law(
     along: Along,
     out: ComplexArray,
@@ -54,27 +55,8 @@ def add_law(
 ) -> None:
     """Add the Fourier coefficients of laws of one displacement and of their slope to `out` (>= 2, top + 1)."""
     ends = np.array((0, len(pieces))), np.array((0, len(steps)))
-    add_laws(along.motions[:1], pieces, ends[0], polynomial[None], steps, ends[1], line[None], out[:, None])
-
-
-def add_laws(
-    motions: ComplexArray,
-    pieces: Array,
-    first: np.ndarray,
-    polynomial: Array,
-    steps: Array,
-    step_first: np.ndarray,
-    line: Array,
-    table: ComplexArray,
-) -> None:
-    """Add the Fourier coefficients of the laws along motions (G, H + 1) and of their slopes to `table` (>= 2, >= G,
-    top + 1); the laws as in `PackedLaws`.
-    """
-    high, top = motions.shape[1] - 1, table.shape[2] - 1
-    grid, nodes = search_grid(high), polynomial_nodes(polynomial.shape[1] - 1, high, top)
-    along_grid, along_nodes = (grid.zr, grid.zi), (nodes.zr, nodes.zi, nodes.weights)
-    laws = pieces, first, polynomial, steps, step_first, line
-    add_spectra(motions, *laws, along_grid, along_nodes, rule_tables(), table)
+    laws = pieces, ends[0], polynomial[None], steps, ends[1], line[None]
+    add_spectra(along.motions[:1], laws, *places(along.high, along.top, len(polynomial) - 1), out[:, None])
 
 
 @kernel()
@@ -197,10 +179,14 @@ def add_step(u, point, width, factor, force, stiffness):
 
 
 @kernel()
-def add_spectra(motions, pieces, first, polynomial, steps, step_first, line, grid, nodes, rules, table):
-    """See `add_laws`; grid: points on the circle for searches along the motion; nodes: those of the polynomials, with
-    weights; rules: `rule_tables`.
+def add_spectra(motions, laws, grid, nodes, rules, table):
+    """Add the Fourier coefficients of laws along motions (G, H + 1) and of their slopes to `table` (>= 2, >= G,
+    top + 1).
+
+    laws: see `PackedLaws.known`; grid: points on the circle for searches along the motion; nodes: those of the
+    polynomials, with weights; rules: `rule_tables`.
     """
+    pieces, first, polynomial, steps, step_first, line = laws
     top, high = table.shape[2] - 1, motions.shape[1] - 1
     for g in range(motions.shape[0]):
         c, force, stiffness = motions[g], table[0, g], table[1, g]

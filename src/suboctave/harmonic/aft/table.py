@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.harmonic.aft.closed_form import NO_LINE, NO_ROWS, NONE, add_laws
+from suboctave.harmonic.aft.closed_form import NO_LINE, NO_ROWS, NONE
 from suboctave.harmonic.aft.law import Along, LawAlong, Member
 from suboctave.harmonic.aft.pieces import Pieces
 from suboctave.harmonic.aft.polynomial import Polynomial
 from suboctave.harmonic.aft.sampled import GradedLaw, UniformLaw
 from suboctave.harmonic.aft.steps import ArctanSteps
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.quadrature import FEWEST
 from suboctave.lazy import lazy
 from suboctave.model.elements.smoothness import (
@@ -214,10 +214,7 @@ class PackedLaws(NamedTuple):
             max([law.unknown_samples for law in laws], default=0),
         )
 
-    def add_spectra(self, motions: ComplexArray, table: ComplexArray) -> bool:
-        """Add the Fourier coefficients of force and stiffness along motions (G, H + 1) to `table` (>= 2, >= G,
-        top + 1); returns whether they are finite.
-        """
-        add_laws(motions, self.pieces, self.first, self.polynomial, self.steps, self.step_first, self.line, table)
-        # a number that is not finite at any instant is in all coefficients
-        return bool(np.isfinite(table[:2, :, 0]).all())
+    @property
+    def known(self) -> tuple[NDArray[Any], ...]:
+        """What is known in closed form, as `closed_form.add_spectra` wants it."""
+        return self.pieces, self.first, self.polynomial, self.steps, self.step_first, self.line
