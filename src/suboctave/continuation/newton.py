@@ -131,11 +131,8 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    if isinstance(row, int):
-        kept, row = row, np.zeros(len(guess))
-        row[kept] = 1.0
-    u = guess.copy()
-    last: Evaluation | None = None
+    row = np.eye(1, len(guess), row)[0] if isinstance(row, int) else row
+    u, last = guess.copy(), None
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
     factor = known
     nearest: Solved | None = None

@@ -138,72 +138,67 @@ def jet(c, zr, zi):
 
 
 @kernel()
-def _refine(c, lo, hi, flo, level):
-    """A root of the motion minus `level` in the bracket (lo, hi), by Newton's method kept inside the bracket."""
-    tau = 0.5 * (lo + hi)
-    last = hi - lo
-    for _ in range(100):
-        x, d, _s = jet(c, math.cos(tau), math.sin(tau))
-        f = x - level
-        if f == 0.0:
-            return tau
-        if (f > 0.0) == (flo > 0.0):
-            lo = tau
-        else:
-            hi = tau
-        new = tau - f / d if d != 0.0 else np.inf
-        if not (lo < new < hi):
-            # a step out of the bracket that rounding alone explains: the root is here
-            if abs(new - tau) < 1e-14 * max(1.0, abs(tau)) or hi - lo < 4e-16 * max(1.0, abs(tau)):
-                return tau
-            new = 0.5 * (lo + hi)
-        step = abs(new - tau)
-        # converging quadratically: the step after one of 1e-8 is below rounding
-        if step < 1e-15 * max(1.0, abs(tau)) or (step < 1e-8 and step < 1e-4 * last):
-            x, d, _s = jet(c, math.cos(new), math.sin(new))
-            if d != 0.0 and abs(x - level) < abs(d) * 1e-12:
-                new -= (x - level) / d
-            return new
-        last = step
-        tau = new
-    return tau
-
-
-@kernel()
 def _search(c, level, lo, hi, f0, d0, f1, d1, roots, count):
     """Append the crossings of `level` in (lo, hi), an interval with one extremum at most; returns the new count.
 
     f, d: the motion minus level and its derivative at both ends.
     """
-    if (f0 > 0.0) != (f1 > 0.0):
-        roots[count] = _refine(c, lo, hi, f0, level)
-        return count + 1
-    if not ((f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0)):
-        return count
-    # an extremum towards the level lies in between: does it reach across?
-    if min(abs(f0), abs(f1)) > (hi - lo) * (abs(d0) + abs(d1)):
-        return count
-    first, last = lo, hi
-    tau = lo + (hi - lo) * d0 / (d0 - d1)
-    for _ in range(60):
-        x, d, s = jet(c, math.cos(tau), math.sin(tau))
-        if (x - level > 0.0) != (f0 > 0.0):
-            break
-        if (d > 0.0) == (d0 > 0.0):
-            lo = tau
-        else:
-            hi = tau
-        new = tau - d / s if s != 0.0 else 0.5 * (lo + hi)
-        if not (lo < new < hi):
-            new = 0.5 * (lo + hi)
-        if abs(new - tau) < 1e-14:
-            break
-        tau = new
-    x, d, s = jet(c, math.cos(tau), math.sin(tau))
-    if (x - level > 0.0) != (f0 > 0.0):
-        roots[count] = _refine(c, first, tau, f0, level)
-        roots[count + 1] = _refine(c, tau, last, x - level, level)
-        count += 2
+    between, there = hi, f1
+    if (f0 > 0.0) == (f1 > 0.0):
+        if not ((f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0)):
+            return count
+        # an extremum towards the level lies in between: does it reach across?
+        if min(abs(f0), abs(f1)) > (hi - lo) * (abs(d0) + abs(d1)):
+            return count
+        first, last = lo, hi
+        between = lo + (hi - lo) * d0 / (d0 - d1)
+        for _ in range(60):
+            x, d, s = jet(c, math.cos(between), math.sin(between))
+            if (x - level > 0.0) != (f0 > 0.0):
+                break
+            if (d > 0.0) == (d0 > 0.0):
+                first = between
+            else:
+                last = between
+            new = between - d / s if s != 0.0 else 0.5 * (first + last)
+            if not (first < new < last):
+                new = 0.5 * (first + last)
+            if abs(new - between) < 1e-14:
+                break
+            between = new
+        x, d, s = jet(c, math.cos(between), math.sin(between))
+        there = x - level
+        if (there > 0.0) == (f0 > 0.0):
+            return count
+    # a root in each bracket, by Newton's method kept inside it
+    for part in range(1 if between == hi else 2):
+        first, last, before = (lo, between, f0) if part == 0 else (between, hi, there)
+        tau, step = 0.5 * (first + last), last - first
+        for _ in range(100):
+            x, d, _s = jet(c, math.cos(tau), math.sin(tau))
+            f = x - level
+            if f == 0.0:
+                break
+            if (f > 0.0) == (before > 0.0):
+                first = tau
+            else:
+                last = tau
+            new = tau - f / d if d != 0.0 else np.inf
+            if not (first < new < last):
+                # a step out of the bracket that rounding alone explains: the root is here
+                if abs(new - tau) < 1e-14 * max(1.0, abs(tau)) or last - first < 4e-16 * max(1.0, abs(tau)):
+                    break
+                new = 0.5 * (first + last)
+            previous, step = step, abs(new - tau)
+            tau = new
+            # converging quadratically: the step after one of 1e-8 is below rounding
+            if step < 1e-15 * max(1.0, abs(tau)) or (step < 1e-8 and step < 1e-4 * previous):
+                x, d, _s = jet(c, math.cos(tau), math.sin(tau))
+                if d != 0.0 and abs(x - level) < abs(d) * 1e-12:
+                    tau -= (x - level) / d
+                break
+        roots[count] = tau
+        count += 1
     return count
 
 
