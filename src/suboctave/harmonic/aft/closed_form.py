@@ -41,7 +41,7 @@ def places(high: int, top: int, degree: int) -> tuple[tuple[Array, ...], tuple[A
     """Where laws are looked at, as `add_spectra` wants it, for motions of harmonics up to `high`, Fourier coefficients
     up to `top`, polynomials of that degree.
     """
-    grid, nodes = search_grid(high), polynomial_nodes(degree, high, top)
+    grid, nodes = search_grid(high), polynomial_nodes(max(degree, 0), high, top)
     return (grid.zr, grid.zi), (nodes.zr, nodes.zi, nodes.weights), rule_tables()
 
 
