@@ -7,7 +7,7 @@ import pytest
 
 import suboctave as so
 from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.normal_form.real import Expansion, cubic_coefficient
+from suboctave.bifurcation.normal_form import Expansion, cubic_coefficient
 from suboctave.continuation.linear import Factor, LeadingBlock
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.grazing import GrazingContactEquations

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.bifurcation.normal_form import NormalForm, normal_form
-from suboctave.bifurcation.normal_form.real import doubling_predictor
-from suboctave.bifurcation.normal_form.terms import with_criticality
+from suboctave.bifurcation.normal_form import Expansion, NormalForm, normal_form, with_criticality
 from suboctave.errors import InputError
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.perturbation import Kind
 from suboctave.timedomain import integrate, shoot
 
 
@@ -35,16 +35,27 @@ def size_of(b):
     return np.linalg.norm(b.orbit.coefficients * b.orbit.balance.scales()[0]) or 1.0
 
 
+def doubled_motion(b):
+    """Basis of twice the period, X, phi and X2 in it: motions `X + eps phi + eps^2 X2` beside a period doubling."""
+    state = b.orbit.state()
+    own = Expansion.of(state, Kind.HALF, b.null_vectors, b.parameter_name)
+    basis = HarmonicBasis(2 * state.basis.harmonics + 1, 2 * state.basis.nu)
+    half, first = own.phi.reshape(-1, state.balance.size), np.zeros((basis.size, state.balance.size))
+    first[1::4], first[2::4] = half[::2], half[1::2]
+    second = np.linalg.solve(state.jacobian, -0.5 * own.squared()).reshape(state.x.shape)
+    return basis, state.basis.resized(state.x, basis), first, state.basis.resized(second, basis)
+
+
 def doubled_curvature(b, share):
     """(p - p_PD) / eps^2 on the doubled branch, eps a share of the motion."""
     state, name = b.orbit.state(), b.parameter_name
-    predictor = doubling_predictor(state, b.null_vectors, name)
-    assert np.sum((predictor.first * state.balance.scales()[0]) ** 2) == pytest.approx(1.0)
-    balance = state.balance.with_basis(predictor.basis).settle(predictor.motion, state.omega, state.values)
+    basis, motion, first, second = doubled_motion(b)
+    assert np.sum((first * state.balance.scales()[0]) ** 2) == pytest.approx(1.0)
+    balance = state.balance.with_basis(basis).settle(motion, state.omega, state.values)
     eps, here = share * size_of(b), b.parameter(name)
-    start = predictor.motion + eps**2 * predictor.second
-    at = here + eps**2 * predictor.curvature
-    return (along(balance, start, predictor.first, eps, at, state.values, state.omega, name) - here) / eps**2
+    at = here + eps**2 * b.normal_form["curvature"]
+    start = motion + eps**2 * second
+    return (along(balance, start, first, eps, at, state.values, state.omega, name) - here) / eps**2
 
 
 def own_curvature(b, share):
@@ -96,14 +107,14 @@ def test_the_doubled_branch_bends_as_foretold(system, omega, share, rel):
 def test_the_doubled_branch_by_shooting():
     """Motions of two load periods, found without harmonics: their halves differ by 2 eps phi, eps^2 as foretold."""
     (b,) = so.frequency_response(so.library.reference_oscillator(p=0.55), (2.4, 2.2)).bifurcations["PD"]
-    predictor = doubling_predictor(b.orbit.state(), b.null_vectors, "omega")
+    basis, motion, first, second = doubled_motion(b)
     eps = 0.01 * size_of(b)
-    x, change = predictor.at(eps)
-    frequency = np.arange(1, predictor.basis.harmonics + 1) * 0.5 * b.omega
+    x, change = motion + eps * first + eps**2 * second, eps**2 * b.normal_form["curvature"]
+    frequency = np.arange(1, basis.harmonics + 1) * 0.5 * b.omega
     state = [x[0, 0] + x[1::2].sum(), frequency @ x[2::2, 0]]
     found = shoot(b.orbit.balance.system, state, b.omega + change, periods=2)
     half = integrate(b.orbit.balance.system, found.state, [0.0, 2.0 * np.pi / found.omega], found.omega)
-    phi = np.array([predictor.first[1::2].sum(), frequency @ predictor.first[2::2, 0]])
+    phi = np.array([first[1::2].sum(), frequency @ first[2::2, 0]])
     across = 0.5 * (found.state - np.array([half.x[-1, 0], half.v[-1, 0]]))
     assert across / eps == pytest.approx(phi, abs=2e-3)
     assert found.stable

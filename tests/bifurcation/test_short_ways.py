@@ -6,7 +6,7 @@ import pytest
 import suboctave as so
 from suboctave import CubicSpring, ElasticStop, HarmonicLoad, System
 from suboctave.bifurcation.bordered import bordered, null_vectors
-from suboctave.bifurcation.normal_form.real import Expansion, cubic_coefficient
+from suboctave.bifurcation.normal_form import Expansion, cubic_coefficient
 from suboctave.continuation import march
 from suboctave.continuation.linear import Factor, LeadingBlock
 from suboctave.curves.kinds.singular import SingularOperator

@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
-from suboctave.bifurcation.normal_form.real import cubic_coefficient
+from suboctave.bifurcation.normal_form import cubic_coefficient
 from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.point import CurvePoint
 from suboctave.curves.kinds.branch_point import BranchPointEquations
