@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.analysis.options import Inherited, settings_of
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct

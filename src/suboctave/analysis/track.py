@@ -10,7 +10,7 @@ from typing import Any, Unpack
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
 from suboctave.analysis.track_onto import aside, begun, curve_onto, start_onto
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent, kind_of
+from suboctave.bifurcation.bifurcation import CURVES_THROUGH, TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part

@@ -26,8 +26,8 @@ import numpy as np
 from suboctave.analysis.options import Inherited
 from suboctave.analysis.switching import switch_branch
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import CURVES_THROUGH, TrackedEvent
 from suboctave.bifurcation.bordered import null_vectors, transversality
-from suboctave.bifurcation.tracked import CURVES_THROUGH, TrackedEvent
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct

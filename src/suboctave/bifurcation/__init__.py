@@ -1,7 +1,7 @@
 """Where a response changes: limit points, branch points, period doublings, Neimark-Sacker points."""
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation, BifurcationList
-from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import NormalForm
 
 __all__ = [

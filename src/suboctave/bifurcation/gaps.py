@@ -1,4 +1,5 @@
-"""The gaps of a system's elements along a motion: where the relative displacement turns, and how far from each gap.
+"""The gaps of a system's elements along a motion: where the relative displacement turns, how far from each gap, and the
+contact that grazes.
 
 A gap is a place u = b at which an element's law has a corner (a piece of a piecewise-linear law), or is sharp (a point
 of `SharpSampling`). Elements that act along the same direction share one search for extrema.
@@ -6,7 +7,7 @@ of `SharpSampling`). Elements that act along the same direction share one search
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from suboctave.harmonic.trigonometric import extrema
 from suboctave.model.elements.base import BaseElement, Element
 from suboctave.model.elements.coupled import CoupledElement, as_coupled, reads
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, levels as levels_of
+
+__all__ = ["basis_rows", "read_direction"]
 
 
 @dataclass(eq=False, slots=True)
@@ -125,3 +128,68 @@ def rests_in_corner(state: BalanceState) -> bool:
                 if abs(above - below) > 1e-9 * max(abs(above), abs(below)):
                     return True
     return False
+
+
+#: what happens along a curve, and what happens the other way round
+_BACKWARDS = {
+    "begins to touch": "ceases to touch",
+    "begins to lift off": "ceases to lift off",
+}
+_BACKWARDS |= {there: here for here, there in _BACKWARDS.items()}
+
+
+@dataclass(frozen=True)
+class GrazingContact:
+    """A gap that a local extremum of an element's relative displacement just reaches.
+
+    Attributes
+    ----------
+    element, label
+        Index of the element in the system's list, and how messages name it.
+    gap
+        Displacement at which the element's law has its corner (unit of length).
+    time
+        Instant in the motion's period, 0 <= time < T.
+    change
+        What happens as the curve is followed on: a contact "begins to touch" or "ceases to touch" (an extremum that
+        comes from outside), or "begins to lift off", "ceases to lift off" (one inside a contact). Empty where the
+        contact belongs to a bifurcation beside the grazing.
+    parameter
+        Value of the free parameter at which it grazes.
+    distance
+        Way along the curve from the grazing to the bifurcation that it belongs to, in scaled arclength; 0 for the
+        grazing itself.
+    """
+
+    element: int
+    label: str
+    gap: float
+    time: float
+    change: str
+    parameter: float
+    distance: float = 0.0
+
+    def backwards(self) -> GrazingContact:
+        """The same on a curve followed the other way."""
+        return replace(self, change=_BACKWARDS.get(self.change, self.change))
+
+    def __str__(self) -> str:
+        return f"{self.label} {self.change}".strip()
+
+
+def read_direction(state: BalanceState, element: int) -> Array:
+    """The displacement that an element's gaps are places of, in the unknown DOFs."""
+    system = state.balance.system
+    return state.linear.retain(reads(system.elements[element], system.n))
+
+
+def basis_rows(high: int, tau: float) -> tuple[Array, Array, Array]:
+    """Basis functions at an instant and their first two derivatives by tau, shape (2 H + 1,) each."""
+    k = np.arange(1.0, high + 1.0)
+    value, slope, curve = np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1)
+    c, s = np.cos(k * tau), np.sin(k * tau)
+    value[0], slope[0], curve[0] = 1.0, 0.0, 0.0
+    value[1::2], value[2::2] = c, s
+    slope[1::2], slope[2::2] = -k * s, k * c
+    curve[1::2], curve[2::2] = -(k**2) * c, -(k**2) * s
+    return value, slope, curve

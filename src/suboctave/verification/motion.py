@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.curves.points import BranchPoint

@@ -24,9 +24,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.bifurcation.contact import GrazingContact
-from suboctave.bifurcation.gaps import contact_side, gap_extrema, level_rate, levels
-from suboctave.bifurcation.grazing import basis_rows, read_direction
+from suboctave.bifurcation.gaps import (
+    GrazingContact,
+    basis_rows,
+    contact_side,
+    gap_extrema,
+    level_rate,
+    levels,
+    read_direction,
+)
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import between, point_between
 from suboctave.curves.events.finder import Located, position

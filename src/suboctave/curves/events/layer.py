@@ -28,8 +28,7 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.bordered import at_values, bordered, residual_scale
-from suboctave.bifurcation.contact import GrazingContact
-from suboctave.bifurcation.gaps import gap_extrema
+from suboctave.bifurcation.gaps import GrazingContact, gap_extrema
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
 from suboctave.curves.events.grazings import Grazing, Touch

@@ -20,7 +20,7 @@ import numpy as np
 
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import null_vectors, transversality
-from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.events.locate import Guess, Singular, locate_branch_point
 from suboctave.curves.sample import Sample

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.gaps import level_rate, levels
-from suboctave.bifurcation.grazing import basis_rows, read_direction
+from suboctave.bifurcation.gaps import basis_rows, level_rate, levels, read_direction
 from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import kind_of
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
-from suboctave.bifurcation.tracked import kind_of
 from suboctave.curves.augmentation import Augmentation, Equations, Gradient
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState

@@ -13,8 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from suboctave.bifurcation.gaps import GapExtrema, gap_extrema, level_rate
-from suboctave.bifurcation.grazing import basis_rows, read_direction
+from suboctave.bifurcation.gaps import GapExtrema, basis_rows, gap_extrema, level_rate, read_direction
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 
 import scipy
 
-from suboctave.bifurcation.contact import GrazingContact
-from suboctave.bifurcation.gaps import levels
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
+from suboctave.bifurcation.gaps import GrazingContact, levels
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point, point_between

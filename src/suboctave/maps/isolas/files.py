@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from suboctave.analysis.options import SearchOptions
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.curves.junction import period_name
 from suboctave.curves.points import TrackedPoint

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import pass_on
 from suboctave.maps.catalogue import Catalogue, branch_through

@@ -24,7 +24,7 @@ import numpy as np
 from suboctave.analysis.frequency_response import continue_branch
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds
-from suboctave.bifurcation.tracked import TrackedEvent
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.bifurcation.bordered import NullVectors
-from suboctave.bifurcation.contact import GrazingContact
+from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import NormalForm
-from suboctave.bifurcation.tracked import TrackedEvent
 from suboctave.continuation.ending import Ending, read_endings
 from suboctave.curves.audit import Audit, Unsettled
 from suboctave.curves.junction import Junction

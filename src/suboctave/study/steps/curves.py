@@ -17,7 +17,7 @@ from suboctave.analysis.options import settings_of
 from suboctave.analysis.switching import check_left, switch_branch
 from suboctave.analysis.track import track
 from suboctave.analysis.track_onto import motion_kind
-from suboctave.bifurcation.tracked import CURVES_THROUGH
+from suboctave.bifurcation.bifurcation import CURVES_THROUGH
 from suboctave.continuation import Event
 from suboctave.errors import InputError, is_number, suggest
 from suboctave.kinds import KINDS, TRACKED_KINDS
