@@ -21,7 +21,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import suboctave as so
-from suboctave.experiments.basins.attractors import Catalogue
+from suboctave.experiments.basin_attractors import Catalogue
 from suboctave.experiments.common import checked_integration
 from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.trapping import Trap

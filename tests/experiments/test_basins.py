@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 import pytest
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.experiments.basins import run as basin_run
 from suboctave.timedomain import shoot
 from suboctave.timedomain.flow import Flow
 
+basin_run = importlib.import_module("suboctave.experiments.basins")
 DUFFING = so.library.duffing(c=0.1, alpha=1.0, F=0.3)
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.floquet import floquet_multipliers, koopman_hill
-from suboctave.floquet.koopman_hill import transition
+from suboctave.floquet import floquet_multipliers, hill
+from suboctave.floquet.hill import transition
 from suboctave.floquet.variational import Variational, two_sided
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.timedomain import shoot
@@ -82,7 +82,7 @@ def test_the_exponential_by_its_action(monkeypatch, subharmonic):
     orbit = so.frequency_response(so.library.nltva(), (0.8, 1.0), 9).orbits[-1]
     system = Variational.of(orbit.state(), 18)
     dense = transition(system, 9, subharmonic)
-    monkeypatch.setattr(koopman_hill, "_DENSE", 0)
+    monkeypatch.setattr(hill, "_DENSE", 0)
     np.testing.assert_allclose(transition(system, 9, subharmonic), dense, atol=1e-11 * np.abs(dense).max())
 
 
@@ -122,8 +122,6 @@ def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
 
 def test_a_strip_that_holds_another_number_is_no_result(monkeypatch):
     """A spurious eigenvalue inside the strip is found out."""
-    from suboctave.floquet import hill
-
     honest = hill.exponents
     monkeypatch.setattr(hill, "exponents", lambda system, h: np.append(honest(system, h), -0.1 + 0.01j))
     orbit = so.frequency_response(so.library.duffing(), (2.0, 1.9), 9).orbits[-1]

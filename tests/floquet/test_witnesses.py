@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.floquet.koopman_hill import transition
+from suboctave.floquet.hill import transition
 from suboctave.floquet.variational import Variational
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.timedomain import integrate, shoot

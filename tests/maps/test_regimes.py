@@ -9,8 +9,7 @@ import suboctave as so
 from suboctave.analysis.diagram import ByDepth, ByPeriod, grown_from
 from suboctave.maps.catalogue import Catalogue, SearchRange, carrier_of
 from suboctave.maps.regimes.map import RegimeMap
-from suboctave.maps.regimes.slices import Arc, Edge, Slice
-from suboctave.maps.regimes.strips import Strip
+from suboctave.maps.regimes.slices import Arc, Edge, Slice, Strip
 
 DAMPING, STIFF = 0.1, 1.0
 

@@ -22,15 +22,13 @@ from suboctave.curves.junction import Junction
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption
+from suboctave.model.inputs import timed
 from suboctave.model.system import System
-from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.store.layout import events_met
-
-__all__ = ["BifurcationDiagram", "DiagramBranch", "Keeper", "bifurcation_diagram"]
 
 #: kinds at which other branches leave
 _SWITCHED = ("PD", "BP")

@@ -6,8 +6,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.options import CurveOptions, settings_of
-from suboctave.analysis.run import CurveRun
+from suboctave.analysis.options import CurveOptions, CurveRun, settings_of
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.analysis.switching import leave_along
 from suboctave.bifurcation import Bifurcation
@@ -20,9 +19,8 @@ from suboctave.errors import InputError, is_number
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
-from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
+from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system, timed
 from suboctave.model.system import System
-from suboctave.model.timed import timed
 from suboctave.options import RunOptions, with_options
 from suboctave.results.branch import Branch
 
@@ -219,6 +217,3 @@ def _warn_of_return(trace: Trace, name: str, first: float, call: str) -> None:
             f"the branch folds back and leaves the range where it began, at {name} = {first:.6g}: what the other end "
             f"leads to lies on another branch, {call}"
         )
-
-
-__all__ = ["continue_branch", "frequency_response"]

@@ -39,8 +39,6 @@ from suboctave.errors import InputError, shortened
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.interruption import limited
 
-__all__ = ["locate_extremum", "newton_extremum"]
-
 #: step of the differences along Psi, in units of the motion and of the parameters' ranges
 _STEP = 3e-5
 #: last correction in scaled arclength, at most

@@ -19,8 +19,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.options import CurveOptions, SearchOptions, settings_of
-from suboctave.analysis.run import CurveRun
+from suboctave.analysis.options import CurveOptions, CurveRun, SearchOptions, settings_of
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
@@ -44,8 +43,6 @@ from suboctave.options import with_options
 from suboctave.progress import Report
 from suboctave.results.branch import Branch
 from suboctave.timedomain import integrate
-
-__all__ = ["Seeds", "find_subharmonics", "isolated_branches", "periodic_orbit", "subharmonic_start"]
 
 #: part of a motion at fractions of omega below which it is taken for a motion of the load's period
 _SUBHARMONIC = 1e-3

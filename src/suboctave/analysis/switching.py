@@ -13,8 +13,7 @@ from typing import Unpack
 
 import numpy as np
 
-from suboctave.analysis.options import CurveOptions, Inherited, settings_of
-from suboctave.analysis.run import CurveRun
+from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, settings_of
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import null_vectors
 from suboctave.bifurcation.branching import branching_equation
@@ -31,12 +30,9 @@ from suboctave.curves.trace import Settings, Trace
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import KINDS
-from suboctave.model.inputs import check_bounds
-from suboctave.model.timed import timed
+from suboctave.model.inputs import check_bounds, timed
 from suboctave.options import with_options
 from suboctave.results.branch import Branch
-
-__all__ = ["check_left", "leave_along", "switch_branch"]
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01

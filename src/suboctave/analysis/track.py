@@ -1,4 +1,21 @@
-"""`track`: a bifurcation followed in two parameters, an extremum along a curve of them in a third."""
+"""`track`: a bifurcation followed in two parameters, an extremum along a curve of them in a third.
+
+From a point of codimension two onto the other curve of bifurcations that passes through it, or begins there.
+
+Where two curves cross (LPPD, LPNS, PDNS, NSNS) the point lies on both. At R1 and R2 Neimark-Sacker points begin on a
+curve of LP or PD: with g of `bifurcation.bordered` as a function of kappa, and k its distance from 0 or w0/2,
+
+    g = g_0 + i k g_1 + k^2 g_2 + ...,    g_i real,
+
+so that the equations of an NS, `Re g = 0` and `Im g / k = 0`, are smooth in k^2 and hold at k^2 = 0 where g_0 = g_1 =
+0: at R1, R2. The curve is entered at a small k, held fixed. On its other side, k^2 < 0, are neutral saddles, two real
+multipliers with product one, which bifurcate nowhere: no k is theirs, and the side need not be chosen.
+
+At a GPD the motions of twice the period change sides. On one side of it the doubled branch turns back close to its
+birth, and these limit points are a curve that ends at the GPD, tangent to the curve of period doublings. It is entered
+beside its end: at a value of the second parameter near that of the GPD the period doubling is located, the doubled
+branch followed, and its first limit point taken.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +24,36 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Unpack
 
+import numpy as np
+
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
-from suboctave.analysis.track_onto import aside, begun, curve_onto, start_onto
+from suboctave.analysis.switching import switch_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH, TrackedEvent, kind_of
-from suboctave.continuation import CurvePoint, SteppingOptions
-from suboctave.continuation.linear import one_thread
+from suboctave.bifurcation.bordered import null_vectors, transversality
+from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
+from suboctave.continuation.linear import length, one_thread
+from suboctave.continuation.newton import correct
+from suboctave.continuation.point import make_point
 from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
 from suboctave.curves.events.formulation import BorderedSystem
-from suboctave.curves.motion import MotionProblem
+from suboctave.curves.events.locate import Guess, Singular
+from suboctave.curves.events.monitors import PERIOD_DOUBLING
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.points import BranchPoint
+from suboctave.curves.refine import solved_bifurcation
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
-from suboctave.curves.tracked.start import Box, discretisation, is_extremum, solved_start
-from suboctave.errors import InputError, is_number
+from suboctave.curves.tracked.start import Box, curve_through, discretisation, is_extremum, solved_start, spans_of
+from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import AdaptiveHarmonics
-from suboctave.kinds import MOTION_KINDS, TRACKED_KINDS
-from suboctave.model.inputs import check_bounds, check_parameter, check_range
-from suboctave.model.timed import timed
+from suboctave.interruption import pass_on
+from suboctave.kinds import KINDS, MOTION_KINDS, TRACKED_KINDS
+from suboctave.model.inputs import check_bounds, check_parameter, check_range, timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.results.tracked_branch import TrackedBranch
@@ -299,4 +325,263 @@ def _leads_inside(point: CurvePoint, box: Box) -> bool:
     return True
 
 
-__all__ = ["track"]
+#: distances of kappa from 0 or w0/2, in units of w0, at which Neimark-Sacker points are looked for beside a resonance
+_SHARES = (0.02, 0.01, 0.03, 0.005, 0.0025)
+#: the farthest that they lie from it, in scaled arclength, and their multipliers from the unit circle
+_NEAR, _CRITICAL = 0.2, 0.02
+#: component of the parameters' forces along the left null vector below which there is none
+_FORCED = 1e-6
+#: way along a curve from a point of codimension two, in scaled arclength, from which it is met like any other
+_ASIDE = 2e-3
+#: distances from the GPD at which the curve is looked for, in units of the second parameter's range
+_GPD_SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)
+#: steps from the GPD to there
+_STEPS = 24
+#: way of a limit point from the birth of its branch, in scaled arclength, that is far enough from the GPD
+_CLEAR = 0.01
+#: range of the first parameter in which the doubled branch is followed, in units of its value
+_AROUND = 0.05
+
+
+def motion_kind(onto: Any) -> tuple[str, dict[str, float]] | None:
+    """The kind of motions that `onto` names, with the numbers that choose among its curves; None where it names none.
+    InputError for a kind or a number that there is not.
+    """
+    given = dict(onto) if isinstance(onto, Mapping) else {"name": onto}
+    name = given.pop("name", None)
+    choices = KINDS[name].choices if name in MOTION_KINDS else None
+    if choices is None:
+        if isinstance(onto, Mapping):
+            raise InputError(f"onto= has no kind of motions {name!r}{suggest(str(name), MOTION_KINDS)}")
+        return None
+    for key, number in given.items():
+        if key not in choices:
+            raise InputError(f"{name} has no {key!r}{suggest(str(key), choices)}")
+        if not (is_number(number) and number > 0.0):
+            raise InputError(f"{key} of {name} must be a positive number, not {shortened(number)}")
+    return name, {**choices, **given}
+
+
+def begun(start: Any, onto: Any, observe: int | None) -> tuple[Any, str | None]:
+    """What a curve begins at, and the kind that is chosen of those through it: a motion as a point of its own curve."""
+    kind = motion_kind(onto)
+    if kind is None:
+        return start, onto
+    if not isinstance(start, Bifurcation | BranchPoint):
+        raise InputError(
+            f"a curve of {kind[0]} begins at a point of a branch or at a located one, not {type(start).__name__}"
+        )
+    known = start.context or {} if isinstance(start, Bifurcation) else {}
+    orbit = start.orbit
+    dof = next((d for d in (observe, known.get("observe")) if d is not None), orbit.system.observed_dof)
+    context = {**known, "observe": dof, "onto": {"name": kind[0], **kind[1]}}
+    floquet, size = start.floquet, orbit.amplitude(dof)
+    return Bifurcation(kind[0], orbit, floquet, orbit.residual, size, "omega", context=context), None
+
+
+def curve_onto(item: Bifurcation, onto: str | None) -> str:
+    """Kind of the curve that is followed from a point of codimension two; default: the one that it was not found on.
+    InputError where it lies on no such curve.
+    """
+    if item.kind not in CURVES_THROUGH or not isinstance(item, TrackedEvent):
+        if onto is not None:
+            raise InputError(
+                f"onto= chooses between the curves through a point of codimension two ({', '.join(CURVES_THROUGH)}); "
+                f"this is a {item.kind}: leave it out"
+            )
+        return item.kind
+    if item.turning:
+        raise InputError(
+            f"this {item.kind} lies on a curve of extrema in {', '.join(item.names)}: other curves are entered from "
+            "points of curves in two parameters"
+        )
+    kinds = CURVES_THROUGH[item.kind]
+    if onto is None:
+        return next((kind for kind in kinds if kind != item.curve), kinds[0])
+    if onto not in kinds:
+        raise InputError(
+            f"onto={onto!r}: the curves through a {item.kind} are {' and '.join(kinds)}{suggest(onto, kinds)}"
+        )
+    return onto
+
+
+def start_onto(
+    item: TrackedEvent,
+    kind: str,
+    names: tuple[str, ...],
+    box: Box,
+    newton: NewtonOptions,
+) -> Bifurcation:
+    """A bifurcation of a kind at a point of codimension two, or beside it where its curve begins there; InputError if
+    the curve lies outside the ranges, ConvergenceError where nothing of that kind is found.
+    """
+    if item.kind == "GPD" and kind == "LP":
+        if names != item.names:
+            raise InputError(
+                f"the limit points that leave this GPD are followed over {' and '.join(item.names)}, in which it was "
+                "found"
+            )
+        low, high = box.second
+        return limit_point_beside(item, high - low)
+    if kind == "LP" and _symmetric(item, names):
+        kind = "BP"
+    if kind != "NS":
+        return replace(item, curve=kind, kappa=0.0)
+    if item.kind in ("R1", "R2"):
+        return _beside_resonance(item, names, box, newton)
+    return replace(item, curve=kind, kappa=_frequency(item))
+
+
+def _symmetric(item: TrackedEvent, names: tuple[str, ...]) -> bool:
+    """Whether no parameter moves the multiplier +1: it belongs to branch points that a symmetry forces.
+
+    The equations of a limit point hold there, too, but are singular.
+    """
+    state = item.orbit.state()
+    vectors = null_vectors(state, Kind.INTEGER)
+    return all(transversality(state, vectors, name) <= _FORCED for name in names)
+
+
+def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:
+    """A start a little beside a point of codimension two, which the curve then passes; the start where none is found.
+
+    Tests vanish at the point itself, and do not tell there that they change sign.
+    """
+    for way in (_ASIDE, -_ASIDE):
+        row = start.weights * start.tangent
+        try:
+            solved = correct(start.curve, start.u + way * start.tangent, row / length(row), start.weights, newton)
+        except ConvergenceError:
+            continue
+        point = make_point(solved, start.curve, start.tangent, 0.0)
+        assert isinstance(point.curve, MotionProblem)
+        if box.around(point.curve.names, point.curve.named(point.u)):
+            return point
+    return start
+
+
+def _frequency(item: TrackedEvent) -> float:
+    """kappa of the pair on the unit circle; at an NSNS of the pair that its curve does not follow. ConvergenceError if
+    there is none.
+    """
+    if item.curve == "NS" and item.kind != "NSNS":
+        return item.kappa
+    mu = item.multipliers
+    if item.curve == "NS":
+        critical = item.critical_multiplier()
+        apart = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+        mu = np.delete(mu, np.argsort(apart)[:2])  # both of the pair that the curve follows
+    pairs = mu[mu.imag > 1e-9 * np.abs(mu)]
+    if not pairs.size:
+        raise ConvergenceError(f"this {item.kind} has no complex pair of multipliers")
+    pair = min(pairs, key=lambda m: abs(abs(m) - 1.0))
+    return float(np.angle(pair)) / item.orbit.period
+
+
+def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newton: NewtonOptions) -> Bifurcation:
+    """A Neimark-Sacker point close to a 1:1 or 1:2 resonance."""
+    orbit = item.orbit
+    rate = orbit.omega / orbit.basis.nu
+    balance = HarmonicBalance(orbit.system, orbit.basis, linear=own_linear_part(orbit))
+    outside, reason = False, "they lie elsewhere, or more harmonics are needed"
+    for share in _SHARES:
+        kappa = (share if item.kind == "R1" else 0.5 - share) * rate
+        beside = replace(item, curve="NS", kappa=kappa)
+        try:
+            curve, u = curve_through(beside, balance, None, names, spans_of(item, names, box))
+            weights = curve.weights(u, 0.0)
+            solved = correct(curve, u, curve.balance.dimension, weights, newton)
+        except ConvergenceError as failure:
+            reason = str(failure)
+            continue
+        evaluation = solved.evaluation
+        assert isinstance(evaluation, MotionEvaluation)
+        if length(weights * (solved.u - u)) > _NEAR or evaluation.doubt > _CRITICAL:
+            continue
+        state = evaluation.state
+        values = dict(state.values)
+        there = replace(orbit, balance=state.balance, coefficients=state.x.copy(), omega=state.omega, values=values)
+        start = replace(beside, orbit=there)
+        if box.around(names, {name: start.parameter(name) for name in names}):
+            return start
+        outside = True
+    at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in item.names)
+    if outside:
+        raise InputError(
+            f"the Neimark-Sacker points that begin in the {item.kind} at {at} lie outside the ranges: widen them"
+        )
+    raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {reason}")
+
+
+# ------------------------------------------------------------------------------------------ the limit points of a GPD
+def limit_point_beside(event: TrackedEvent, span: float) -> Bifurcation:
+    """A limit point of the doubled motions close to a GPD; ConvergenceError where there is none. `span`: width of the
+    second parameter's range.
+    """
+    best: tuple[float, Bifurcation] | None = None
+    for share in _GPD_SHARES:
+        for sign in (1.0, -1.0):
+            try:
+                candidate = _limit_point(event, sign * share * span)
+            except ConvergenceError:
+                continue
+            if candidate is not None and (best is None or candidate[0] > best[0]):
+                best = candidate
+        if best is not None and best[0] > _CLEAR:
+            break
+    if best is not None:
+        return best[1]
+    first, second = event.names
+    raise ConvergenceError(
+        f"no limit point of the doubled motions was found beside the GPD at {first} = {event.parameter(first):.6g}, "
+        f"{second} = {event.parameter(second):.6g}"
+    )
+
+
+def _doubling_at(event: TrackedEvent, way: float) -> Singular:
+    """The period doubling at a distance from the GPD, in steps along its curve."""
+    free, fixed = event.names
+    orbit = event.orbit
+    span = 2.0 * _AROUND * (abs(event.parameter(free)) or 1.0)
+    x, first = orbit.coefficients, event.parameter(free)
+    step_x, step = np.zeros_like(x), 0.0
+    vectors = event.null_vectors
+    for number in range(1, _STEPS + 1):
+        values = {**orbit.values, fixed: event.parameter(fixed) + way * number / _STEPS}
+        omega = orbit.omega
+        if free == "omega":
+            omega = first + step
+        else:
+            values[free] = first + step
+        guess = Guess(orbit.balance, x + step_x, omega, values, free, span, vectors=vectors)
+        doubling = PERIOD_DOUBLING.solve(guess)
+        state = doubling.state
+        value = state.omega if free == "omega" else state.values[free]
+        step_x, step = state.x - x, value - first
+        x, first, vectors = state.x, value, doubling.vectors
+    return doubling
+
+
+def _limit_point(event: TrackedEvent, way: float) -> tuple[float, Bifurcation] | None:
+    """The first limit point of the doubled branch at a distance from the GPD, and how far from its birth it lies."""
+    free, fixed = event.names
+    orbit = event.orbit
+    value = event.parameter(free)
+    start = _doubling_at(event, way)
+    system = orbit.system.with_parameters({fixed: event.parameter(fixed) + way})
+    linear = own_linear_part(orbit, system)
+    balance = HarmonicBalance(system, orbit.basis, linear=linear).settle(start.state.x, start.state.omega)
+    width = _AROUND * (abs(value) or 1.0)
+    curve = MotionProblem.response(balance, free, orbit.omega, 2.0 * width, orbit.adaptive)
+    observe = Inherited(event).observe or 0
+    own = replace(start, state=balance.at(start.state.x, start.state.omega, start.state.values))
+    doubling = solved_bifurcation(PERIOD_DOUBLING, own, curve, observe, [])
+    there = doubling.parameter(free)
+    context: dict[str, Any] = {**(event.context or {}), "bounds": {free: (there - width, there + width)}}
+    stepping = SteppingOptions(max_step=0.03, max_points=60)
+    branch = switch_branch(replace(doubling, context=context), stepping=stepping)
+    pass_on(branch.interruption)
+    limits = branch.bifurcations["LP"]
+    if not limits:
+        return None
+    return float(limits[0].arclength), limits[0]

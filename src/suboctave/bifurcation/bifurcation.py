@@ -18,8 +18,6 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.lazy import lazy
 
-__all__ = ["CURVES_THROUGH", "TrackedEvent", "kind_of"]
-
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)
 

@@ -28,8 +28,6 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import motion_size
 
-__all__ = ["BranchingEquation", "branching_equation", "doubled_direction"]
-
 #: discriminant of the branching equation, relative to its coefficients, below which two branches are not told apart
 _DISTINCT = 1e-10
 

@@ -19,8 +19,6 @@ from suboctave.model.elements.base import BaseElement, Element
 from suboctave.model.elements.coupled import CoupledElement, as_coupled, reads
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, levels as levels_of
 
-__all__ = ["basis_rows", "read_direction"]
-
 
 @dataclass(eq=False, slots=True)
 class GapExtrema:

@@ -60,8 +60,6 @@ from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.trigonometric import wave_sums
 from suboctave.harmonic.waves import Frequencies, Waves
 
-__all__ = ["FORMS", "NormalForm", "normal_form"]
-
 SUPERCRITICAL, SUBCRITICAL = "supercritical", "subcritical"
 #: share of the terms that add up to it below which a number counts as zero whatever its estimated error
 ROUNDING = 1e-9

@@ -1,17 +1,14 @@
 """Experiments in time: trajectories, sections, brute force, exponents, basins, stepped sine, measured curves."""
 
 from suboctave.experiments import files
-from suboctave.experiments.attractors import Attractor
 from suboctave.experiments.basins import Basins, basins
 from suboctave.experiments.brute_force import BruteForceDiagram, brute_force_diagram
-from suboctave.experiments.lyapunov import LyapunovExponents, lyapunov_exponents
+from suboctave.experiments.lyapunov import LyapunovExponents, Separation, TwoTrajectories, lyapunov_exponents
 from suboctave.experiments.lyapunov_map import LyapunovMap, lyapunov_map
 from suboctave.experiments.measured import Measured, read_measured
-from suboctave.experiments.poincare import PoincareSections, poincare_sections
-from suboctave.experiments.stepped_result import SteppedSine
-from suboctave.experiments.stepped_sine import stepped_sine
+from suboctave.experiments.poincare import Attractor, PoincareSections, poincare_sections
+from suboctave.experiments.stepped_sine import SteppedSine, stepped_sine
 from suboctave.experiments.trajectories import Trajectory, integrate
-from suboctave.experiments.two_trajectories import Separation, TwoTrajectories
 
 __all__ = [
     "Attractor",

@@ -16,22 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError, suggest
-from suboctave.experiments.attractors import Attractor, attractor_of
 from suboctave.experiments.common import (
     FEW,
     Integration,
+    Layout,
     SectionOptions,
+    TimeResult,
     checked_integration,
     start_state,
     starting_states,
     varied_grid,
 )
-from suboctave.experiments.time_result import Layout, TimeResult
+from suboctave.experiments.poincare import Attractor, attractor_of
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count
+from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
-from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.columns import parameter_column
@@ -40,8 +40,6 @@ from suboctave.timedomain.flow import Flow, check_extent
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-__all__ = ["BruteForceDiagram", "brute_force_diagram"]
 
 _CARRIED = ("up", "down")
 _STARTS = (*_CARRIED, "rest")

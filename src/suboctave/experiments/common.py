@@ -1,10 +1,14 @@
-"""What experiments in time share: starts, counts, grids and options that are checked, and forces without jumps."""
+"""What experiments in time share: starts, counts, grids and options that are checked, forces without jumps,
+and results that can be saved, loaded and written as a table.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,26 +20,16 @@ from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.inputs import check_count, check_parameter, check_range, observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
+from suboctave.store.arrays import flat
+from suboctave.store.registry import Stored
+from suboctave.store.table import Table, write_csv
 from suboctave.timedomain.flow import METHODS, Flow
-from suboctave.timedomain.layout import Layout
+from suboctave.timedomain.layout import Layout as StateLayout
+from suboctave.version import __version__
 
-__all__ = [
-    "FEW",
-    "TOLERANCE",
-    "BasinOptions",
-    "ComplexArray",
-    "Integration",
-    "ParallelOptions",
-    "RecognitionOptions",
-    "SectionOptions",
-    "check_continuous",
-    "checked_integration",
-    "checked_range",
-    "start_state",
-    "starting_states",
-    "steps_of",
-    "varied_grid",
-]
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 
@@ -202,7 +196,7 @@ def check_continuous(system: System, state: Array, omega: float, values: Mapping
     Derivatives of the flow take continuous forces for granted. Between the two samples of the motion that differ most
     in force, the place is halved again and again: what is left of a continuous force is nothing.
     """
-    own = Layout(system).called_back
+    own = StateLayout(system).called_back
     if not own:
         return
     flow = Flow(system, "newmark", _PER_PERIOD, _PER_PERIOD, lanes=8)
@@ -242,3 +236,69 @@ def _check_jump(system: System, element: Any, states: Array, values: Mapping[str
             f"{element.label}: the force jumps by {abs(last - first):.3g} at ({place}); the derivative of the flow "
             "does not contain that. Write the law with a steep but continuous passage"
         )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What of a result is written as it is: arrays with their axes, and attributes with their kinds.
+
+    An array on the one axis of its own name is the coordinate there. `names`: variables that are not called as here.
+    """
+
+    contents: str
+    arrays: Mapping[str, tuple[str, ...]]
+    attributes: Mapping[str, type]
+    names: Mapping[str, str] = field(default_factory=dict)
+
+
+class TimeResult(Stored, ABC):
+    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications."""
+
+    layout: ClassVar[Layout]
+    system: System
+
+    @abstractmethod
+    def to_xarray(self) -> xarray.Dataset:
+        """The result as a labelled dataset, with what produced it."""
+
+    @abstractmethod
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The result as a table."""
+
+    def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
+        """The table as comma-separated text (.csv)."""
+        return write_csv(self.to_dataframe(), path, overwrite)
+
+    def to_table(self) -> Table:
+        """The table with the result beside it (`.result`)."""
+        import numpy as np
+
+        frame = self.to_dataframe()
+        columns = {str(name): np.asarray(frame[name].tolist()) for name in frame.columns}
+        return Table(columns, repr(self).splitlines()[0], self)
+
+    def _dataset(
+        self,
+        variables: Mapping[str, Any] | None = None,
+        coordinates: Mapping[str, Any] | None = None,
+        attributes: Mapping[str, Any] | None = None,
+    ) -> xarray.Dataset:
+        """A dataset of everything in the layout, of what is given besides, and of what produced it."""
+        import numpy as np
+        import xarray
+
+        layout, system = self.layout, self.system
+        values = getattr(self, "parameters", system.parameters)
+        arrays = {layout.names.get(one, one): (axes, getattr(self, one)) for one, axes in layout.arrays.items()}
+        arrays |= {"parameters": (("parameter",), np.array(list(values.values()), dtype=float)), **(variables or {})}
+        own = {layout.names.get(one, one): getattr(self, one) for one in layout.attributes}
+        plain = {name: int(value) if isinstance(value, bool) else value for name, value in own.items()}
+        produced = {"dofs": system.n, "system": system.name, "suboctave": __version__}
+        dataset = xarray.Dataset(
+            dict(flat(arrays)),
+            coords={**(coordinates or {}), "parameter": list(values)},
+            attrs={"contents": layout.contents, **plain, **(attributes or {}), **produced},
+        )
+        if "dof" in dataset.dims:
+            dataset = dataset.assign_coords(dof=list(system.dof_names or range(system.n)))
+        return dataset

@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.experiments.basins.attractors import BasinAttractor
-from suboctave.experiments.basins.verb import Basins
+from suboctave.experiments.basin_attractors import BasinAttractor
+from suboctave.experiments.basins import Basins
 from suboctave.experiments.brute_force import BruteForceDiagram
-from suboctave.experiments.lyapunov import LyapunovExponents
+from suboctave.experiments.common import TimeResult
+from suboctave.experiments.lyapunov import LyapunovExponents, Separation, TwoTrajectories
 from suboctave.experiments.lyapunov_map import LyapunovMap
 from suboctave.experiments.poincare import PoincareSections
-from suboctave.experiments.stepped_result import SteppedSine
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.stepped_sine import SteppedSine
 from suboctave.experiments.trajectories import Trajectory
-from suboctave.experiments.two_trajectories import Separation, TwoTrajectories
 from suboctave.model.system import System, build
 from suboctave.store.arrays import array_of, flat
 from suboctave.store.plain import from_json, to_json

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
+    Layout,
     ParallelOptions,
+    TimeResult,
     check_continuous,
     checked_range,
     start_state,
     varied_grid,
 )
 from suboctave.experiments.lyapunov import smooth_weights
-from suboctave.experiments.time_result import Layout, TimeResult
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_parameter, read_values
+from suboctave.model.inputs import check_count, check_parameter, read_values, timed
 from suboctave.model.system import System
-from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.columns import parameter_column
@@ -31,8 +31,6 @@ from suboctave.timedomain.flow import Flow, check_extent
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-__all__ = ["LyapunovMap", "lyapunov_map"]
 
 #: stretches that one trajectory is cut into
 _STRETCHES = 8

@@ -12,8 +12,6 @@ import numpy as np
 from suboctave.errors import InputError, is_number, path_of, suggest
 from suboctave.model.elements.base import Array
 
-__all__ = ["Measured", "read_measured"]
-
 _UNITS = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
 
 

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from suboctave.experiments.common import FEW, start_state, steps_of
-from suboctave.experiments.time_result import Layout, TimeResult
+from suboctave.experiments.common import FEW, Layout, TimeResult, start_state, steps_of
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, read_values
+from suboctave.model.inputs import check_count, check_omega, read_values, timed
 from suboctave.model.system import System
-from suboctave.model.timed import timed
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import reporting
 from suboctave.timedomain.flow import Flow, check_motions
@@ -22,8 +20,6 @@ from suboctave.timedomain.flow import Flow, check_motions
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-__all__ = ["Trajectory", "integrate"]
 
 
 @dataclass(eq=False)

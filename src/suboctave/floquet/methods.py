@@ -22,8 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, shortened, suggest
-from suboctave.floquet.hill import hill_multipliers
-from suboctave.floquet.koopman_hill import koopman_hill_multipliers
+from suboctave.floquet.hill import hill_multipliers, koopman_hill_multipliers
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState
@@ -96,7 +95,7 @@ class Hill(StabilityMethod):
 
 @dataclass(frozen=True)
 class KoopmanHill(StabilityMethod):
-    """Multipliers of `C exp(H T) W`, H Hill's matrix: no selection; see `suboctave.floquet.koopman_hill`.
+    """Multipliers of `C exp(H T) W`, H Hill's matrix: no selection; see `suboctave.floquet.hill`.
 
     subharmonic
         With the waves of half the base frequency besides: half as many harmonics reach the same accuracy.

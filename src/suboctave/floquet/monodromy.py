@@ -1,7 +1,19 @@
 """Stability of a periodic motion from its monodromy matrix.
 
 The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 0` is propagated over one period on
-panels that follow the laws (`linearised`, `time_mesh`, `propagate`).
+panels that follow the laws (`time_mesh`, `propagate`), in modes of the linear part:
+
+    y'' + C y' + K y = - sum_g left_g (k_g q_g + c_g q_g' + r_g),    q_g = right_g^T y,
+
+r the force that the motion leaves unbalanced. All elements along one direction are one channel. An element with nodes
+of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi d_i^T y')` per input:
+one channel each, with its own direction to the left and to the right. Channels without force make panels follow what
+such a law follows (a corner in velocity, a sharp law in velocity), and give the time at the nodes.
+
+Piecewise-linear laws and polynomials in u are evaluated in compiled code. All other elements give their tangents at all
+nodes at once, along the motion as it stands and, where it is corrected by `d(tau)`, again; but for sharp laws `f_u +
+f_uu d + f_uv d'` is taken at the old nodes. Panels are graded towards the old passages, and where d exceeds the law's
+width the new ones lie between the nodes; the linear form has the right integral all the same.
 
 A motion of H harmonics is not quite the true one: it leaves the force `r = sum d (f - P_H f)` unbalanced, P_H f the
 part of the element forces within the basis. One step of Newton's method among periodic functions (Kantorovich),
@@ -22,17 +34,405 @@ square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.linalg import lapack
+from scipy.linalg import eigh, lapack
 
-from suboctave.floquet.linearised import Linearised
-from suboctave.floquet.propagate import multipliers_and_shifts, response
+from suboctave.floquet.propagate import multipliers_and_shifts, parts_needed, propagate, response, structure
 from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.time_mesh import (
+    NODES,
+    ORDER,
+    along_panels,
+    changed_laws,
+    events_along,
+    longest_panel,
+    panels_between,
+    split,
+)
+from suboctave.harmonic.aft.channel import Channel, Group
+from suboctave.harmonic.aft.general import GeneralLaw, Smoothness
+from suboctave.harmonic.aft.law import LawAlong
+from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.quadrature import FEWEST, search_grid, singular_instants
 from suboctave.interruption import check_time
+from suboctave.model.elements.base import Element
+
+#: longest panel in units of the fastest time scale: there collocation is exact to rounding
+_LONGEST = 0.8
+#: most panels that a period is cut into for that
+_MOST = 20000
+#: nodes per period of a law of unknown smoothness, in units of panels of one radian; phase of a tangent over a panel
+_BLIND, _TANGENT = 48.0, 7.0
+#: width of the slices that are cut out around corners, in units of the motion
+_SLICE = 1e-9
+#: how close to a corner where powers of a half begin panels are graded, in units of the motion
+_ROUGH = 1e-6
+_NONE, _NO_PIECES, _NO_PASSAGES = np.zeros(0), np.zeros((0, 3)), np.zeros((2, 0))
+
+
+class Linearised:
+    """Stiffness, damping and unbalanced force of the elements along a motion.
+
+    Attributes
+    ----------
+    size
+        Number of states, 2 n.
+    spans
+        dt/ds on every panel, (P, ORDER).
+    path, law, base
+        See `time_mesh.along_panels`, with the elements that are not known in closed form.
+    active
+        The channels with a force, (A,).
+    varying
+        Whether any stiffness or damping varies within panels.
+    """
+
+    def __init__(self, state: BalanceState) -> None:
+        balance = state.balance
+        self.state = state
+        self._given = state.laws.groups
+        own = self._own = Channels(state, len(self._given))
+        self._modes = modes = _in_modes(state.linear, balance.all_groups)
+        self.size = 2 * len(modes.stiffness)
+        self._laws = laws = PackedLaws.of(self._given + own.laws) if own.laws else state.packed
+        self._motions, self._forces, self.active = state.motions, state.force_spectra, modes.active
+        if own.laws:
+            self._motions = np.concatenate((state.motions, own.motions))
+            self._forces = np.concatenate((state.force_spectra[: own.first], own.forces))
+            self.active = np.concatenate((np.arange(own.first), own.numbers))[modes.active]
+        degree = max(own.degree, laws.degree)
+        self.varying = degree > 0
+        longest = min(longest_panel(self._motions, degree), own.finest)
+        if laws.unknown_samples:
+            longest = min(longest, _BLIND / laws.unknown_samples)
+        grid = search_grid(state.basis.harmonics)
+        # singularities further away than the longest panel do not disturb it
+        passed = [
+            singular_instants(self._motions[g], points, widths, longest, grid.zr, grid.zi)
+            for g, points, widths in laws.singularities
+        ]
+        passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
+        events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
+        self.events = events[np.argsort(events[:, 0], kind="stable")]
+        panels, start = panels_between(self.events, longest)
+        parts, total = self._evaluated(panels)
+        while len(panels) < total <= _MOST:
+            panels, start = split(panels, start, parts)
+            parts, total = self._evaluated(panels)
+        self.start = start
+        own.locate(self.events, start, laws.owner, len(panels))
+        self._structures = structure(self.spans, *modes.matrices)
+
+    def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
+        """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
+        laws = self._laws
+        self.spans, self.path, self.law, self.base = along_panels(
+            panels, self._motions, self._forces, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
+            laws.step_owner, laws.line,
+        )  # fmt: skip
+        #: (group, element, its coefficients, whether sharp, f_u, f_v) of the elements not known in closed form
+        self._sampled = []
+        for g, law in enumerate(() if self.state.packed.closed_form else self._given):
+            for members, sharp in ((law.graded, True), (law.uniform, False)):
+                for _, element, _, a, _ in members:
+                    assert isinstance(element, Element)
+                    force, f_u, f_v = element.tangent(self.path[g, 0], self.path[g, 1], a)
+                    self.law[g, 0] += force
+                    self.law[g, 1] += f_u
+                    if f_v is not None:
+                        self.law[g, 2] += f_v
+                    self._sampled.append((g, element, a, sharp, f_u, f_v))
+        self._own.evaluate(self.path, self.law)
+        parts: np.ndarray
+        total: float
+        parts, total = parts_needed(self.spans, self.law, self.base, self.active, *self._modes.rates, _LONGEST)
+        return parts, total
+
+    def standing(self) -> tuple[Array, Array, Array]:
+        """Along the motion as it stands, with the unbalanced force: see `propagate`."""
+        return self._propagated(self.law, np.zeros(self.base.shape), True)
+
+    def corrected(self, change: Array) -> Array:
+        """Monodromy matrix along the motion changed by (G, 2, N)."""
+        return self._propagated(*self._changed(change), False)[0]
+
+    def _propagated(self, law: Array, kick: Array, forced: bool) -> tuple[Array, Array, Array]:
+        modes, (kinds, structures) = self._modes, self._structures
+        result: tuple[Array, Array, Array] = propagate(
+            kinds, structures, law, self.base, kick, self.active, modes.left, modes.right, forced
+        )
+        return result
+
+    def _changed(self, change: Array) -> tuple[Array, Array]:
+        """Along the motion changed by (G, 2, N): no force, stiffness and damping (G, 3, N), kicks at the beginnings of
+        panels (G, P).
+        """
+        laws = self._laws
+        law: Array
+        kick: Array
+        law, kick = changed_laws(
+            self.path, self.law, change, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
+            laws.step_owner, self.events, self.start, len(self.spans),
+        )  # fmt: skip
+        for g, element, a, sharp, f_u, f_v in self._sampled:
+            u, v = self.path[g]
+            d_u, d_v = change[g]
+            if sharp:
+                f_uu, f_uv, f_vv = element.curvature(u, v, a)
+                f_u = f_u + f_uu * d_u
+                if f_v is not None and f_uv is not None and f_vv is not None:
+                    f_u = f_u + f_uv * d_v
+                    f_v = f_v + f_uv * d_u + f_vv * d_v
+            else:
+                _, f_u, f_v = element.tangent(u + d_u, v + d_v, a)
+            law[g, 1] += f_u
+            if f_v is not None:
+                law[g, 2] += f_v
+        self._own.changed(self.path, change, law, self.spans)
+        return law, kick
+
+
+class _Modes(NamedTuple):
+    """The linear part in its modes, normalised by mass: norms have no units, and most products are with diagonal
+    matrices. Where mass or stiffness is not symmetric, or the mass not positive definite, in DOFs weighted by the
+    square roots of their masses.
+
+    stiffness, damping
+        K, C, (n, n).
+    left, right
+        Where the active channels act and what they read, (A, n).
+    active
+        Which of all groups' inputs they are, (A,).
+    rates
+        What bounds the rates of the motion: the norms of K and C, and what a channel's stiffness or damping of one adds
+        to them, (A,).
+    """
+
+    stiffness: Array
+    damping: Array
+    left: Array
+    right: Array
+    active: np.ndarray
+    rates: tuple[float, float, Array]
+
+    @property
+    def matrices(self) -> tuple[Array, Array, Array, Array]:
+        """K, C, left, right."""
+        return self.stiffness, self.damping, self.left, self.right
+
+
+@lru_cache(maxsize=16)
+def _in_modes(linear: LinearPart, groups: tuple[Group, ...]) -> _Modes:
+    m, c, k = (np.asarray(matrix, dtype=float) for matrix in linear.equation_of_motion())
+    # in one unknown DOF channels have one direction
+    pairs = [(d if len(d) == 1 else group.direction, d) for group in groups for d in group.inputs]
+    rows = np.array([[linear.expand(d) for d in pair] for pair in pairs], dtype=float).reshape(-1, 2, len(m))
+    active = np.flatnonzero(rows[:, 0].any(axis=1))
+    l, r = rows[active, 0], rows[active, 1]
+    modes = None
+    if np.array_equal(m, m.T) and np.array_equal(k, k.T):
+        try:
+            values, modes = eigh(k, m)
+        except np.linalg.LinAlgError:
+            modes = None
+    if modes is not None:
+        l, r, k, c = l @ modes, r @ modes, np.diag(values), modes.T @ c @ modes
+        # without what rounding leaves off the diagonal
+        scale = np.sqrt(np.abs(np.multiply.outer(c.diagonal(), c.diagonal())))
+        c = np.where(np.abs(c) > 1e-13 * scale, c, 0.0)
+    else:
+        weight = np.sqrt(m.diagonal())
+        inverse = np.linalg.inv(m) * weight[:, None]
+        l, r, k, c = l @ inverse.T, r / weight, inverse @ k / weight, inverse @ c / weight
+    k, c, l, r = (np.ascontiguousarray(matrix) for matrix in (k, c, l, r))
+    shares = np.abs(l).max(axis=1, initial=0.0) * np.abs(r).sum(axis=1)
+    rates = float(np.linalg.norm(k, np.inf)), float(np.linalg.norm(c, np.inf)), shares
+    return _Modes(k, c, l, r, active, rates)
+
+
+class Channels:
+    """The channels of all elements with nodes of their own, after those of the `first` groups.
+
+    Attributes
+    ----------
+    motions, forces
+        Displacement and Fourier coefficients of the force of every channel, lists of (H + 1,) and (top + 1,).
+    numbers
+        The channel of every input of these elements.
+    laws
+        What panels follow: see `DirectionLaws`.
+    degree, finest
+        Degree of the tangents as polynomials in the motion; longest panel that they allow.
+    """
+
+    def __init__(self, state: BalanceState, first: int) -> None:
+        self.state, self.first = state, first
+        self.motions: list[ComplexArray] = []
+        self.forces: list[ComplexArray] = []
+        self.numbers: list[int] = []
+        self.laws: list[DirectionLaws] = []
+        self.degree, self.finest = 0, math.inf
+        self._elements: list[tuple[GeneralLaw, int, Array]] = []
+        self._tangents: list[Array] = []
+        #: channels with marks of corners, by the first channel of their element; first and last panel between marks,
+        #: by channel
+        self._sliced: dict[int, list[tuple[int, int]]] = {}
+        self._slices: dict[int, list[tuple[int, int]]] = {}
+        self._clock = -1
+        for channel in state.own_channels if state.balance.own else ():
+            self._add(channel.laws[0], channel)
+        if any(law.harmonic for law, _, _ in self._elements):
+            turning = np.zeros(state.basis.harmonics + 1, dtype=complex)
+            turning[1] = 1.0
+            self._clock = self._channel(turning)
+
+    def _channel(
+        self, motion: ComplexArray, pieces: Array = _NO_PIECES, singular: tuple[Array, Array] = (_NONE, _NONE)
+    ) -> int:
+        self.motions.append(motion)
+        self.forces.append(np.zeros(self.state.balance.top + 1, dtype=complex))
+        self.laws.append(DirectionLaws(pieces, points=singular[0], widths=singular[1]))
+        return self.first + len(self.motions) - 1
+
+    def _add(self, nodal: LawAlong, own: Channel) -> None:
+        assert isinstance(nodal, GeneralLaw)
+        along, law = nodal.along, nodal.smoothness
+        scale = np.ones(own.count)
+        begin = len(self.motions)
+        for i, (d, motion) in enumerate(zip(own.ins, along.motions, strict=True)):
+            if len(d) == 1:
+                # see `_in_modes`
+                scale[i] = own.out[0] / d[0]
+            points = law.points if i == 0 else ()
+            self.numbers.append(self._channel(motion, _marks(points, motion), _grading(law, points, motion)))
+            if i == 0 and law.points:
+                self._sliced.setdefault(self.first + begin, []).append((self.first + begin, 0))
+        self.forces[begin] = scale[0] * own.spectra[0]
+        self._elements.append((nodal, self.first + begin, scale))
+        velocity = 1j * along.rate * np.arange(len(along.motions[0])) * along.motions[0]
+        if law.velocities and velocity.any():
+            marks, grading = _marks(law.velocities, velocity), _grading(law, law.velocities, velocity)
+            probe = self._channel(velocity, marks, grading)
+            self._sliced.setdefault(self.first + begin, []).append((probe, 1))
+        if law.sharp[0] and velocity.any():
+            self._channel(velocity, singular=(np.array(law.sharp[0]), np.array(law.sharp[1])))
+        degree = max(1, law.degree - 1)
+        self.degree = max(self.degree, degree)
+        if law.cornered or law.unknown:
+            self.finest = min(self.finest, _BLIND / (nodal.samples or FEWEST))
+        if nodal.harmonic:
+            varying = nodal.harmonic * nodal.along.nu + degree * nodal.along.high
+            self.finest = min(self.finest, _TANGENT / varying)
+
+    def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
+        """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
+        rows = path[begin : begin + nodal.count]
+        q = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.along.moving else rows[:, 0]
+        if self._clock < 0 or not nodal.harmonic:
+            return np.ascontiguousarray(q), np.zeros(q.shape[1])
+        cosine, slope = path[self._clock]
+        return np.ascontiguousarray(q), nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
+
+    def evaluate(self, path: Array, law: Array) -> None:
+        """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, >= 3, N)."""
+        self._tangents = []
+        for nodal, begin, scale in self._elements:
+            q, theta = self._state(nodal, begin, path)
+            force, f_q = nodal.law.tangent(q, theta, nodal.c)
+            law[begin, 0] += scale[0] * force
+            self._tangents.append(f_q)
+            self._put(nodal, begin, scale, f_q, law)
+
+    def _put(self, nodal: GeneralLaw, begin: int, scale: Array, f_q: Array, law: Array) -> None:
+        """Add a tangent (Q, N) to stiffness and damping in `law` (G, >= 3, N)."""
+        count = nodal.count
+        for i in range(count):
+            law[begin + i, 1] += scale[i] * f_q[i]
+            if nodal.along.moving:
+                law[begin + i, 2] += scale[i] * f_q[count + i]
+
+    def changed(self, path: Array, change: Array, law: Array, spans: Array) -> None:
+        """Add stiffness and damping along the path changed by `change` to `law` (G, 3, N).
+
+        Of laws with corners every node keeps its side. For the time by which the motion reaches a corner later the law
+        before it stays: an impulse, put into the slice that was cut out there.
+        """
+        for (nodal, begin, scale), f_q in zip(self._elements, self._tangents, strict=True):
+            q, theta = self._state(nodal, begin, path)
+            rows = change[begin : begin + nodal.count]
+            d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.along.moving else rows[:, 0]
+            if nodal.smoothness.sharp[0]:
+                new = f_q + np.einsum("rsn,sn->rn", nodal.law.curvature(q, theta, nodal.c), d)
+            else:
+                new = nodal.law.tangent(_moved(nodal, q, d), theta, nodal.c)[1]
+            self._put(nodal, begin, scale, new, law)
+            for channel, order in self._sliced.get(begin, ()):
+                row = order * nodal.count
+                for p, last in self._slices.get(channel, ()):
+                    i, j = p * (ORDER - 1), (last + 1) * (ORDER - 1)
+                    # of the displacement, or of the velocity
+                    slope = path[channel, 1, i] + (change[begin, 1, i] if order == 0 else 0.0)
+                    jump = f_q[row, j] - f_q[row, i]
+                    if slope == 0.0 or jump == 0.0:
+                        continue
+                    later = -change[begin, order, i] / slope
+                    length = 2.0 * spans[p, 0]
+                    bump = 1.5 * scale[0] * jump * later / length * (1.0 - NODES**2)
+                    law[begin, 1 + order, i : i + ORDER] -= bump
+
+    def locate(self, events: Array, start: np.ndarray, owner: np.ndarray, panels: int) -> None:
+        """Find the slices around corners: panels between the two marks of one corner.
+
+        events, start, owner: see `time_mesh.events_along` and `panels_between`; panels: how many there are.
+        """
+        if not self._sliced:
+            return
+        first = np.searchsorted(owner, np.arange(self.first + len(self.motions)))
+        pieces = events[:, 5].astype(int)
+        for i, piece in enumerate(pieces):
+            follow = (i + 1) % len(pieces)
+            if pieces[follow] < 0:  # a passage between the marks
+                follow = (follow + 1) % len(pieces)
+            if piece < 0 or owner[piece] < self.first or pieces[follow] < 0 or follow == i:
+                continue
+            channel = int(owner[piece])
+            own, other = piece - first[channel], pieces[follow] - first[channel]
+            apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
+            if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
+                last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
+                self._slices.setdefault(channel, []).append((int(start[i]), last))
+
+
+def _moved(nodal: GeneralLaw, q: Array, d: Array) -> Array:
+    """The states `q + d`, which stay on their sides of all corners."""
+    moved, law = q + d, nodal.smoothness
+    for row, levels in ((0, law.points), (nodal.count, law.velocities)):
+        for level in levels:
+            near = _SLICE * max(float(np.abs(q[row]).max()), np.finfo(float).tiny)
+            above = np.maximum(moved[row], level + near)
+            moved[row] = np.where(q[row] > level, above, np.minimum(moved[row], level - near))
+    return moved
+
+
+def _grading(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> tuple[Array, Array]:
+    """Where panels are graded towards corners, as towards a law that is sharp there."""
+    if not law.rough or not levels:
+        return _NONE, _NONE
+    return np.array(levels, dtype=float), np.full(len(levels), _ROUGH * float(np.abs(motion).max()))
+
+
+def _marks(levels: tuple[float, ...], motion: ComplexArray) -> Array:
+    """Pieces without stiffness: panels end where the motion crosses them, just before and just after a corner."""
+    near = _SLICE * 2.0 * float(np.abs(motion).max())
+    return np.array([(0.0, level + side * near, 1.0) for level in levels for side in (-1.0, 1.0)]).reshape(-1, 3)
+
 
 #: a correction larger than this share of the motion is cut down to it
 _LARGEST = 0.1
@@ -44,8 +444,6 @@ _DOUBTFUL = 0.1
 _TOGETHER = 3.0
 #: natural vibrations in a period of the load beyond which a phase has no digits left
 _MOST_TURNS = 1e15
-
-__all__ = ["FloquetResult", "floquet_multipliers"]
 
 
 def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetResult:

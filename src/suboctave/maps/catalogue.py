@@ -27,11 +27,10 @@ from suboctave.curves.identity import gap_to, lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import start_point
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import truncation
 from suboctave.interruption import Interruption, pass_on
-from suboctave.maps.inputs import check_count
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
 from suboctave.model.system import System
@@ -39,8 +38,6 @@ from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.results.tracked_branch import TrackedBranch
-
-__all__ = ["FAILURES", "Catalogue", "SearchRange", "Work", "branch_through", "carrier_of", "motion_near"]
 
 #: share of the range of omega by which branches are followed beyond what they are to hold
 _MARGIN = 0.02
@@ -345,3 +342,57 @@ def _turns_back(branch: Branch, item: Bifurcation) -> bool:
     clear = np.flatnonzero((ahead > _CLEAR * whole) & (ahead < (1.0 - _CLEAR) * whole))
     after, before = clear[np.argmin(ahead[clear])], clear[np.argmax(ahead[clear])]
     return bool((branch.omega[after] - item.omega) * (branch.omega[before] - item.omega) > 0.0)
+
+
+#: values of a parameter at which whole responses are followed
+MOST_VALUES = 10_000
+#: a search among resonances: coarse, since the branches themselves are followed afterwards
+COARSE = Seeds(8, 4, 3)
+
+
+def is_count(number: Any, least: int) -> bool:
+    """Whether something is a whole number that is not too small."""
+    return isinstance(number, int) and not isinstance(number, bool) and number >= least
+
+
+def check_count(name: str, number: Any, least: int) -> int:
+    """A whole number that is not too small."""
+    if not is_count(number, least):
+        raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
+    return int(number)
+
+
+def listed(values: Any) -> list[Any]:
+    """The items of a sequence or an array; a single None for anything else."""
+    return list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [None]
+
+
+def check_seeds(seeds: Any) -> Seeds | None:
+    """How finely resonances are searched."""
+    if seeds is not None and not isinstance(seeds, Seeds):
+        raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
+    return seeds
+
+
+def checked_orders(search: Any, least: int) -> tuple[int, ...]:
+    """Periods, in periods of the load, of a search among resonances."""
+    given = listed(search)
+    if not all(is_count(order, least) for order in given):
+        raise InputError(f"search must be periods in periods of the load, {least} or more, as (2, 3), not {search!r}")
+    return tuple(given)
+
+
+def checked_values(values: Any, bounds: tuple[float, float]) -> list[float]:
+    """Values of the design parameter: how many from bound to bound, or the values themselves."""
+    low, high = bounds
+    if isinstance(values, int) and not isinstance(values, bool):
+        if not 2 <= values <= MOST_VALUES:
+            raise InputError(
+                f"values must be at least 2 and at most {MOST_VALUES}, or the values of the parameter themselves, not "
+                f"{shortened(values)}"
+            )
+        return [float(v) for v in np.linspace(low, high, values)]
+    given = listed(values)
+    if not given or not all(is_number(v) and low <= v <= high for v in given):
+        raise InputError(f"values must be how many, or numbers within the bounds ({low:g}, {high:g}), not {values!r}")
+    return sorted({float(v) for v in given})

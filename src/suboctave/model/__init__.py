@@ -8,10 +8,9 @@ from __future__ import annotations
 from suboctave.model import library
 from suboctave.model.elements.base import Element
 from suboctave.model.elements.callable import Callable
-from suboctave.model.elements.coupled import CoupledElement
+from suboctave.model.elements.coupled import CoupledElement, Expression
 from suboctave.model.elements.dampers import QuadraticDamper, TanhFriction
 from suboctave.model.elements.derivative_check import DerivativeReport, check_derivatives
-from suboctave.model.elements.expression import Expression
 from suboctave.model.elements.hertz import HertzContact
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,

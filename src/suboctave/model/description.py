@@ -25,17 +25,6 @@ import numpy as np
 from suboctave.errors import InputError, located, suggest
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
 
-__all__ = [
-    "Arrays",
-    "Recorded",
-    "build_part",
-    "describe_part",
-    "from_plain",
-    "known_kinds",
-    "plain_number",
-    "plain_value",
-]
-
 Arrays = MutableMapping[str, np.ndarray]
 _PACKAGE = "suboctave."
 _KNOWN: dict[str, type[Recorded]] = {}

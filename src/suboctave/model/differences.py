@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["STEP", "central_difference", "shift_derivative", "shifted", "step_of"]
-
 #: step as a share of the length over which a law changes: truncation (step^4 / 30 times a fifth derivative) and
 #: rounding (1e-16 / step, more behind a sharp corner) both stay below 1e-7 there
 STEP = 2e-3

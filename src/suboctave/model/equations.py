@@ -21,16 +21,16 @@ from sympy.simplify.fu import TR8
 
 from suboctave.errors import InputError, located, suggest
 from suboctave.model.elements.base import BaseElement
-from suboctave.model.elements.expression import Expression
+from suboctave.model.elements.coupled import Expression
 from suboctave.model.elements.springs import CubicSpring, PolynomialSpring
 from suboctave.model.elements.stops import ElasticStop
-from suboctave.model.expressions.code import as_text
 from suboctave.model.expressions.coefficients import coefficient
 from suboctave.model.expressions.derivatives import (
     CORNER_FUNCTIONS,
     Modulus,
     Ramp,
     Step,
+    as_text,
     expanded_size,
     force_expression,
     number,
@@ -39,8 +39,6 @@ from suboctave.model.expressions.derivatives import (
 from suboctave.model.expressions.law import harmonic_of
 from suboctave.model.expressions.reader import LONGEST, PRIME, RESERVED
 from suboctave.model.loads import HarmonicLoad, Load
-
-__all__ = ["parts_of"]
 
 _HIGHEST_POWER, _MOST_TERMS = 30, 500
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from suboctave.errors import InputError
-from suboctave.model.elements.expression import Expression
+from suboctave.model.elements.coupled import Expression
 from suboctave.model.elements.springs import CubicSpring
 from suboctave.model.elements.stops import ElasticStop
 from suboctave.model.loads import HarmonicLoad, RotatingUnbalance

@@ -27,18 +27,6 @@ from suboctave.model.elements.base import Array, Dof, Place, required
 from suboctave.model.expressions.coefficients import ZERO, Coefficient, coefficient, named_coefficient
 from suboctave.model.matrices import MatrixCoefficient
 
-__all__ = [
-    "BaseAcceleration",
-    "BaseDisplacement",
-    "Gravity",
-    "HarmonicLoad",
-    "Load",
-    "LoadComponent",
-    "Matrices",
-    "RotatingUnbalance",
-    "StaticLoad",
-]
-
 Number = float | str | Coefficient
 _QUARTER = coefficient("-pi/2")
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration

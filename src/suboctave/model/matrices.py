@@ -17,8 +17,6 @@ from suboctave.errors import InputError, NegativeDampingWarning
 from suboctave.model.elements.base import Array
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
 
-__all__ = ["MatrixCoefficient", "check_damping", "check_mass", "matrix_coefficient", "warn_of_negative"]
-
 #: largest asymmetry of a mass, in units of sqrt(M_ii M_jj)
 _ASYMMETRY = 1e-9
 #: degrees of freedom up to which eigenvalues are cheap; beyond, pivots and diagonals are taken

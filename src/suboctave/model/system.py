@@ -22,8 +22,6 @@ from suboctave.model.expressions.reader import RESERVED
 from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
 from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient
 
-__all__ = ["System", "build", "describe"]
-
 _MATRICES = ("mass", "damping", "stiffness")
 _PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names")
 

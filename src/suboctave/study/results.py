@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, suggest
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.common import TimeResult
 from suboctave.harmonic.linear_part import LinearPart
-from suboctave.maps.isolas.region import IsolaMap
+from suboctave.maps.isolas.map import IsolaMap
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.results.branch import Branch

@@ -20,7 +20,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from suboctave.errors import ConvergenceError, InputError, TimeLimitError
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.common import TimeResult
 from suboctave.interruption import Interruption, check_seconds, time_limit
 from suboctave.maps.isolas.result import Isolas
 from suboctave.results.branch import Branch

@@ -14,7 +14,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS
 from suboctave.curves.junction import period_name
 from suboctave.maps.isolas.result import Isolas, isola_row
-from suboctave.maps.stretches import stable_ranges
+from suboctave.maps.pieces import stable_ranges
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram, tree_text
 from suboctave.store.layout import branch_dataset, events_met

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.continuation.problem import Array
-from suboctave.experiments.time_result import TimeResult
+from suboctave.experiments.common import TimeResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch

@@ -18,10 +18,8 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.points import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, limited
-from suboctave.maps.catalogue import SearchRange, branch_through
-from suboctave.maps.inputs import is_count, listed
-from suboctave.maps.pieces import MonotonePiece
-from suboctave.maps.stretches import stable_ranges
+from suboctave.maps.catalogue import SearchRange, branch_through, is_count, listed
+from suboctave.maps.pieces import MonotonePiece, stable_ranges
 from suboctave.model.system import System
 from suboctave.results.branch import Branch
 from suboctave.results.readings.readings import shared
@@ -34,8 +32,6 @@ from suboctave.store.table import write_csv
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-__all__ = ["Isola", "IsolaEnd", "Isolas", "head_dataset", "isola_row"]
 
 _NAN = float("nan")
 

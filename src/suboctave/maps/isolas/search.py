@@ -20,8 +20,6 @@ from suboctave.maps.isolas.result import IsolaEnd
 from suboctave.maps.pieces import MonotonePiece
 from suboctave.results.branch import Branch
 
-__all__ = ["PREPARATION", "Existence", "Loop", "Search"]
-
 #: share of the work that the responses make, for progress
 PREPARATION = 0.6
 #: events that are closer, in units of the parameter's range, are met together

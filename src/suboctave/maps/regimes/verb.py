@@ -31,19 +31,15 @@ from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on, unlimited
-from suboctave.maps.catalogue import Catalogue
-from suboctave.maps.inputs import COARSE, MOST_VALUES, check_count, check_seeds, checked_orders
+from suboctave.maps.catalogue import COARSE, MOST_VALUES, Catalogue, check_count, check_seeds, checked_orders
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.regimes.map import RegimeMap
-from suboctave.maps.regimes.slices import Slice, follow_curves_beside, follow_curves_of
-from suboctave.maps.regimes.strips import Strip
+from suboctave.maps.regimes.slices import Slice, Strip, follow_curves_beside, follow_curves_of
+from suboctave.model.inputs import timed
 from suboctave.model.system import System
-from suboctave.model.timed import timed
 from suboctave.options import with_options
 from suboctave.results.branch import Branch
 from suboctave.results.tracked_branch import TrackedBranch
-
-__all__ = ["regime_map"]
 
 #: a multiplier this close to -1 asks for slices beside it, as far as this share of the range apart
 _NEARLY, _FINE = 0.6, 1.0 / 32.0

@@ -24,8 +24,6 @@ from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_s
 from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
-__all__ = ["Array", "BaseElement", "Dof", "Element", "Place"]
-
 Array: TypeAlias = NDArray[np.float64]
 Dof: TypeAlias = int | Sequence[int]
 

@@ -24,18 +24,6 @@ from suboctave.model.elements.smoothness import (
     levels,
 )
 
-__all__ = [
-    "BatchForm",
-    "CalledBack",
-    "Names",
-    "QuadraticForm",
-    "Tangent",
-    "TanhForm",
-    "WrittenForm",
-    "form_of_sampling",
-]
-
-
 Array = NDArray[np.float64]
 
 

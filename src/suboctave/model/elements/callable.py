@@ -16,8 +16,6 @@ from suboctave.model.elements.base import Array, Dof, Element, required
 from suboctave.model.elements.smoothness import AdaptiveSampling
 from suboctave.model.expressions.coefficients import Coefficient
 
-__all__ = ["Callable"]
-
 Number = float | str | Coefficient
 #: step of complex differences
 _COMPLEX = 1e-30

@@ -15,8 +15,6 @@ from suboctave.model.elements.smoothness import CornerSampling, SharpVelocitySam
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.matrices import warn_of_negative
 
-__all__ = ["QuadraticDamper", "TanhFriction"]
-
 Number = float | str | Coefficient
 
 

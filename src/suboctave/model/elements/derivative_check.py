@@ -23,8 +23,6 @@ from suboctave.model.elements.smoothness import (
     levels,
 )
 
-__all__ = ["DerivativeReport", "check_derivatives"]
-
 Tensor = Callable[[Array, Array], Array]
 #: distance from a corner, in steps: differences reach two of them. Half powers that begin there are steep beside it
 _BESIDE, _BESIDE_ROUGH = 4.0, 100.0

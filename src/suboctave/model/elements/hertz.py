@@ -15,8 +15,6 @@ from suboctave.model.elements.smoothness import CornerSampling
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.matrices import warn_of_negative
 
-__all__ = ["HertzContact"]
-
 Number = float | str | Coefficient
 _SIDES = {"right": 1.0, "left": -1.0}
 

@@ -10,19 +10,6 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 
-__all__ = [
-    "AdaptiveSampling",
-    "CornerSampling",
-    "Piece",
-    "PiecewiseLinear",
-    "PolynomialSampling",
-    "Sampling",
-    "SharpSampling",
-    "SharpVelocitySampling",
-    "levels",
-    "switches",
-]
-
 
 @dataclass(frozen=True)
 class PolynomialSampling:

@@ -15,8 +15,6 @@ from suboctave.model.elements.base import Array, Dof, Element, required
 from suboctave.model.elements.smoothness import PolynomialSampling
 from suboctave.model.expressions.coefficients import Coefficient
 
-__all__ = ["CubicSpring", "PolynomialSpring"]
-
 Number = float | str | Coefficient
 #: largest power of a displacement, as in texts: 2**1024 is no floating-point number any more
 LARGEST_POWER = 1000

@@ -30,8 +30,6 @@ from suboctave.model.elements.base import Array, Dof, Element, required
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear, SharpSampling
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
-__all__ = ["Clearance", "ElasticStop", "Freeplay"]
-
 Number = float | str | Coefficient
 _SIDES = {"right": 1, "left": -1}
 #: sharpness, and sharpness times gap, beyond which the squares of rounded laws leave the range of floats

@@ -14,8 +14,6 @@ from typing import Any
 from suboctave.errors import InputError, suggest
 from suboctave.model.expressions.reader import FUNCTIONS, Evaluate, read
 
-__all__ = ["ZERO", "Coefficient", "coefficient", "named_coefficient"]
-
 
 class Coefficient:
     """A number or an expression in named parameters. Immutable; made by `coefficient`.
@@ -76,8 +74,7 @@ class Coefficient:
     def _differentiate(self, name: str) -> Coefficient:
         if self._affine is not None:
             return _number(self._affine[name])
-        from suboctave.model.expressions.code import scalar_function
-        from suboctave.model.expressions.derivatives import symbol
+        from suboctave.model.expressions.derivatives import scalar_function, symbol
 
         assert self._symbolic is not None
         expression = self._symbolic().diff(symbol(name))

@@ -18,7 +18,6 @@ import sympy
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, PolynomialSampling, Sampling
-from suboctave.model.expressions.code import array_function, as_text, lines_of_code
 from suboctave.model.expressions.derivatives import (
     CORNER_FUNCTIONS,
     Modulus,
@@ -26,13 +25,14 @@ from suboctave.model.expressions.derivatives import (
     Ramp,
     Sign,
     Step,
+    array_function,
+    as_text,
     expanded_size,
     force_expression,
+    lines_of_code,
     symbol,
 )
 from suboctave.model.expressions.reader import PRIME
-
-__all__ = ["Law", "harmonic_of", "law_of"]
 
 #: symbol of the phase omega t of the load
 _THETA = "omega*t"  # no identifier, so that no parameter can have this name

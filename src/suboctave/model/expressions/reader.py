@@ -14,8 +14,6 @@ from typing import Any
 
 from suboctave.errors import InputError, suggest
 
-__all__ = ["CORNERS", "FUNCTIONS", "LONGEST", "PRIME", "RESERVED", "Evaluate", "Form", "read"]
-
 Evaluate = Callable[[Mapping[str, float]], float]
 
 #: functions that any expression may contain

@@ -15,8 +15,7 @@ from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.analysis.options import settings_of
 from suboctave.analysis.switching import check_left, switch_branch
-from suboctave.analysis.track import track
-from suboctave.analysis.track_onto import motion_kind
+from suboctave.analysis.track import motion_kind, track
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH
 from suboctave.continuation import Event
 from suboctave.errors import InputError, is_number, suggest

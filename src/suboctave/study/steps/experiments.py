@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from suboctave.experiments.basins.verb import Basins as BasinsResult, basins, check_plane
+from suboctave.experiments.basins import Basins as BasinsResult, basins, check_plane
 from suboctave.experiments.common import start_state
 from suboctave.experiments.lyapunov import lyapunov_exponents
 from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import ConvergenceError, InputError, shortened
-from suboctave.experiments.attractors import Attractor, state_sizes
 from suboctave.experiments.common import Integration
+from suboctave.experiments.poincare import Attractor, state_sizes
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
@@ -19,8 +19,6 @@ from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.period_recognition import same_cycle
 from suboctave.timedomain.shooting import PeriodicSolution, shoot
 from suboctave.timedomain.trapping import Trap, traps_about
-
-__all__ = ["BasinAttractor", "Catalogue", "Given", "enter_attractors", "read_attractors"]
 
 #: relative distance below which two periodic motions are the same
 _SAME = 1e-5
