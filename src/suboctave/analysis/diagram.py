@@ -22,7 +22,7 @@ from suboctave.curves.junction import Junction
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption
-from suboctave.model.inputs import timed
+from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
@@ -134,10 +134,7 @@ def bifurcation_diagram(
         As `frequency_response`. A branch that cannot be followed does not end the diagram: it is listed as not
         followed.
     """
-    if isinstance(depth, bool) or not isinstance(depth, int) or depth < 0:
-        raise InputError(f"depth must be a whole number, 0 or more, not {depth!r}")
-    if isinstance(max_branches, bool) or not isinstance(max_branches, int) or max_branches < 1:
-        raise InputError(f"max_branches must be a whole number of at least 1, not {max_branches!r}")
+    depth, max_branches = check_count("depth", depth, 0), check_count("max_branches", max_branches)
     with reporting(options.get("progress"), "bifurcation diagram") as report:
         growth = _Growth(handed_on(options), ByDepth(depth), max_branches, report, keeper)
         return growth.diagram(system, omega, harmonics, start)

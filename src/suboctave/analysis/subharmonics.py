@@ -30,14 +30,14 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import linear_response, start_point
 from suboctave.curves.trace import Trace
-from suboctave.errors import ConvergenceError, InputError, is_number
+from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import truncation
 from suboctave.interruption import Interruption, limited, pass_on
-from suboctave.model.inputs import check_range, check_system
+from suboctave.model.inputs import check_count, check_omega, check_range, check_system, start_state
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report
@@ -67,16 +67,12 @@ class Seeds:
 
     def __post_init__(self) -> None:
         for name in ("frequencies", "phases", "modes"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InputError(f"Seeds: {name} must be a whole number of at least 1, not {value!r}")
+            check_count(f"Seeds: {name}", getattr(self, name))
 
 
 def check_order(order: Any) -> int:
     """A sub-harmonic's order: a whole number of load periods, at least 2."""
-    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 2:
-        raise InputError(f"subharmonic must be a whole number of at least 2 (periods of the load), not {order!r}")
-    return int(order)
+    return check_count("subharmonic", order, 2)
 
 
 @with_options(CurveOptions)
@@ -229,24 +225,17 @@ def periodic_orbit(
         If Newton's method finds no motion there.
     """
     order = 1 if subharmonic == 1 else check_order(subharmonic)
-    if not (is_number(omega) and omega > 0.0):
-        raise InputError(f"omega must be a positive number, not {omega!r}")
-    if isinstance(settle, bool) or not isinstance(settle, int) or settle < 0:
-        raise InputError(f"settle must be a whole number of periods, not {settle!r}")
-    check_system(system, (float(omega),))
-    try:
-        given = np.asarray(state, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        given = np.zeros(0)
-    if given.shape != (2 * system.n,) or not np.isfinite(given).all():
-        raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
-    curve = make_curve(system, "omega", float(omega), float(omega), harmonics, order, None)
+    omega = check_omega(omega)
+    settle = check_count("settle", settle, 0)
+    check_system(system, (omega,))
+    given = start_state(system, state)
+    curve = make_curve(system, "omega", omega, omega, harmonics, order, None)
     with one_thread():
         if settle:
             end = settle * order * 2.0 * np.pi / omega
-            trajectory = integrate(system, given, np.array([0.0, end]), float(omega), system.parameters, rtol=1e-8)
+            trajectory = integrate(system, given, np.array([0.0, end]), omega, system.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
-        point = start_point(curve, float(omega), given, newton or NewtonOptions())
+        point = start_point(curve, omega, given, newton or NewtonOptions())
     own = (orbit := _orbit(point)).own_period
     return orbit if own == order else periodic_orbit(system, omega, orbit.start(), own, harmonics, newton=newton)
 

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError, path_of, suggest
 from suboctave.experiments.basin_attractors import BasinAttractor, Catalogue, Given, enter_attractors, read_attractors
-from suboctave.experiments.common import BasinOptions, Layout, TimeResult, checked_integration, start_state
+from suboctave.experiments.common import BasinOptions, Layout, TimeResult, checked_integration
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, check_range, read_values, timed
+from suboctave.model.inputs import check_count, check_omega, check_range, read_values, start_state, timed
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
 from suboctave.progress import reporting

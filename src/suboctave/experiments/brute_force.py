@@ -23,14 +23,13 @@ from suboctave.experiments.common import (
     SectionOptions,
     TimeResult,
     checked_integration,
-    start_state,
     starting_states,
     varied_grid,
 )
 from suboctave.experiments.poincare import Attractor, attractor_of
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, timed
+from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting

@@ -17,7 +17,7 @@ from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.coupled import as_coupled
-from suboctave.model.inputs import check_count, check_parameter, check_range, observed_dof
+from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, numbers_of, observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
 from suboctave.store.arrays import flat
@@ -95,16 +95,11 @@ def checked_integration(system: System, options: Mapping[str, Any], **defaults: 
     """Options of integration, or a verb's defaults; `InputError` for those that make no sense."""
     given = defaults | {name: value for name, value in options.items() if value is not None}
     method, period_tolerance = given.get("method", "accurate"), given.get("period_tolerance", TOLERANCE)
-    _check_system(system)
+    check_is_system(system)
     if not (isinstance(period_tolerance, int | float) and 1e-14 <= period_tolerance < 1.0):
         raise InputError(f"period_tolerance={period_tolerance!r}: give a share of the motion's size, such as 1e-6")
     steps, observe = steps_of(method, given.get("steps_per_period")), observed_dof(system, given.get("observe"))
     return Integration(method, steps, given.get("tolerance"), period_tolerance, observe, given.get("workers"))
-
-
-def _check_system(system: Any) -> None:
-    if not isinstance(system, System):
-        raise InputError(f"the first argument must be a System, not {type(system).__name__}")
 
 
 def steps_of(method: str, given: int | None) -> int:
@@ -115,37 +110,14 @@ def steps_of(method: str, given: int | None) -> int:
 
 
 # ------------------------------------------------------------------------------------------------------------ starts
-def start_state(system: System, state: Any) -> Array:
-    """A state (2n,): rest for None, that of a periodic motion at t = 0, or what is given."""
-    _check_system(system)
-    if state is None:
-        return np.zeros(2 * system.n)
-    for name in ("start", "state"):
-        held = getattr(state, name, None)
-        if held is not None and not isinstance(state, np.ndarray):
-            state = held() if callable(held) else held
-            break
-    array = _numbers(state)
-    if array.shape != (2 * system.n,) or not np.isfinite(array).all():
-        raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
-    return array
-
-
 def starting_states(system: System, states: Any) -> Array:
     """States (k, 2n), none for None."""
     if states is None:
         return np.zeros((0, 2 * system.n))
-    array = np.atleast_2d(_numbers(states))
+    array = np.atleast_2d(numbers_of(states))
     if array.ndim != 2 or array.shape[1] != 2 * system.n or not np.isfinite(array).all():
         raise InputError(f"states must be finite numbers of shape (k, {2 * system.n}), got {array.shape}")
     return array
-
-
-def _numbers(given: Any) -> Array:
-    try:
-        return np.array(given, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        return np.zeros(0)
 
 
 # ------------------------------------------------------------------------------------------------------------- grids
@@ -154,7 +126,7 @@ def checked_range(name: str, given: Any, count: int, positive: bool) -> Array:
     if isinstance(given, tuple) and len(given) == 2:
         first, last = check_range(name, given, positive)
         return np.linspace(min(first, last), max(first, last), count)
-    array = _numbers(given)
+    array = numbers_of(given)
     if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (positive and (array <= 0.0).any()):
         what = "positive frequencies" if positive else "finite values"
         raise InputError(f"{name}: give a range (from, to), or an array of {what}")

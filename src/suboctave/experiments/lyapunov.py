@@ -28,11 +28,11 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
-from suboctave.experiments.common import Layout, ParallelOptions, TimeResult, check_continuous, start_state
+from suboctave.experiments.common import Layout, ParallelOptions, TimeResult, check_continuous
 from suboctave.experiments.poincare import state_sizes
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, read_values, timed
+from suboctave.model.inputs import check_count, check_omega, read_values, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting

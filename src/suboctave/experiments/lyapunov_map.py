@@ -16,12 +16,11 @@ from suboctave.experiments.common import (
     TimeResult,
     check_continuous,
     checked_range,
-    start_state,
     varied_grid,
 )
 from suboctave.experiments.lyapunov import smooth_weights
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_parameter, read_values, timed
+from suboctave.model.inputs import check_count, check_parameter, read_values, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting

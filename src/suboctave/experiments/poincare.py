@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
-from suboctave.experiments.common import Layout, SectionOptions, TimeResult, checked_integration, start_state
+from suboctave.experiments.common import Layout, SectionOptions, TimeResult, checked_integration
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, timed
+from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting

@@ -32,12 +32,11 @@ from suboctave.experiments.common import (
     TimeResult,
     checked_integration,
     checked_range,
-    start_state,
 )
 from suboctave.experiments.poincare import Attractor, attractor_of
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, observed_dof, timed
+from suboctave.model.inputs import check_count, observed_dof, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting

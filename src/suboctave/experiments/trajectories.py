@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from suboctave.experiments.common import FEW, Layout, TimeResult, start_state, steps_of
+from suboctave.experiments.common import FEW, Layout, TimeResult, steps_of
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, read_values, timed
+from suboctave.model.inputs import check_count, check_omega, read_values, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import reporting

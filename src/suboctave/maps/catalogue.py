@@ -32,7 +32,7 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import truncation
 from suboctave.interruption import Interruption, pass_on
 from suboctave.maps.pieces import MonotonePiece, pieces_of
-from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
+from suboctave.model.inputs import check_bounds, check_count, check_parameter, check_range, check_system
 from suboctave.model.system import System
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch
@@ -353,13 +353,6 @@ COARSE = Seeds(8, 4, 3)
 def is_count(number: Any, least: int) -> bool:
     """Whether something is a whole number that is not too small."""
     return isinstance(number, int) and not isinstance(number, bool) and number >= least
-
-
-def check_count(name: str, number: Any, least: int) -> int:
-    """A whole number that is not too small."""
-    if not is_count(number, least):
-        raise InputError(f"{name} must be a whole number of at least {least}, not {number!r}")
-    return int(number)
 
 
 def listed(values: Any) -> list[Any]:

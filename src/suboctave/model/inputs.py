@@ -14,6 +14,7 @@ import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, chosen_dof, is_number, shortened, suggest
 from suboctave.interruption import time_limit
+from suboctave.model.elements.base import Array
 from suboctave.model.system import System
 
 #: the largest count of anything
@@ -22,10 +23,15 @@ _MOST = 100_000_000
 _MOST_EXAMINED = 400
 
 
-def check_system(system: System, omega: tuple[float, ...] = ()) -> None:
-    """Refuse what cannot vibrate periodically: no load (at the frequencies `omega`), or a body that nothing holds."""
+def check_is_system(system: Any) -> None:
+    """Refuse what is no system."""
     if not isinstance(system, System):
         raise InputError(f"the first argument must be a System, not {type(system).__name__}")
+
+
+def check_system(system: System, omega: tuple[float, ...] = ()) -> None:
+    """Refuse what cannot vibrate periodically: no load (at the frequencies `omega`), or a body that nothing holds."""
+    check_is_system(system)
     periodic = [c for c in system.load_components() if c.harmonic > 0]
     if not periodic and not system.excited_by_elements:
         raise InputError(
@@ -69,11 +75,12 @@ def check_parameter(system: System, name: str) -> None:
 
 
 def check_count(name: str, value: Any, least: int = 1) -> int:
-    """A whole number, positive or at least 0."""
+    """A whole number of at least so much."""
     exact = isinstance(value, int | np.integer) and not isinstance(value, bool)
     whole = exact or (not isinstance(value, bool) and is_number(value) and float(value).is_integer())
     if not whole or value < least:
-        raise InputError(f"{name} must be a {'positive ' * (least > 0)}whole number, not {shortened(value)}")
+        enough = f" of at least {least}" if least > 1 else ""
+        raise InputError(f"{name} must be a {'positive ' * (least == 1)}whole number{enough}, not {shortened(value)}")
     if value > _MOST:
         raise InputError(f"{name}={shortened(int(value))} is more than {_MOST}, the largest count that is taken")
     return int(value)
@@ -134,6 +141,30 @@ def read_values(system: System, parameters: Any) -> dict[str, float]:
         if isinstance(value, bool) or not is_number(value):
             raise InputError(f"parameters: {name!r} must be a finite number, not {shortened(value)}")
     return {name: float(value) for name, value in parameters.items()}
+
+
+def start_state(system: System, state: Any) -> Array:
+    """A state (2n,): rest for None, that of a periodic motion at t = 0, or what is given."""
+    check_is_system(system)
+    if state is None:
+        return np.zeros(2 * system.n)
+    for name in ("start", "state"):
+        held = getattr(state, name, None)
+        if held is not None and not isinstance(state, np.ndarray):
+            state = held() if callable(held) else held
+            break
+    array = numbers_of(state)
+    if array.shape != (2 * system.n,) or not np.isfinite(array).all():
+        raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
+    return array
+
+
+def numbers_of(given: Any) -> Array:
+    """What was given as an array of floats; an empty one for what is none."""
+    try:
+        return np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return np.zeros(0)
 
 
 def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:

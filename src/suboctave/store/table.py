@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,6 +42,12 @@ class Table:
     def interruption(self) -> Interruption | None:
         """What stopped the analysis before its end, Ctrl-C or a time limit; None if nothing did."""
         return self.stopped if self.result is None else self.result.interruption
+
+    @classmethod
+    def of_rows(cls, names: Sequence[str], rows: Sequence[Sequence[Any]], title: str) -> Table:
+        """Columns of these names from rows; empty ones without any."""
+        columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * len(names)
+        return cls(dict(zip(names, columns, strict=True)), title)
 
     def __len__(self) -> int:
         return max((len(column) for column in self.columns.values()), default=0)

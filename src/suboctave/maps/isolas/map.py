@@ -405,6 +405,7 @@ def _nearest(border: MonotonePiece, value: float) -> int:
     return int(inner[np.argmin(np.abs(border.values[inner] - value))])
 
 
+@dataclass(eq=False, repr=False)
 class IsolaMap(Stored):
     """In which regions of two design parameters isolas exist.
 
@@ -422,31 +423,24 @@ class IsolaMap(Stored):
         What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
-    def __init__(
-        self,
-        regions: Sequence[IsolaRegion],
-        system: System,
-        parameter: str,
-        second: str,
-        within: tuple[float, float] | None,
-        bounds: tuple[float, float],
-        notes: Sequence[str],
-        interruption: Interruption | None = None,
-    ) -> None:
-        self.regions = tuple(regions)
-        self.system = system
-        self.parameter = parameter
-        self.second = second
-        self.within = within
-        self.bounds = bounds
-        self.interruption = interruption
+    regions: Sequence[IsolaRegion]
+    system: System
+    parameter: str
+    second: str
+    within: tuple[float, float] | None
+    bounds: tuple[float, float]
+    notes: Sequence[str]
+    interruption: Interruption | None = None
+
+    def __post_init__(self) -> None:
+        self.regions = tuple(self.regions)
         doubts = [
-            f"at {second} = {probe.second:.6g}, {parameter} = {probe.middle:.6g}: {probe.disagreement}"
-            for region in regions
+            f"at {self.second} = {probe.second:.6g}, {self.parameter} = {probe.middle:.6g}: {probe.disagreement}"
+            for region in self.regions
             for probe in region.probes
             if not probe.agrees
         ]
-        self.notes = tuple(dict.fromkeys([*notes, *doubts]))
+        self.notes = tuple(dict.fromkeys([*self.notes, *doubts]))
 
     @property
     def born(self) -> list[TrackedBranch]:
@@ -517,11 +511,9 @@ class IsolaMap(Stored):
                 for nature, first, second in region.border(upper):
                     side = "upper" if upper else "lower"
                     rows += [(number, side, nature, float(a), float(b)) for a, b in zip(first, second, strict=True)]
-        columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * 5
         own = ("region", "end", "border")
         names = (*own, *(parameter_column(name, own) for name in (self.second, self.parameter)))
-        title = f"isolas over {self.second} and {self.parameter}"
-        return Table(dict(zip(names, columns, strict=True)), title)
+        return Table.of_rows(names, rows, f"isolas over {self.second} and {self.parameter}")
 
     def to_dataframe(self) -> pandas.DataFrame:
         """`to_table` as a table of pandas."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -259,6 +259,7 @@ def _joined(chain: Sequence[MonotonePiece], bounds: tuple[float, float]) -> Trac
     )
 
 
+@dataclass(eq=False, repr=False)
 class Isolas(Stored, Sequence[Isola]):
     """Isolas in the order of the values at which they are born, and what was learnt on the way.
 
@@ -276,29 +277,21 @@ class Isolas(Stored, Sequence[Isola]):
         What stopped the search, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
-    def __init__(
-        self,
-        isolas: Iterable[Isola],
-        system: System,
-        parameter: str,
-        bounds: tuple[float, float],
-        omega: tuple[float, float],
-        limit_points: Sequence[TrackedBranch] = (),
-        doublings: Sequence[TrackedBranch] = (),
-        notes: Iterable[str] = (),
-        summary: str = "",
-        interruption: Interruption | None = None,
-    ) -> None:
+    isolas: InitVar[Iterable[Isola]]
+    system: System
+    parameter: str
+    bounds: tuple[float, float]
+    omega: tuple[float, float]
+    limit_points: Sequence[TrackedBranch] = ()
+    doublings: Sequence[TrackedBranch] = ()
+    notes: Iterable[str] = ()
+    summary: str = ""
+    interruption: Interruption | None = None
+
+    def __post_init__(self, isolas: Iterable[Isola]) -> None:
         self._items = tuple(sorted(isolas, key=_birth))
-        self.system = system
-        self.parameter = parameter
-        self.bounds = bounds
-        self.omega = omega
-        self.limit_points = tuple(limit_points)
-        self.doublings = tuple(doublings)
-        self.notes = tuple(notes)
-        self.summary = summary
-        self.interruption = interruption
+        self.limit_points, self.doublings = tuple(self.limit_points), tuple(self.doublings)
+        self.notes = tuple(self.notes)
 
     def __len__(self) -> int:
         return len(self._items)

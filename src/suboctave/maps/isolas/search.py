@@ -10,13 +10,13 @@ for is located by bisection and noted.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import pass_on
 from suboctave.maps.catalogue import Catalogue, branch_through
-from suboctave.maps.isolas.result import IsolaEnd
+from suboctave.maps.isolas.result import Isola, IsolaEnd
 from suboctave.maps.pieces import MonotonePiece
 from suboctave.results.branch import Branch
 
@@ -44,43 +44,6 @@ class Loop:
     detached: bool
 
 
-@dataclass
-class Existence:
-    """The range of a detached branch: the pieces that its limit points lie on, its ends, loops that are known.
-
-    To begin with a single value.
-    """
-
-    pieces: list[MonotonePiece]
-    loops: list[Loop]
-    low: float
-    high: float
-    ends: tuple[IsolaEnd | None, IsolaEnd | None] = (None, None)
-    reasons: tuple[str, str] = ("not followed to lower values", "not followed to higher values")
-    notes: list[str] = field(default_factory=list)
-
-    def covers(self, piece: MonotonePiece, value: float) -> bool:
-        """Whether a piece's limit point at a value lies on it."""
-        return piece in self.pieces and self.low <= value <= self.high
-
-    def take(self, loop: Loop) -> None:
-        """The branch at another value, detached as well."""
-        self.loops.append(loop)
-        self.pieces += [piece for piece in loop.pieces if piece not in self.pieces]
-
-    def end_at(self, upper: bool, end: _End, name: str) -> None:
-        """How it ends in one direction becomes known."""
-        event = None if end.event is None else IsolaEnd.of(end.event, name, end.centre)
-        if upper:
-            self.high, self.ends, self.reasons = end.value, (self.ends[0], event), (self.reasons[0], end.reason)
-        else:
-            self.low, self.ends, self.reasons = end.value, (event, self.ends[1]), (end.reason, self.reasons[1])
-
-    def ends_at(self, event: TrackedEvent) -> bool:
-        """Whether it ends at an event, whose orbit its end shares."""
-        return any(end is not None and end.orbit is event.orbit for end in self.ends)
-
-
 class Search:
     """What a search for isolas knows: curves of bifurcations, branches at values, and the isolas so far.
 
@@ -94,7 +57,7 @@ class Search:
         self.catalogue = catalogue
         self.values = tuple(values)
         self.met: dict[float, list[Branch]] = {}
-        self.isolas: list[Existence] = []
+        self.isolas: list[Isola] = []
         self._explained: set[tuple[float, int]] = set()
 
     @property
@@ -118,15 +81,21 @@ class Search:
 
     def _consider(self, loop: Loop) -> None:
         """A branch that is detached exists over some range, unless it is known; any other is known from now on."""
-        if any(isola.covers(piece, loop.value) for isola in self.isolas for piece in loop.pieces):
+        if any(_covers(isola, piece, loop.value) for isola in self.isolas for piece in loop.pieces):
             return
         if loop.detached and loop.pieces:
-            self.catalogue.progress(PREPARATION, f"closed branch at {self.catalogue.name} = {loop.value:.6g}")
-            isola = Existence(list(loop.pieces), [loop], loop.value, loop.value)
+            catalogue, value = self.catalogue, loop.value
+            catalogue.progress(PREPARATION, f"closed branch at {catalogue.name} = {value:.6g}")
+            # to begin with at a single value
+            reasons = ("not followed to lower values", "not followed to higher values")
+            isola = Isola(
+                catalogue.system, catalogue.name, (catalogue.omega.low, catalogue.omega.high), (None, None),
+                (value, value), reasons, loop.pieces, catalogue.options, (), {value: loop.branch},
+            )  # fmt: skip
             low, high = (_Direction(upper, isola, self) for upper in (False, True))
             self.isolas.append(isola)
-            isola.end_at(False, low.end(), self.catalogue.name)
-            isola.end_at(True, high.end(), self.catalogue.name)
+            for direction in (low, high):
+                direction.settle(loop)
         else:
             self.attach(loop)
 
@@ -143,7 +112,7 @@ class Search:
                 break
             piece, event, upper = centre
             done.add(id(event))
-            if any(isola.ends_at(event) for isola in self.isolas):
+            if any(end is not None and end.orbit is event.orbit for isola in self.isolas for end in isola.ends):
                 continue
             value = event.parameter(name)
             beyond, _ = next(self.critical(piece.nu, value, not upper), (bounds[0 if upper else 1], []))
@@ -151,7 +120,7 @@ class Search:
         for value in values:
             for piece in self.catalogue.limit_points:
                 unexplained = piece.contains(value) and not self.explained(piece, value)
-                if unexplained and not any(isola.covers(piece, value) for isola in self.isolas):
+                if unexplained and not any(_covers(isola, piece, value) for isola in self.isolas):
                     yield piece, value
 
     def _centres(self) -> Iterator[tuple[MonotonePiece, TrackedEvent, bool]]:
@@ -237,7 +206,7 @@ class _End:
 class _Direction:
     """A detached branch over rising (`upper`) or falling values of the parameter."""
 
-    def __init__(self, upper: bool, isola: Existence, search: Search) -> None:
+    def __init__(self, upper: bool, isola: Isola, search: Search) -> None:
         self.upper = upper
         self.isola = isola
         self.search = search
@@ -245,14 +214,27 @@ class _Direction:
         self.name = search.catalogue.name
         self.bound = search.catalogue.bounds[1 if upper else 0]
 
-    def end(self) -> _End:
+    def settle(self, loop: Loop) -> None:
+        """Find the end of the range in this direction, from a branch within it."""
+        isola, end = self.isola, self._end(loop)
+        event = None if end.event is None else IsolaEnd.of(end.event, self.name, end.centre)
+        (low, high), (first, last), (why, reason) = isola.range, isola.ends, isola.reasons
+        isola.range = (low, end.value) if self.upper else (end.value, high)
+        isola.ends = (first, event) if self.upper else (event, last)
+        isola.reasons = (why, end.reason) if self.upper else (end.reason, reason)
+
+    def _take(self, loop: Loop) -> None:
+        """The branch at another value, detached as well."""
+        self.isola.followed[loop.value] = loop.branch
+        self.isola.pieces = tuple(dict.fromkeys([*self.isola.pieces, *loop.pieces]))
+
+    def _end(self, loop: Loop) -> _End:
         """Go on until the branch vanishes, meets another one, or the range ends."""
-        loop = self.isola.loops[0]
         while (step := next(self._relevant(loop), None)) is not None:
             after = self._behind(loop, *step)
             if isinstance(after, _End):
                 return after
-            self.isola.take(after)
+            self._take(after)
             loop = after
         last = [piece for piece in loop.pieces if piece.contains(self.bound)]
         if not last:
@@ -265,7 +247,7 @@ class _Direction:
         if at_bound is None:
             return _End(loop.value, f"behind {self.name} = {loop.value:.9g} it could not be followed")
         if at_bound.detached:
-            self.isola.take(at_bound)
+            self._take(at_bound)
             return cut
         return self._bisected(last[0], loop, at_bound)
 
@@ -285,7 +267,7 @@ class _Direction:
             if event is None or not (own or self._detached_before(value, lasting[0], loop)):
                 return self._bisected(lasting[0], loop, after)
             return _End(value, _merging(self.name, value, event, after), event)
-        other = next((o for o in self.others if any(o.covers(piece, behind) for piece in after.pieces)), None)
+        other = next((o for o in self.others if any(_covers(o, piece, behind) for piece in after.pieces)), None)
         return after if other is None else _End(value, _joining(self.name, value, own or events, other), event)
 
     def _detached_before(self, value: float, piece: MonotonePiece, loop: Loop) -> bool:
@@ -293,7 +275,7 @@ class _Direction:
         before = self.search.through(piece, value - _BEFORE * (value - loop.value))
         if before is None or not before.detached:
             return False
-        self.isola.take(before)
+        self._take(before)
         return True
 
     def _relevant(self, loop: Loop) -> Iterator[tuple[float, list[TrackedEvent]]]:
@@ -315,16 +297,19 @@ class _Direction:
             if middle is None:
                 break
             if middle.detached:
-                self.isola.take(middle)
+                self._take(middle)
                 a = middle.value
             else:
                 b = middle.value
         low, high = sorted((a, b))
-        self.isola.notes.append(
-            f"between {self.name} = {low:.6g} and {high:.6g} it ceases to be detached, and no event that was found "
-            "says why"
-        )
+        where = f"between {self.name} = {low:.6g} and {high:.6g}"
+        self.isola.notes += (f"{where} it ceases to be detached, and no event that was found says why",)
         return _End(a, f"detached up to {self.name} = {a:.6g} at least, no longer at {b:.6g}")
+
+
+def _covers(isola: Isola, piece: MonotonePiece, value: float) -> bool:
+    """Whether a piece's limit point at a value lies on an isola."""
+    return piece in isola.pieces and value in isola
 
 
 def _reconnecting(events: list[TrackedEvent]) -> TrackedEvent | None:
@@ -353,7 +338,7 @@ def _merging(name: str, value: float, event: TrackedEvent, after: Loop) -> str:
     return f"merges at {where} with {what}"
 
 
-def _joining(name: str, value: float, events: list[TrackedEvent], other: Existence) -> str:
+def _joining(name: str, value: float, events: list[TrackedEvent], other: Isola) -> str:
     place = ", ".join(f"{name} = {float(e):.7g}" for e in other.ends if e is not None and e.kind == "isola_centre")
     which = f"the isola born at {place}" if place else "another isola"
     return f"merges at omega = {events[0].omega:.9g}, {name} = {value:.9g} with {which}, as which it goes on"

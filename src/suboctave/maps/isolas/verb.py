@@ -36,16 +36,15 @@ from suboctave.interruption import pass_on
 from suboctave.maps.catalogue import (
     COARSE,
     Catalogue,
-    check_count,
     check_seeds,
     checked_orders,
     checked_values,
     listed,
     motion_near,
 )
-from suboctave.maps.isolas.result import Isola, Isolas
+from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.isolas.search import PREPARATION, Loop, Search
-from suboctave.model.inputs import timed
+from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.branch import Branch
@@ -146,21 +145,7 @@ def _result(search: Search) -> Isolas:
     """The isolas of a search, and the curves that were followed, with the outcome in one sentence."""
     catalogue = search.catalogue
     (low, high), (first, last) = catalogue.bounds, catalogue.omega
-    isolas = [
-        Isola(
-            catalogue.system,
-            catalogue.name,
-            (first, last),
-            one.ends,
-            (one.low, one.high),
-            one.reasons,
-            tuple(one.pieces),
-            catalogue.options,
-            tuple(one.notes),
-            {loop.value: loop.branch for loop in one.loops},
-        )
-        for one in search.isolas
-    ]
+    isolas = search.isolas
     curves = {kind: [curve for curve in catalogue.curves if curve.kind == kind] for kind in ("LP", "PD")}
     where = f"for {catalogue.name} from {low:g} to {high:g}, omega from {first:g} to {last:g}"
     begin = f"the responses at {len(search.values)} values of {catalogue.name}"

@@ -19,24 +19,36 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.analysis.subharmonics import periodic_orbit
+from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import make_curve
+from suboctave.curves.identity import apart
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import linear_response
-from suboctave.errors import ConvergenceError
+from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.experiments.poincare import Attractor, poincare_sections
+from suboctave.floquet import floquet_multipliers
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import limited, pass_on
-from suboctave.maps.catalogue import check_count
-from suboctave.maps.regimes.slices import Arc, LabelledPlane, Regime, regime_of
+from suboctave.maps.catalogue import Catalogue, motion_near
+from suboctave.maps.regimes.slices import Arc, Regime, Strip, regime_of
+from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.progress import reporting
+from suboctave.results.tracked_branch import TrackedBranch
 from suboctave.store.columns import parameter_column
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table
 
 if TYPE_CHECKING:
     import pandas
+
+#: steps of the way, shares of it: the first, the smallest
+_FIRST, _SMALLEST = 0.5, 1e-3
+#: a step may change the harmonics of a motion by this share of them
+_MOST = 0.35
+#: and keeps this share of what a motion of a shorter period has not: else it fell back onto that
+_LASTING = 0.3
 
 
 @dataclass(frozen=True)
@@ -49,7 +61,7 @@ class Region:
     values: tuple[float, float]
 
 
-class RegimeMap(LabelledPlane, Stored):
+class RegimeMap(Stored):
     """Which stable motions exist over omega and a design parameter.
 
     Attributes
@@ -67,6 +79,94 @@ class RegimeMap(LabelledPlane, Stored):
     interruption
         What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
+
+    def __init__(self, catalogue: Catalogue, strips: Sequence[Strip], depth: int, resolution: float) -> None:
+        self.system = catalogue.system
+        self.parameter = catalogue.name
+        self.omega: tuple[float, float] = catalogue.omega
+        self.bounds = catalogue.bounds
+        self.options = catalogue.options
+        self.curves: tuple[TrackedBranch, ...] = tuple(catalogue.curves)
+        self.strips = tuple(strips)
+        self.depth = depth
+        self.resolution = resolution
+        self.notes = tuple(catalogue.notes)
+        self.interruption = catalogue.interruption
+
+    def strip(self, value: float) -> Strip:
+        """The strip that a value of the parameter lies in; InputError outside the bounds."""
+        low, high = self.bounds
+        if not is_number(value) or not low <= value <= high:
+            raise InputError(f"the map reaches from {self.parameter} = {low:g} to {high:g}, not to {value!r}")
+        return next(s for s in self.strips if value <= s.high or s is self.strips[-1])
+
+    def arcs(self, omega: float, value: float) -> list[Arc]:
+        """The stable arcs that have a motion at a point of the plane; InputError outside the map."""
+        low, high = self.omega
+        if not is_number(omega) or not low <= omega <= high:
+            raise InputError(f"the map reaches from omega = {low:g} to {high:g}, not to {omega!r}")
+        ranges = ((arc, *arc.range(value)) for arc in self.strip(value).arcs)
+        return [arc for arc, first, last in ranges if first <= omega <= last]
+
+    def motion(self, arc: Arc, omega: float, value: float) -> PeriodicOrbit:
+        """The motion of an arc at a point of the plane, from its own motions at another value, step by step.
+
+        On the way it keeps its place between the two ends of its arc, so that the path stays on the arc.
+        ConvergenceError if Newton's method loses it on the way.
+        """
+        seen = self.strip(value).value
+
+        def ends(there: float) -> tuple[float, float]:
+            low, high = arc.range(there)
+            return max(float(low), self.omega[0]), min(float(high), self.omega[1])
+
+        low, high = ends(value)
+        share = (omega - low) / ((high - low) or 1.0)
+
+        def place(way: float) -> tuple[float, float]:
+            there = seen + way * (value - seen)
+            first, last = ends(there)
+            return first + share * (last - first), there
+
+        begin = place(0.0)[0]
+        orbit = min((p.orbit for p in arc.points), key=lambda o: abs(o.omega - begin))
+        way, step = 0.0, _FIRST
+        with one_thread():
+            while way < 1.0:
+                target = min(1.0, way + step)
+                at, there = (omega, value) if target == 1.0 else place(target)
+                try:
+                    motion = motion_near(orbit, self.system.with_parameters({self.parameter: there}), at)
+                except ConvergenceError:
+                    motion = None
+                if motion is not None and _follows(orbit, motion):
+                    orbit, way = motion, target
+                    continue
+                step *= 0.5
+                if step < _SMALLEST:
+                    where = f"omega = {omega:.6g}, {self.parameter} = {value:.6g}"
+                    raise ConvergenceError(f"the motion of {arc.nu} load periods at {where} was not found again")
+        return orbit
+
+    def motions(self, omega: float, value: float) -> list[PeriodicOrbit]:
+        """The stable motions themselves at a point of the plane, solved there; those beyond the depth are left out.
+
+        Raises
+        ------
+        ConvergenceError
+            If one is not found again, which may happen next to a border.
+        """
+        return [self.motion(arc, omega, value) for arc in self.arcs(omega, value) if arc.followed]
+
+    def label(self, omega: float, value: float) -> Regime:
+        """The stable motions known at a point of the plane.
+
+        Raises
+        ------
+        InputError
+            Outside the map.
+        """
+        return regime_of(self.arcs(omega, value))
 
     @limited
     def check(
@@ -94,7 +194,16 @@ class RegimeMap(LabelledPlane, Stored):
         seconds
             Time limit; what is not complete then is no check, and a TimeLimitError says so.
         """
-        return check_regimes(self, points, seed, states, transient, progress)
+        for name, number, least in (("points", points, 1), ("states", states, 0), ("transient", transient, 1)):
+            check_count(name, number, least)
+        with reporting(progress, "integrating at points of the map") as report:
+            work = _Check(self, points, seed)
+            for number in range(points):
+                if report is not None:
+                    report(0.3 * number / points, f"motions at point {number + 1} of {points}")
+                work.begin_at(number, states)
+            landings = work.landings(transient, None if report is None else lambda s, text: report(0.3 + 0.7 * s, text))
+        return RegimeCheck(tuple(landings), points, self.system, self.parameter)
 
     def raster(self, columns: int = 400, rows: int = 300) -> tuple[np.ndarray, tuple[Regime, ...]]:
         """The labels at the centres of cells: numbers (rows, columns), the parameter growing with the row; the regimes.
@@ -156,10 +265,7 @@ class RegimeMap(LabelledPlane, Stored):
         """The borders of stable arcs, point by point: arc, period, whether on an isola, kind, parameter, both ends."""
         own = ("strip", "arc", "period", "isola", "from kind", "to kind")
         names = (*own, parameter_column(self.parameter, own), "from omega", "to omega")
-        rows = list(self._rows())
-        columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * len(names)
-        title = f"stable motions over omega and {self.parameter}"
-        return Table(dict(zip(names, columns, strict=True)), title)
+        return Table.of_rows(names, list(self._rows()), f"stable motions over omega and {self.parameter}")
 
     def _rows(self, count: int = 33) -> Iterator[tuple[Any, ...]]:
         for number, strip in enumerate(self.strips):
@@ -227,14 +333,8 @@ _TOLERANCE, _REPEATS = 1e-9, 1e-5
 _LONGER = 10
 
 #: verdicts on a trajectory
-AGREES, BEYOND, UNKNOWN, LEFT, UNSETTLED, NOT_SOLVED = (
-    "agrees",
-    "not followed",
-    "unknown motion",
-    "left its motion",
-    "not settled",
-    "not solved",
-)
+AGREES, BEYOND, UNKNOWN = "agrees", "not followed", "unknown motion"
+LEFT, UNSETTLED, NOT_SOLVED = "left its motion", "not settled", "not solved"
 
 
 @dataclass(frozen=True)
@@ -264,6 +364,7 @@ class Landing:
     state: Array
 
 
+@dataclass(eq=False, repr=False)
 class RegimeCheck:
     """What time integration says of a regime map.
 
@@ -275,11 +376,10 @@ class RegimeCheck:
         How many points of the plane.
     """
 
-    def __init__(self, landings: Sequence[Landing], points: int, system: System, name: str) -> None:
-        self.landings = tuple(landings)
-        self.points = points
-        self.system = system
-        self.name = name
+    landings: tuple[Landing, ...]
+    points: int
+    system: System
+    name: str
 
     @property
     def rate(self) -> float:
@@ -323,8 +423,7 @@ class RegimeCheck:
         own = ("start", "period", "amplitude", "expected", "verdict")
         names = ("omega", parameter_column(self.name, own), *own)
         rows = [(x.omega, x.value, x.start, x.period, x.amplitude, x.expected, x.verdict) for x in self.landings]
-        columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * len(names)
-        return Table(dict(zip(names, columns, strict=True)), "a regime map against time integration")
+        return Table.of_rows(names, rows, "a regime map against time integration")
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {verdict}" for verdict, count in sorted(self.counts.items()))
@@ -354,26 +453,10 @@ class _Start:
     state: Array
 
 
-def check_regimes(
-    regimes: LabelledPlane, points: int, seed: int, states: int, transient: int, progress: Any
-) -> RegimeCheck:
-    """See `RegimeMap.check`."""
-    for name, number, least in (("points", points, 1), ("states", states, 0), ("transient", transient, 1)):
-        check_count(name, number, least)
-    with reporting(progress, "integrating at points of the map") as report:
-        check = _Check(regimes, points, seed)
-        for number in range(points):
-            if report is not None:
-                report(0.3 * number / points, f"motions at point {number + 1} of {points}")
-            check.begin_at(number, states)
-        landings = check.landings(transient, None if report is None else lambda s, text: report(0.3 + 0.7 * s, text))
-    return RegimeCheck(landings, points, regimes.system, regimes.parameter)
-
-
 class _Check:
     """Trajectories from points of the plane drawn at random, and the motions that the map knows there."""
 
-    def __init__(self, regimes: LabelledPlane, points: int, seed: int) -> None:
+    def __init__(self, regimes: RegimeMap, points: int, seed: int) -> None:
         self.regimes = regimes
         self.draw = np.random.default_rng(seed)
         sides = (regimes.omega, regimes.bounds)
@@ -458,7 +541,7 @@ class _Check:
         return Landing(omega, value, begun, attractor.period, attractor.amplitude, str(label), verdict, attractor.state)
 
 
-def _sizes(regimes: LabelledPlane) -> tuple[Array, Array]:
+def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
     """Sizes (2n,) of the smallest motion of the map, and of what may be reached: that of its largest, or in resonance.
 
     The linear response in resonance is what no motion of the load's period exceeds by much.
@@ -498,3 +581,18 @@ def _extent(orbit: PeriodicOrbit) -> Array:
     """Largest displacement and velocity of every DOF, shape (2n,)."""
     dofs = range(orbit.balance.system.n)
     return np.array([orbit.amplitude(i) for i in dofs] + [orbit.velocity_amplitude(i) for i in dofs])
+
+
+def _follows(orbit: PeriodicOrbit, motion: PeriodicOrbit) -> bool:
+    """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
+    lasting = _own(motion) >= _LASTING * _own(orbit)
+    return lasting and apart(orbit, motion) <= _MOST and bool(floquet_multipliers(motion.state()).stable)
+
+
+def _own(orbit: PeriodicOrbit) -> float:
+    """Size of the harmonics that motions of half the period, or of the load's, do not have; of the latter all."""
+    sizes = np.linalg.norm(orbit.amplitudes, axis=1)
+    orders, nu = np.arange(len(sizes)), orbit.basis.nu
+    if nu == 1:
+        return float(np.linalg.norm(sizes))
+    return float(np.linalg.norm(sizes[orders % 2 == 1] if nu % 2 == 0 else sizes[orders % nu != 0]))

@@ -17,20 +17,14 @@ import numpy as np
 from suboctave.analysis.diagram import ByPeriod, grown_from
 from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
-from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
-from suboctave.curves.identity import apart, lies_on, mirrored
+from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
 from suboctave.curves.points import BranchPoint
-from suboctave.errors import ConvergenceError, InputError, is_number
-from suboctave.floquet import floquet_multipliers
-from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import FAILURES, Catalogue, SearchRange, branch_through, motion_near
+from suboctave.maps.catalogue import FAILURES, Catalogue, SearchRange, branch_through
 from suboctave.maps.pieces import MonotonePiece, Stretch, same_branch, stretches
-from suboctave.model.system import System
 from suboctave.results.branch import Branch
-from suboctave.results.tracked_branch import TrackedBranch
 
 #: ends of branches this close to the end of the range, relatively, lie on it
 _AT_END = 1e-6
@@ -293,14 +287,6 @@ def follow_curves_beside(value: float, catalogue: Catalogue) -> None:
                     catalogue.known(item, value)
 
 
-#: steps of the way, shares of it: the first, the smallest
-_FIRST, _SMALLEST = 0.5, 1e-3
-#: a step may change the harmonics of a motion by this share of them
-_MOST = 0.35
-#: and keeps this share of what a motion of a shorter period has not: else it fell back onto that
-_KEPT = 0.3
-
-
 @dataclass(frozen=True)
 class Regime:
     """The stable motions that coexist: of each its period in periods of the load, and whether it lies on an isola.
@@ -356,135 +342,7 @@ class Strip:
         return 0.5 * (self.low + self.high) if self.slice is None else self.slice.value
 
 
-class LabelledPlane:
-    """What `RegimeMap` says of a point: stable arcs over omega and a design parameter, strip by strip."""
-
-    def __init__(self, catalogue: Catalogue, strips: Sequence[Strip], depth: int, resolution: float) -> None:
-        self.system = catalogue.system
-        self.parameter = catalogue.name
-        self.omega: tuple[float, float] = catalogue.omega
-        self.bounds = catalogue.bounds
-        self.options = catalogue.options
-        self.curves: tuple[TrackedBranch, ...] = tuple(catalogue.curves)
-        self.strips = tuple(strips)
-        self.depth = depth
-        self.resolution = resolution
-        self.notes = tuple(catalogue.notes)
-        self.interruption = catalogue.interruption
-
-    def strip(self, value: float) -> Strip:
-        """The strip that a value of the parameter lies in; InputError outside the bounds."""
-        low, high = self.bounds
-        if not is_number(value) or not low <= value <= high:
-            raise InputError(f"the map reaches from {self.parameter} = {low:g} to {high:g}, not to {value!r}")
-        return next(s for s in self.strips if value <= s.high or s is self.strips[-1])
-
-    def arcs(self, omega: float, value: float) -> list[Arc]:
-        """The stable arcs that have a motion at a point of the plane; InputError outside the map."""
-        low, high = self.omega
-        if not is_number(omega) or not low <= omega <= high:
-            raise InputError(f"the map reaches from omega = {low:g} to {high:g}, not to {omega!r}")
-        present = []
-        for arc in self.strip(value).arcs:
-            first, last = (float(v) for v in arc.range(value))
-            if first <= omega <= last:
-                present.append(arc)
-        return present
-
-    def motion(self, arc: Arc, omega: float, value: float) -> PeriodicOrbit:
-        """The motion of an arc at a point of the plane, solved there; ConvergenceError if it is not found again."""
-        seen = self.strip(value).value
-        return motion_at(arc, seen, self.system, self.parameter, self.omega, omega, value)
-
-    def motions(self, omega: float, value: float) -> list[PeriodicOrbit]:
-        """The stable motions themselves at a point of the plane, solved there; those beyond the depth are left out.
-
-        Raises
-        ------
-        ConvergenceError
-            If one is not found again, which may happen next to a border.
-        """
-        return [self.motion(arc, omega, value) for arc in self.arcs(omega, value) if arc.followed]
-
-    def label(self, omega: float, value: float) -> Regime:
-        """The stable motions known at a point of the plane.
-
-        Raises
-        ------
-        InputError
-            Outside the map.
-        """
-        return regime_of(self.arcs(omega, value))
-
-
 def regime_of(arcs: Sequence[Arc]) -> Regime:
     """The label of motions that coexist."""
     known, beyond = ([(a.nu, a.isolated) for a in arcs if a.followed is followed] for followed in (True, False))
     return Regime(tuple(sorted(known)), tuple(sorted(beyond)))
-
-
-# ------------------------------------------------------------------------------------------------- motions at points
-def motion_at(
-    arc: Arc, seen: float, system: System, name: str, within: tuple[float, float], omega: float, value: float
-) -> PeriodicOrbit:
-    """The motion of an arc at (omega, value), from its own motions at the value `seen`, step by step.
-
-    On the way it keeps its place between the two ends of its arc, so that the path stays on the arc.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method loses it on the way.
-    """
-    low, high = _range(arc, value, within)
-    share = (omega - low) / ((high - low) or 1.0)
-
-    def place(way: float) -> tuple[float, float]:
-        there = seen + way * (value - seen)
-        first, last = _range(arc, there, within)
-        return first + share * (last - first), there
-
-    begin = place(0.0)[0]
-    orbit = min((p.orbit for p in arc.points), key=lambda o: abs(o.omega - begin))
-    way, step = 0.0, _FIRST
-    with one_thread():
-        while way < 1.0:
-            target = min(1.0, way + step)
-            at = (omega, value) if target == 1.0 else place(target)
-            motion = _solved(orbit, system, name, *at)
-            if motion is None or not _follows(orbit, motion):
-                step *= 0.5
-                if step < _SMALLEST:
-                    where = f"omega = {omega:.6g}, {name} = {value:.6g}"
-                    raise ConvergenceError(f"the motion of {arc.nu} load periods at {where} was not found again")
-                continue
-            orbit, way = motion, target
-    return orbit
-
-
-def _range(arc: Arc, value: float, within: tuple[float, float]) -> tuple[float, float]:
-    low, high = arc.range(value)
-    return max(float(low), within[0]), min(float(high), within[1])
-
-
-def _follows(orbit: PeriodicOrbit, motion: PeriodicOrbit) -> bool:
-    """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
-    lasting = _own(motion) >= _KEPT * _own(orbit)
-    return lasting and apart(orbit, motion) <= _MOST and bool(floquet_multipliers(motion.state()).stable)
-
-
-def _own(orbit: PeriodicOrbit) -> float:
-    """Size of the harmonics that motions of half the period, or of the load's, do not have; of the latter all."""
-    sizes = np.linalg.norm(orbit.amplitudes, axis=1)
-    orders, nu = np.arange(len(sizes)), orbit.basis.nu
-    if nu == 1:
-        return float(np.linalg.norm(sizes))
-    return float(np.linalg.norm(sizes[orders % 2 == 1] if nu % 2 == 0 else sizes[orders % nu != 0]))
-
-
-def _solved(orbit: PeriodicOrbit, system: System, name: str, omega: float, value: float) -> PeriodicOrbit | None:
-    """The motion near another one at other values; None if Newton's method arrives at none there."""
-    try:
-        return motion_near(orbit, system.with_parameters({name: value}), omega)
-    except ConvergenceError:
-        return None

@@ -31,11 +31,11 @@ from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on, unlimited
-from suboctave.maps.catalogue import COARSE, MOST_VALUES, Catalogue, check_count, check_seeds, checked_orders
+from suboctave.maps.catalogue import COARSE, MOST_VALUES, Catalogue, check_seeds, checked_orders
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.slices import Slice, Strip, follow_curves_beside, follow_curves_of
-from suboctave.model.inputs import timed
+from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.branch import Branch

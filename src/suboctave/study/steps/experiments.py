@@ -10,10 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from suboctave.experiments.basins import Basins as BasinsResult, basins, check_plane
-from suboctave.experiments.common import start_state
 from suboctave.experiments.lyapunov import lyapunov_exponents
 from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine
-from suboctave.model.inputs import check_range
+from suboctave.model.inputs import check_range, start_state
 from suboctave.store.table import Table
 from suboctave.study.steps.base import (
     CheckContext,
