@@ -48,23 +48,6 @@ APART = {
     # Experiments in time follow no curve.
     "experiments": {"harmonic", "continuation", "floquet", "bifurcation", "curves", "results"},
 }
-# Rooms without circles of imports so far.
-CLEAN = [
-    "model",
-    "timedomain",
-    "continuation",
-    "floquet",
-    "bifurcation",
-    "curves",
-    "store",
-    "pictures",
-    "results",
-    "experiments",
-    "analysis",
-    "maps",
-    "verification",
-    "study",
-]
 HEAVY = ("numba", "sympy", "xarray", "pandas", "matplotlib", "plotly", "jinja2", "typer", "rich", "pydantic", "scipy")
 HEAVY += ("numpy",)
 
@@ -156,7 +139,7 @@ def imported_modules() -> dict[str, set[str]]:
     return imports
 
 
-@pytest.mark.parametrize("room", CLEAN)
+@pytest.mark.parametrize("room", sorted(ROOMS))
 def test_no_modules_of_a_room_import_each_other(room):
     imports = imported_modules()
 
@@ -220,3 +203,21 @@ def test_a_misspelt_name_gets_a_suggestion():
 def test_no_file_outgrows_reading():
     long = {path.name: lines for path in SOURCE.rglob("*.py") if (lines := len(path.read_text().splitlines())) > 600}
     assert not long
+
+
+def test_no_folder_outgrows_a_shelf():
+    crowded = {str(path) for path in SOURCE.rglob("*") if path.is_dir() and len(list(path.glob("*.py"))) > 25}
+    assert not crowded
+
+
+def test_no_function_outgrows_a_page():
+    """Eighty lines and fifteen arguments at most."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+    large = []
+    for path in SOURCE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, functions):
+                arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                if node.end_lineno - node.lineno + 1 > 80 or len(arguments) > 15:
+                    large.append(f"{path.relative_to(SOURCE)}:{node.lineno} {node.name}")
+    assert not large
