@@ -103,33 +103,43 @@ def _doubtful(places, values, at):
     if same:
         # all that may come off the chord against its lower end
         bend = 0.25 * h * h * (abs(bent) + abs(third) * max(abs(shift - p), abs(shift - q)))
-        stray = max(before * np.prod(np.abs(q - places[low:at])), behind * np.prod(np.abs(p - places[at + 2 : high])))
-        if min(abs(fp), abs(fq)) > bend + SAFETY * h * stray:
+        ahead, back = before, behind
+        for i in range(low, at):
+            ahead *= abs(q - places[i])
+        for i in range(at + 2, high):
+            back *= abs(p - places[i])
+        if min(abs(fp), abs(fq)) > bend + SAFETY * h * max(ahead, back):
             return -1.0
     sign = 1.0 if fp > 0.0 else -1.0
-    # the grid, and where the cubic off the chord is extreme: its derivative is a s^2 + b s + c
+    # the grid, and in their places where the cubic off the chord is extreme: its derivative is a s^2 + b s + c
     shares = np.empty(_GRID.shape[0] + 2)
     looks = _GRID.shape[0]
-    shares[:looks] = _GRID
+    for k in range(looks):
+        shares[k] = _GRID[k]
     a, b, c = 3.0 * third, 2.0 * (bent - third * (shift - p + h)), chord - bent * h + third * (shift - p) * h
     inside = b * b - 4.0 * a * c
     if inside >= 0.0:
         q_root = -0.5 * (b + math.copysign(math.sqrt(inside), b))
         for over, under in ((q_root, a), (c, q_root)):
             if under != 0.0 and 0.0 < over / under < h:
-                shares[looks] = over / (under * h)
+                share, k = over / (under * h), looks
+                while k > 0 and shares[k - 1] > share:
+                    shares[k] = shares[k - 1]
+                    k -= 1
+                shares[k] = share
                 looks += 1
-    shares = np.sort(shares[:looks])
     value = np.empty(looks)
     doubt = np.empty(looks)
     for k in range(looks):
         ahead, back = shares[k] * h, (1.0 - shares[k]) * h
         s = p + ahead
         value[k] = sign * (fp + ahead * chord - ahead * back * (bent + third * (s - shift)))
-        doubt[k] = SAFETY * max(
-            ahead * before * np.prod(np.abs(s - places[low:at])),
-            back * behind * np.prod(np.abs(s - places[at + 2 : high])),
-        )
+        ahead, back = ahead * before, back * behind
+        for i in range(low, at):
+            ahead *= abs(s - places[i])
+        for i in range(at + 2, high):
+            back *= abs(s - places[i])
+        doubt[k] = SAFETY * max(ahead, back)
     # one zero between places of opposite sign: where the cubic says, and nowhere else
     root = 1.0
     if not same:

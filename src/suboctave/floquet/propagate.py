@@ -59,6 +59,17 @@ def eliminate(a, b):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
+def _add_product(a, b, out):
+    """Add the matrix product a b to out; zeros of a cost nothing."""
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            f = a[i, k]
+            if f != 0.0:
+                for j in range(b.shape[1]):
+                    out[i, j] += f * b[k, j]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
 def structure(spans, stiffness, damping, left, right):
     """What the linear part makes of initial states and forces, on panels with dt/ds = spans (P, m).
 
@@ -84,14 +95,15 @@ def structure(spans, stiffness, damping, left, right):
             continue
         once = INTEGRATION * spans[p]
         rate = ADJOINT * spans[p]
-        twice = once @ rate
-        time = np.zeros(m)
+        twice, time = np.zeros((m, m)), np.zeros(m)
+        _add_product(once, rate, twice)
         for j in range(m):
             for l in range(m):
                 time[j] += once[j, l]
         # unknowns are the accelerations, mode by mode
-        a = np.eye(n * m)
-        b = np.zeros((n * m, columns))
+        a, b = np.zeros((n * m, n * m)), np.zeros((n * m, columns))
+        for i in range(n * m):
+            a[i, i] = 1.0
         for i in range(n):
             for k in range(n):
                 for j in range(m):
@@ -104,8 +116,9 @@ def structure(spans, stiffness, damping, left, right):
                     b[i * m + j, size + g * m + j] = -left[g, i]
         eliminate(a, b)
         for i in range(n):
-            y = twice @ b[i * m : i * m + m]
-            v = rate @ b[i * m : i * m + m]
+            y, v = np.zeros((m, columns)), np.zeros((m, columns))
+            _add_product(twice, b[i * m : i * m + m], y)
+            _add_product(rate, b[i * m : i * m + m], v)
             for j in range(m):
                 y[j, i] += 1.0
                 y[j, n + i] += time[j]
@@ -116,23 +129,13 @@ def structure(spans, stiffness, damping, left, right):
                         for l in range(columns):
                             out[d, g * m + j, l] += right[g, i] * y[j, l]
                             out[d, forces + g * m + j, l] += right[g, i] * v[j, l]
-            out[d, 2 * forces + i] = y[m - 1]
+            for l in range(columns):
+                out[d, 2 * forces + i, l] = y[m - 1, l]
             for j in range(m):
                 for l in range(columns):
                     out[d, 2 * forces + n + i, l] += once[m - 1, j] * b[i * m + j, l]
             out[d, 2 * forces + n + i, n + i] += 1.0
     return kinds, out
-
-
-@kernel(fastmath=_FAST, error_model="numpy")
-def _add_product(a, b, out):
-    """Add the matrix product a b to out; zeros of a cost nothing."""
-    for i in range(a.shape[0]):
-        for k in range(a.shape[1]):
-            f = a[i, k]
-            if f != 0.0:
-                for j in range(b.shape[1]):
-                    out[i, j] += f * b[k, j]
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -151,7 +154,9 @@ def propagate(kinds, structures, law, base, kick, active, left, right, forced):
     n = left.shape[1]
     size, forces = 2 * n, groups * m
     columns = size + 1 if forced else size
-    total = np.eye(size, columns)
+    total, closing = np.zeros((size, columns)), np.zeros((size, size))
+    for i in range(size):
+        total[i, i] = closing[i, i] = 1.0
     nodes = np.empty((panels if forced else 0, 2 * forces, columns))
     values, lower = np.empty((3, forces)), np.empty((3, forces))
     a = np.empty((forces, forces))
@@ -179,8 +184,8 @@ def propagate(kinds, structures, law, base, kick, active, left, right, forced):
                 for i in range(m):
                     for part in range(3):
                         lower[part, row] += values[part, g * m + i] * LOWER[i, j]
-            values[:] = lower
-        r, k, c = values
+            values, lower = lower, values
+        r, k, c = values[0], values[1], values[2]
         one = structures[kinds[p]]
         free[:] = 0.0
         _add_product(one[: 2 * forces, :size], total, free)
@@ -195,14 +200,15 @@ def propagate(kinds, structures, law, base, kick, active, left, right, forced):
         eliminate(a, f)
         if forced:
             _add_product(one[: 2 * forces, size:], f, free)
-            nodes[p] = free
+            for row in range(2 * forces):
+                for l in range(columns):
+                    nodes[p, row, l] = free[row, l]
         end[:] = 0.0
         _add_product(one[2 * forces :, :size], total, end)
         _add_product(one[2 * forces :, size:], f, end)
-        total[:] = end
+        total, end = end, total
     monodromy = np.empty((size, size))
     start = np.empty((size if forced else 0, 1))
-    closing = np.eye(size)
     for i in range(size):
         for j in range(size):
             monodromy[i, j] = total[i, j]

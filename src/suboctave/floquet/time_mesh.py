@@ -96,7 +96,8 @@ def events_along(c, pieces, owner, passages, zr, zi):
         at, _above = crossings_of(c[g], gap, values)
         for tau in at:
             _x, d, s = jet(c[g], math.cos(tau), math.sin(tau))
-            rows[count] = np.array((tau, np.inf, d, s, 0.0, float(q)))
+            rows[count, 0], rows[count, 1], rows[count, 2] = tau, np.inf, d
+            rows[count, 3], rows[count, 4], rows[count, 5] = s, 0.0, q
             count += 1
         for j in range(n):
             follow = j + 1 if j + 1 < n else 0
@@ -116,10 +117,12 @@ def events_along(c, pieces, owner, passages, zr, zi):
                     tau -= d / s
                     x, d, s = jet(c[g], math.cos(tau), math.sin(tau))
             if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
-                rows[count] = np.array((tau, np.inf, 0.0, s, x - gap, float(q)))
+                rows[count, 0], rows[count, 1], rows[count, 2] = tau, np.inf, 0.0
+                rows[count, 3], rows[count, 4], rows[count, 5] = s, x - gap, q
                 count += 1
     for i in range(passages.shape[1]):
-        rows[count] = np.array((passages[0, i], passages[1, i], 0.0, 0.0, 0.0, -1.0))
+        rows[count, 0], rows[count, 1], rows[count, 5] = passages[0, i], passages[1, i], -1.0
+        rows[count, 2:5] = 0.0
         count += 1
     return rows[:count]
 

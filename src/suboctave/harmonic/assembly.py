@@ -31,7 +31,7 @@ Sparse = tuple[np.ndarray, np.ndarray, Array]
 
 def sparse(directions: Array) -> Sparse:
     """Directions (G, n) by their entries that are not zero."""
-    owner, dofs = np.nonzero(directions)
+    owner, dofs = map(np.ascontiguousarray, np.nonzero(directions))
     return np.searchsorted(owner, np.arange(len(directions) + 1)), dofs, directions[owner, dofs]
 
 

@@ -80,21 +80,14 @@ def even(count: int) -> int:
     return 8 * math.ceil(count / 8)
 
 
-def graded(motion: ComplexArray, points: Array, widths: Array, top: int, moving: bool = False) -> Array:
-    """Nodes for laws that are singular at u = points +- i widths, with the motion there: cosines, sines, weights,
-    values and, if `moving`, derivatives by tau, (5, N) or (4, N).
+def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -> Nodes:
+    """Nodes for laws that are singular at u = points +- i widths.
 
     motion: complex coefficients (H + 1,); top: highest Fourier coefficient of the tangent that is wanted.
     """
     high = motion.shape[0] - 1
     grid = search_grid(high)
-    nodes: Array = sharp_nodes(motion, points, widths, top + high, moving, grid.zr, grid.zi, *rule_tables())
-    return nodes
-
-
-def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -> Nodes:
-    """These nodes alone."""
-    return Nodes(*graded(motion, points, widths, top)[:3])
+    return Nodes(*sharp_nodes(motion, points, widths, top + high, grid.zr, grid.zi, *rule_tables()))
 
 
 def between_corners(corners: Array, longest: float, parts: int) -> Nodes:
@@ -279,9 +272,8 @@ def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, n
 
 
 @kernel()
-def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
-    """Nodes on a period: rows `cos tau`, `sin tau`, weights (which add up to 2 pi), the motion there and, if `moving`,
-    its derivative by tau; (5, N) or (4, N).
+def sharp_nodes(c, points, widths, degree, zr, zi, nodes, weights):
+    """Nodes on a period: `cos tau`, `sin tau`, and weights, which add up to 2 pi.
 
     Parameters
     ----------
@@ -344,8 +336,4 @@ def sharp_nodes(c, points, widths, degree, moving, zr, zi, nodes, weights):
                 offset,
             )
             done += piece
-    # one array, since handing arrays over costs more than filling them
-    out = np.empty((5 if moving else 4, count))
-    out[0], out[1], out[2] = out_r[:count], out_i[:count], w[:count]
-    displacement(c, out[0], out[1], out[3:])
-    return out
+    return out_r[:count].copy(), out_i[:count].copy(), w[:count].copy()

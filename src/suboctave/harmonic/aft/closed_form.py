@@ -225,8 +225,9 @@ def add_spectra(motions, laws, grid, nodes, rules, table):
                 if end == begin:
                     continue
                 places, widths = steps[begin:end, 0].copy(), steps[begin:end, 1].copy()
-                rows = sharp_nodes(c, places, widths, top + high, False, grid[0], grid[1], rules[0], rules[1])
-                zr, zi, weights, u = rows[0], rows[1], rows[2], rows[3]
+                zr, zi, weights = sharp_nodes(c, places, widths, top + high, grid[0], grid[1], rules[0], rules[1])
+                u = np.empty(zr.shape[0])
+                displacement(c, zr, zi, u.reshape((1, u.shape[0])))
                 values = np.empty((2, u.shape[0]))
                 for j in range(u.shape[0]):
                     values[0, j] = line[g, 0] + line[g, 1] * u[j]

@@ -10,7 +10,7 @@ import numpy as np
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import FEWEST, MOST, SETTLED, even, graded, uniform_nodes
+from suboctave.harmonic.quadrature import FEWEST, MOST, SETTLED, even, graded_nodes, uniform_nodes
 from suboctave.harmonic.trigonometric import motion, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import Element
@@ -151,8 +151,9 @@ class GradedLaw(Sampled):
         self.points, self.widths = points, widths
 
     def _path(self) -> tuple[Array, Array, Array, Array, Array]:
-        zr, zi, w, u, slope = graded(self.along.motion, self.points, self.widths, self.along.top, moving=True)
-        return zr, zi, w, u, slope
+        nodes = graded_nodes(self.along.motion, self.points, self.widths, self.along.top)
+        u, slope = motion(self.along.motion, nodes.zr, nodes.zi)
+        return nodes.zr, nodes.zi, nodes.weights, u, slope
 
     def reaching(self, along: Along, members: tuple[Member, ...]) -> GradedLaw:
         """See `LawAlong.reaching`."""

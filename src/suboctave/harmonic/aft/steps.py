@@ -18,9 +18,8 @@ from suboctave.harmonic.aft.closed_form import add_law, add_step
 from suboctave.harmonic.aft.law import Along, Member, Second, Third
 from suboctave.harmonic.aft.sampled import Sampled
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import graded
+from suboctave.harmonic.quadrature import graded_nodes
 from suboctave.harmonic.trigonometric import motion, spectra
-from suboctave.lazy import lazy
 from suboctave.model.elements.base import Element
 from suboctave.model.elements.smoothness import SharpSampling
 
@@ -40,15 +39,11 @@ class ArctanSteps(Sampled):
         """See `LawAlong.reaching`."""
         return ArctanSteps(along, members, self.steps, self.line)
 
-    @lazy
-    def _nodes(self) -> Array:
-        """Cosines, sines, weights and displacement at the nodes, (4, N)."""
-        places, widths = self.steps[:, 0].copy(), self.steps[:, 1].copy()
-        return graded(self.along.motion, places, widths, self.along.top)
-
     def _path(self) -> tuple[Array, Array, Array, Array, Array]:
-        zr, zi, w, u = self._nodes
-        return zr, zi, w, u, motion(self.along.motion, zr, zi)[1]
+        places, widths = self.steps[:, 0].copy(), self.steps[:, 1].copy()
+        nodes = graded_nodes(self.along.motion, places, widths, self.along.top)
+        u, slope = motion(self.along.motion, nodes.zr, nodes.zi)
+        return nodes.zr, nodes.zi, nodes.weights, u, slope
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
@@ -56,7 +51,7 @@ class ArctanSteps(Sampled):
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
-        zr, zi, w, u = self._nodes
+        zr, zi, w, u, _ = self.path
         weights = np.zeros_like(u)
         for place, width, size in self.steps.tolist():
             ratio = (u - place) / width
@@ -65,7 +60,7 @@ class ArctanSteps(Sampled):
 
     def third(self) -> list[Third]:
         """See `LawAlong.third`."""
-        zr, zi, w, u = self._nodes
+        zr, zi, w, u, _ = self.path
         weights = np.zeros_like(u)
         for place, width, size in self.steps.tolist():
             ratio = (u - place) / width
@@ -91,7 +86,7 @@ class ArctanSteps(Sampled):
             rows += zip(kind.points, kind.widths, kind.steps or (), by.points, by.widths, by.steps, strict=True)
             line += by.constant, by.slope
         if rows:
-            zr, zi, w, u = self._nodes
+            zr, zi, w, u, _ = self.path
             out[:2] += spectra(changed_steps(u, np.array(rows), line), w, zr, zi, self.along.top)
         if others:
             super().add_change(others, out)
