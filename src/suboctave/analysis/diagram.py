@@ -68,7 +68,6 @@ class ByDepth:
     depth: int
 
     def __call__(self, node: DiagramBranch, item: Bifurcation) -> bool:
-        """See `Followed`."""
         return node.depth < self.depth
 
     def __str__(self) -> str:
@@ -86,7 +85,6 @@ class ByPeriod:
     longest: int
 
     def __call__(self, node: DiagramBranch, item: Bifurcation) -> bool:
-        """See `Followed`."""
         if item.kind == "PD":
             return 2 * node.branch.nu <= self.longest
         return node.crossings < max(1, self.longest.bit_length() - 1)

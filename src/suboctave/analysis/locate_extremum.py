@@ -146,11 +146,9 @@ class _Published:
         return np.concatenate((u, np.linalg.svd(m)[2][-1]))
 
     def where(self, u: Array) -> str:
-        """See `Curve.where`."""
         return self.curve.where(u[: len(self.weights)])
 
     def evaluate(self, u: Array) -> _PublishedEvaluation:
-        """See `Curve.evaluate`."""
         n, psi = len(self.weights), u[len(self.weights) :]
         here = self.curve.evaluate(u[:n])
         along = np.zeros(n)

@@ -67,7 +67,6 @@ class Monodromy(StabilityMethod):
     follows_monodromy: ClassVar[bool] = True
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
-        """See `StabilityMethod.multipliers`."""
         return floquet_multipliers(state)
 
 
@@ -89,7 +88,6 @@ class Hill(StabilityMethod):
             raise InputError(f"unknown selection {self.selection!r}{suggest(str(self.selection), SELECTIONS)}")
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
-        """See `StabilityMethod.multipliers`."""
         return hill_multipliers(state, self.selection)
 
 
@@ -109,7 +107,6 @@ class KoopmanHill(StabilityMethod):
             raise InputError(f"subharmonic must be True or False, not {self.subharmonic!r}")
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
-        """See `StabilityMethod.multipliers`."""
         return koopman_hill_multipliers(state, self.subharmonic)
 
 
@@ -133,7 +130,6 @@ class Arbitration(StabilityMethod):
                 raise InputError(f"a witness must be a method such as Hill() or KoopmanHill(), not {witness!r}")
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
-        """See `StabilityMethod.multipliers`."""
         return self._weighed(state, floquet_multipliers(state), math.inf)
 
     def along(self, state: BalanceState) -> FloquetResult:

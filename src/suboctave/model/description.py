@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from suboctave.errors import InputError, located, suggest
+from suboctave.errors import InputError, located, shortened, suggest
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
 
 Arrays = MutableMapping[str, np.ndarray]
@@ -64,6 +64,11 @@ class Recorded:
         made.arguments = given
         return made
 
+    def __repr__(self) -> str:
+        """The call that makes it, texts without quotes."""
+        given = {name: value for name, value in self.arguments.items() if value is not None}
+        return f"{type(self).__name__}({', '.join(f'{name}={_shown(value)}' for name, value in given.items())})"
+
 
 def type_name(cls: type) -> str:
     """How a class is called in files: "CubicSpring", or "module:Class" for one of a user's."""
@@ -87,6 +92,14 @@ def constructor_arguments(cls: type) -> list[str]:
 
 def _signature(cls: Any) -> inspect.Signature:
     return inspect.signature(cls.__init__)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list | tuple | np.ndarray):
+        return f"({', '.join(map(_shown, value[:4]))}{', ...' * (len(value) > 4)})"
+    if isinstance(value, np.generic):
+        value = value.item()
+    return value if isinstance(value, str) else value.text if isinstance(value, Coefficient) else shortened(value)
 
 
 def _kept(value: Any) -> Any:

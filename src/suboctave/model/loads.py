@@ -152,26 +152,11 @@ class HarmonicLoad(Load):
             cosines.append(LoadComponent(direction, 0, self.static, ZERO))
         return tuple(cosines)
 
-    def __repr__(self) -> str:
-        shown = [str(self.place), f"amplitude={_shown(self.amplitudes)}"]
-        if self.harmonics != (1,):
-            shown.append(f"harmonic={_shown(self.harmonics)}")
-        if any(not phase.constant or phase.value({}) != 0.0 for phase in self.phases):
-            shown.append(f"phase={_shown(self.phases)}")
-        if not self.static.constant or self.static.value({}) != 0.0:
-            shown.append(f"static={self.static.text}")
-        return f"HarmonicLoad({', '.join(shown)})"
-
 
 def _listed(given: Any) -> list[Any]:
     if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and np.ndim(given) == 1:
         return list(given)
     return [given]
-
-
-def _shown(items: Sequence[Any]) -> str:
-    texts = [item.text if isinstance(item, Coefficient) else str(item) for item in items]
-    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
 class StaticLoad(Load):
@@ -192,9 +177,6 @@ class StaticLoad(Load):
 
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
         return (LoadComponent(self.place.direction(n), 0, self.force, ZERO),)
-
-    def __repr__(self) -> str:
-        return f"StaticLoad({self.place}, force={self.force.text})"
 
 
 class RotatingUnbalance(Load):
@@ -237,12 +219,6 @@ class RotatingUnbalance(Load):
             LoadComponent(place.direction(n), self.harmonic, amplitude, phase)
             for place, phase in zip(self.places, phases, strict=False)
         )
-
-    def __repr__(self) -> str:
-        dofs = f"dof={self.places[0].dofs[0]}"
-        if len(self.places) > 1:
-            dofs += f", perpendicular={self.places[1].dofs[0]}"
-        return f"RotatingUnbalance({dofs}, mass_eccentricity={self.mass_eccentricity.text})"
 
 
 class _WithMatrices(Load):
@@ -287,9 +263,6 @@ class Gravity(_WithMatrices):
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
         mass = self._matrices(matrices)[0]
         return tuple(self._along(mass, self.direction(n), 0, f"({self.acceleration.text})", ZERO))
-
-    def __repr__(self) -> str:
-        return f"Gravity(acceleration={self.acceleration.text})"
 
 
 class _Base(_WithMatrices):
@@ -344,9 +317,6 @@ class _Base(_WithMatrices):
                     f"{self.label} in absolute coordinates: {element.label} acts between the structure and the base, "
                     'which moves; write the system in relative coordinates (coordinates="relative")'
                 )
-
-    def __repr__(self) -> str:
-        return f"{self.label}(amplitude={self.amplitude.text}, coordinates={self.coordinates!r})"
 
 
 class BaseDisplacement(_Base):

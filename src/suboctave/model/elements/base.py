@@ -191,14 +191,6 @@ class BaseElement(Recorded, ABC, family="element"):
         """The law as code for the integration of many trajectories; default: `tangent` is called back."""
         return CalledBack(c, self.sampling(c))
 
-    def __repr__(self) -> str:
-        shown = [str(self.place)]
-        shown += [f"{name}={c.text}" for name, c in zip(self.coefficient_names, self.coefficients, strict=True)]
-        return f"{type(self).__name__}({', '.join(shown + self._options())})"
-
-    def _options(self) -> list[str]:
-        return []
-
 
 class Element(BaseElement):
     """A nonlinear force along one direction. Subclasses are immutable by convention.

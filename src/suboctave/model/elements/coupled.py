@@ -219,7 +219,3 @@ class Expression(CoupledElement):
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         return self._law.coefficient_curvature(q, theta, c)
-
-    def __repr__(self) -> str:
-        read = "" if self._short else f", inputs={dict(zip(self.states, map(str, self.input_places), strict=True))}"
-        return f"Expression({self.place}, {self.expression!r}{read})"

@@ -55,7 +55,6 @@ class HertzContact(Element):
             warn_of_negative(f"{self.label} feeds energy into motions")
 
     def batch_form(self, c: Array) -> BatchForm:
-        """See `BaseElement.batch_form`."""
         from suboctave.model.expressions.law import law_of
 
         right, left = "stiffness*max(x-gap, 0)**1.5*(1+damping*v)", "-stiffness*max(gap-x, 0)**1.5*(1-damping*v)"
@@ -74,23 +73,19 @@ class HertzContact(Element):
         return sign, y, root, inverse, 1.0 + sign * c[0] * v
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.tangent`."""
         sign, y, root, _, rate = self._parts(u, v, c)
         return sign * c[2] * y * root * rate, 1.5 * c[2] * root * rate, c[0] * c[2] * y * root
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.curvature`."""
         sign, _, root, inverse, rate = self._parts(u, v, c)
         return 0.75 * sign * c[2] * inverse * rate, 1.5 * sign * c[0] * c[2] * root, np.zeros_like(u)
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array, Array]:
-        """See `Element.third`."""
         _, _, _, inverse, rate = self._parts(u, v, c)
         zero = np.zeros_like(u)
         return -0.375 * c[2] * inverse**3 * rate, 0.75 * c[0] * c[2] * inverse, zero, zero
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
-        """See `Element.coefficient_tangent`."""
         sign, y, root, inverse, rate = self._parts(u, v, c)
         f_c = [c[2] * y * root * v, -1.5 * c[2] * root * rate, sign * y * root * rate]
         f_uc = [1.5 * sign * c[2] * root * v, -0.75 * sign * c[2] * inverse * rate, 1.5 * root * rate]
@@ -98,11 +93,7 @@ class HertzContact(Element):
         return np.array(f_c), np.array(f_uc), np.array(f_vc)
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
-        """See `Element.coefficient_curvature`."""
         sign, y, root, inverse, rate = self._parts(u, v, c)
         zero = np.zeros_like(u)
         dg, dk, gk = -1.5 * sign * c[2] * root * v, y * root * v, -1.5 * root * rate
         return np.array([[zero, dg, dk], [dg, 0.75 * sign * c[2] * inverse * rate, gk], [dk, gk, zero]])
-
-    def _options(self) -> list[str]:
-        return [] if self.side == "right" else [f"side={self.side!r}"]

@@ -314,9 +314,6 @@ class ElasticStop(_Stops):
     def label(self) -> str:
         return f"ElasticStop({self.place}, gap={self.coefficients[1].text})"
 
-    def _options(self) -> list[str]:
-        return [f"side={self.side!r}"]
-
     def _check_gaps(self, gaps: list[float], first: bool) -> None:
         """Refuse, first, an ambiguous side."""
         stiffness, gap = self.coefficients[:2]
@@ -345,17 +342,9 @@ class _Play(_Stops):
         given: dict[str, Coefficient],
     ) -> None:
         super().__init__(dof, stiffness, {"left": left, "right": right}, regularization, direction)
-        self._given = given
         what, width = next(iter(given.items()))
         if width.constant and width.value({}) < 0.0:
             raise InputError(f"{self.label}: {what} must not be negative, not {width.value({}):g}")
-
-    def __repr__(self) -> str:
-        shown = [str(self.place), f"stiffness={self.coefficients[0].text}"]
-        shown += [f"{name}={read.text}" for name, read in self._given.items()]
-        if self.regularised:
-            shown.append(f"regularization={self.coefficients[3].text}")
-        return f"{type(self).__name__}({', '.join(shown)})"
 
     def _check_gaps(self, gaps: list[float], first: bool) -> None:
         """Refuse sides that have changed places."""
