@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.analysis.diagram import ByDepth, ByPeriod, grown_from
+from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.maps.catalogue import Catalogue, SearchRange, carrier_of
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.slices import Arc, Edge, Slice, Strip
@@ -196,11 +196,11 @@ def test_a_branch_point_uses_up_no_period_doubling(ueda):
     """From the symmetric motions: a pitchfork to the unsymmetric ones, then their doubling."""
     (pitchfork,) = so.frequency_response(ueda, (0.9, 0.79)).bifurcations["BP"]
     symmetric = so.switch_branch(pitchfork)
-    by_period = grown_from(symmetric, ByPeriod(2), {})
+    by_period = grown_from(symmetric, Followed(longest=2), {})
     doubled = [node for node in by_period if node.branch.nu == 2]
     assert {(node.crossings, node.depth) for node in doubled} == {(1, 2)}
     assert doubled[0].origin.omega == pytest.approx(0.8165596, abs=1e-6)
-    for shallow in (ByDepth(1), ByPeriod(1)):
+    for shallow in (Followed(1), Followed(longest=1)):
         assert {branch.nu for branch in grown_from(symmetric, shallow, {}).branches} == {1}
 
 

@@ -53,44 +53,28 @@ class Keeper(Protocol):
         ...
 
 
-class Followed(Protocol):
-    """Which branches of a diagram are followed."""
+@dataclass(frozen=True)
+class Followed:
+    """Which branches of a diagram are followed: those so many bifurcations deep, of whatever kind, or those of
+    motions of up to so many load periods.
+
+    In the second case branch points, where motions of the same period leave, are counted apart: on the way to a branch
+    there may be as many as period doublings, and one in any case.
+    """
+
+    depth: int | None = None
+    longest: int = 1
 
     def __call__(self, node: DiagramBranch, item: Bifurcation) -> bool:
         """Whether the branch that leaves another at a bifurcation is."""
-        ...
-
-
-@dataclass(frozen=True)
-class ByDepth:
-    """Branches so many bifurcations deep, of whatever kind."""
-
-    depth: int
-
-    def __call__(self, node: DiagramBranch, item: Bifurcation) -> bool:
-        return node.depth < self.depth
-
-    def __str__(self) -> str:
-        return f"depth={self.depth}"
-
-
-@dataclass(frozen=True)
-class ByPeriod:
-    """Branches of motions of up to so many load periods.
-
-    Branch points, where motions of the same period leave, are counted apart: on the way to a branch there may be as
-    many as period doublings, and one in any case.
-    """
-
-    longest: int
-
-    def __call__(self, node: DiagramBranch, item: Bifurcation) -> bool:
+        if self.depth is not None:
+            return node.depth < self.depth
         if item.kind == "PD":
             return 2 * node.branch.nu <= self.longest
         return node.crossings < max(1, self.longest.bit_length() - 1)
 
     def __str__(self) -> str:
-        return f"{self.longest} load periods"
+        return f"{self.longest} load periods" if self.depth is None else f"depth={self.depth}"
 
 
 @with_options(CurveOptions)
@@ -134,7 +118,7 @@ def bifurcation_diagram(
     """
     depth, max_branches = check_count("depth", depth, 0), check_count("max_branches", max_branches)
     with reporting(options.get("progress"), "bifurcation diagram") as report:
-        growth = _Growth(handed_on(options), ByDepth(depth), max_branches, report, keeper)
+        growth = _Growth(handed_on(options), Followed(depth), max_branches, report, keeper)
         return growth.diagram(system, omega, harmonics, start)
 
 

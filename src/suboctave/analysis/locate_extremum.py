@@ -102,13 +102,7 @@ def locate_extremum(
 def newton_extremum(
     curve: MotionProblem, u: Array, turning: str, newton: NewtonOptions, formulation: Formulation | None = None
 ) -> Array:
-    """u at the extremum of a parameter along a curve of bifurcations in two parameters, from a guess near it.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method does not converge.
-    """
+    """u at the extremum of a parameter along a curve of bifurcations in two parameters, from a guess near it."""
     weights = curve.weights(u, 0.0)
     # from a point of the curve both systems need but follow it
     u = nearest_point(curve, u, weights, newton).u

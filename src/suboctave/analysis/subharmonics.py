@@ -28,6 +28,7 @@ from suboctave.curves.discretisation import Harmonics, make_curve
 from suboctave.curves.identity import lies_on, relation
 from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.sample import Sample
 from suboctave.curves.starts import linear_response, start_point
 from suboctave.curves.trace import Trace
 from suboctave.errors import ConvergenceError, InputError
@@ -35,7 +36,6 @@ from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.truncation import truncation
 from suboctave.interruption import Interruption, limited, pass_on
 from suboctave.model.inputs import check_count, check_omega, check_range, check_system, start_state
 from suboctave.model.system import System
@@ -165,7 +165,7 @@ def _branches(curve: MotionProblem, seeds: Seeds, run: CurveRun, known: Sequence
     silent = run.settings.report is None
     following = None if silent else lambda _, where: run.report(searched, where)
     for point in _motions(run.scaled(curve), seeds, run, looking):
-        if any(lies_on(_orbit(point), branch.points) for branch in branches):
+        if any(lies_on(Sample(point).orbit, branch.points) for branch in branches):
             continue
         own = replace(run, settings=run.settings.reporting_to(following, run.ends))
         trace = own.both_ways(point)
@@ -236,17 +236,8 @@ def periodic_orbit(
             trajectory = integrate(system, given, np.array([0.0, end]), omega, system.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
         point = start_point(curve, omega, given, newton or NewtonOptions())
-    own = (orbit := _orbit(point)).own_period
+    own = (orbit := Sample(point).orbit).own_period
     return orbit if own == order else periodic_orbit(system, omega, orbit.start(), own, harmonics, newton=newton)
-
-
-def _orbit(point: CurvePoint) -> PeriodicOrbit:
-    curve, evaluation = point.curve, point.evaluation
-    assert isinstance(curve, MotionProblem)
-    x, omega, values = curve.split(point.u)
-    state = curve.balance.at(x, omega, values)
-    error = float(evaluation.error)
-    return PeriodicOrbit(curve.balance, x.copy(), omega, dict(values), error, truncation(state), curve.adaptive)
 
 
 # ------------------------------------------------------------------------------------------------------------- search

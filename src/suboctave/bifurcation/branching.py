@@ -60,21 +60,9 @@ class BranchingEquation:
 def branching_equation(
     state: BalanceState, name: str, span: float, vectors: NullVectors | None = None
 ) -> BranchingEquation:
-    """The directions in which branches leave a located branch point.
+    """The directions in which branches leave a located branch point; ConvergenceError where no two are real.
 
-    Parameters
-    ----------
-    state
-        The motion there.
-    name, span
-        The free parameter and the width of its range.
-    vectors
-        Null vectors of R_X, where they are known.
-
-    Raises
-    ------
-    ConvergenceError
-        If there are no two different real directions.
+    `name`, `span`: the free parameter and the width of its range; `vectors`: null vectors of R_X, where they are known.
     """
     borders = null_vectors(state, Kind.INTEGER) if vectors is None else vectors
     border = bordered(state, Kind.INTEGER, borders)

@@ -50,7 +50,7 @@ from functools import cached_property
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import NullVectors, null_vectors
+from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
 from suboctave.continuation.linear import Factor, LeadingBlock
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.harmonic.basis import Array, HarmonicBasis
@@ -211,14 +211,8 @@ def cubic_coefficient(
 ) -> float:
     """c3 of a period doubling along curves of them, where `psi.R''[phi, .]` is known: it is the gradient of g.
 
-    Parameters
-    ----------
-    phi, psi
-        Right and left null vectors of J_half, in the coefficients' own units.
-    by_motion
-        Gradient of `psi.J_half phi` by the motion, shape (2 H + 1, size).
-    block, weights
-        J_0, its columns divided by the weights, one for every coefficient.
+    `phi`, `psi`: null vectors of J_half in the coefficients' own units; `by_motion`: gradient of `psi.J_half phi` by
+    the motion, (2 H + 1, size); `block`: J_0, its columns divided by `weights`, one for every coefficient.
     """
     own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
     return own.cubic(block.solve(-0.5 * own.squared()) / weights)[0]
@@ -249,18 +243,10 @@ _SYMMETRIC = 1e-6
 def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
     """a, b, c, g, and c3 with the curvature that belong to c = 0."""
     own = Expansion.of(state, Kind.INTEGER, vectors, name)
-    n = state.balance.dimension
-    bordered = np.zeros((n + 1, n + 1), order="F")
-    bordered[:n, :n] = state.jacobian
-    # rows and columns in weighted units: J = D^-1 J_w D^-1
-    size = state.omega**2
-    weight = np.tile(state.balance.scales()[0], state.basis.size)
-    bordered[:n, n] = size * weight * vectors.left
-    bordered[n, :n] = size * weight * vectors.right
-    factor = Factor.of(bordered, overwrite=True)
+    border = bordered(state, Kind.INTEGER, vectors)
 
     def solve(rhs: Array) -> Array:
-        solution: Array = factor.solve(np.append(rhs, 0.0))[:n]
+        solution: Array = border.factor.solve(np.append(rhs * border.scale, 0.0))[:-1] * border.scale
         return solution
 
     shape = state.x.shape
@@ -352,20 +338,10 @@ _TERMS: dict[str, Callable[[BalanceState, NullVectors, str, float], Terms]] = {
 
 
 def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str, kappa: float = 0.0) -> NormalForm:
-    """The normal form of a located bifurcation.
+    """The normal form of a located LP, BP, PD or NS in its free parameter `name`.
 
-    Parameters
-    ----------
-    kind
-        "LP", "BP", "PD" or "NS".
-    state
-        The equations at the located motion.
-    vectors
-        Null vectors of its singular operator, weighted by masses (`Bifurcation.null_vectors`).
-    name
-        The free parameter, "omega" or one of the system's.
-    kappa
-        Frequency of the perturbation at an NS, rad per time.
+    `vectors`: null vectors of its singular operator, weighted by masses (`Bifurcation.null_vectors`); `kappa`:
+    frequency of the perturbation at an NS, rad per time.
     """
     if kind not in FORMS:
         raise InputError(f"a {kind!r} has no normal form; it is for LP, BP, PD and NS")

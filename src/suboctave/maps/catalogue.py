@@ -25,11 +25,10 @@ from suboctave.continuation import NewtonOptions
 from suboctave.curves.discretisation import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of
 from suboctave.curves.identity import gap_to, lies_on
 from suboctave.curves.junction import period_name
-from suboctave.curves.motion import MotionProblem
+from suboctave.curves.sample import Sample
 from suboctave.curves.starts import start_point
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.truncation import truncation
 from suboctave.interruption import Interruption, pass_on
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_count, check_parameter, check_range, check_system
@@ -235,7 +234,8 @@ class Catalogue(Work):
     def known(self, item: Bifurcation, value: float) -> MonotonePiece | None:
         """The piece that a bifurcation lies on, followed over the parameter if it is new; None if that fails."""
         piece = self.piece_of(item, value)
-        if piece is not None or self._is_lost(item, value):
+        lost = (b for v, b in self._lost if v == value and b.kind == item.kind)
+        if piece is not None or any(abs(b.omega - item.omega) <= _SAME_OMEGA * item.omega for b in lost):
             return piece
         where = f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}"
         if len(self.curves) >= self.most:
@@ -253,12 +253,6 @@ class Catalogue(Work):
             self._lost.append((value, item))
         return piece
 
-    def _is_lost(self, item: Bifurcation, value: float) -> bool:
-        return any(
-            v == value and b.kind == item.kind and abs(b.omega - item.omega) <= _SAME_OMEGA * item.omega
-            for v, b in self._lost
-        )
-
 
 def branch_through(
     limit_point: Bifurcation, omega: SearchRange, name: str, pieces: Iterable[MonotonePiece], options: SearchOptions
@@ -270,24 +264,13 @@ def branch_through(
 
 
 def motion_near(orbit: PeriodicOrbit, system: System, omega: float) -> PeriodicOrbit:
-    """The motion of a system near another one, at a frequency.
-
-    Raises
-    ------
-    ConvergenceError
-        Where Newton's method arrives at none there.
-    """
+    """The motion of a system near another one, at a frequency; ConvergenceError where Newton arrives at none."""
     linear = own_linear_part(orbit, system)
     start = make_curve(system, "omega", omega, omega, harmonics_of(orbit), orbit.basis.nu, linear)
-    point = start_point(start, omega, orbit, NewtonOptions())
-    curve = point.curve
-    assert isinstance(curve, MotionProblem)
-    x, reached, values = curve.split(point.u)
-    if abs(reached - omega) > 1e-9 * omega:
-        raise ConvergenceError(f"next to a limit point the nearest motion lies at omega = {reached:.6g}")
-    error = truncation(curve.balance.at(x, reached, values))
-    residual = float(point.evaluation.error)
-    return PeriodicOrbit(curve.balance, x.copy(), reached, dict(values), residual, error, start.adaptive)
+    motion = Sample(start_point(start, omega, orbit, NewtonOptions())).orbit
+    if abs(motion.omega - omega) > 1e-9 * omega:
+        raise ConvergenceError(f"next to a limit point the nearest motion lies at omega = {motion.omega:.6g}")
+    return motion
 
 
 # ----------------------------------------------------------------------------------------------------- closed branches
@@ -296,12 +279,8 @@ def carrier_of(branch: Branch, attached: Iterable[Branch], options: SearchOption
     them is not closed, or meets a branch that leads to the ends of the range, as those `attached` do.
 
     Branches meet at branch points, and where motions of twice the period lead from doublings of the one to elsewhere.
-    A loop hangs on another if it turns back where it meets it, as what leaves a pitchfork does.
-
-    Raises
-    ------
-    ConvergenceError, InputError
-        If what crosses one of them at a branch point cannot be followed.
+    A loop hangs on another if it turns back where it meets it, as what leaves a pitchfork does. ConvergenceError or
+    InputError if what crosses one of them at a branch point cannot be followed.
     """
     met, connected = list(attached), [branch]
     for one in connected:  # which grows on the way

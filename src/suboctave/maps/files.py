@@ -184,6 +184,8 @@ def isolas_from_datasets(
     stored = opened(groups, "isolas", allow_code, linear)
     record, parameter = stored.record, str(stored.head.attrs["isolas"])
     closed = iter(stored.named("closed_"))
+    # older files hold nothing else of an interruption
+    older = Interruption() if any(note.startswith("interrupted") for note in record["notes"]) else None
     isolas = Isolas(
         [_isola(given, stored, parameter, closed) for given in record["isolas"]],
         stored.system,
@@ -194,15 +196,10 @@ def isolas_from_datasets(
         stored.named("doublings_"),
         record["notes"],
         str(stored.head.attrs["said"]),
-        record["interruption"] if "interruption" in record else _interruption_of(record["notes"]),
+        record.get("interruption", older),
     )
     isolas.seconds = stored.seconds
     return isolas
-
-
-def _interruption_of(notes: Sequence[str]) -> Interruption | None:
-    """The interruption that notes mention: older files hold nothing else."""
-    return Interruption() if any(note.startswith("interrupted") for note in notes) else None
 
 
 def _isola(given: Mapping[str, Any], stored: Opened, parameter: str, closed: Iterator[Branch]) -> Isola:

@@ -170,13 +170,7 @@ class MonotonePiece:
 
     # ------------------------------------------------------------------------------------------------------ location
     def solve_at(self, value: float) -> Bifurcation:
-        """The limit point at a value of `along`, located over omega.
-
-        Raises
-        ------
-        ConvergenceError
-            Where Newton's method arrives at none on this piece.
-        """
+        """The limit point at a value of `along`, located over omega; ConvergenceError where there is none on it."""
         if value not in self._located:
             with one_thread():
                 self._located[value] = self._solved(value)

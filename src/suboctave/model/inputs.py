@@ -168,13 +168,7 @@ def numbers_of(given: Any) -> Array:
 
 
 def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:
-    """(from, to) as two different finite numbers.
-
-    Raises
-    ------
-    InputError
-        If they are not, or not positive where they must be.
-    """
+    """(from, to) as two different finite numbers, positive where they must be."""
     try:
         first, last = (float(b) for b in bounds)
     except (TypeError, ValueError, OverflowError):

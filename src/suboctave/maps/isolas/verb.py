@@ -22,7 +22,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.diagram import ByDepth
+from suboctave.analysis.diagram import Followed
 from suboctave.analysis.frequency_response import continue_branch
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds
@@ -190,7 +190,7 @@ def from_responses(search: Search, depth: int) -> None:
 
 def _responses(catalogue: Catalogue, value: float, depth: int) -> Iterator[Branch]:
     """Branches at a value that a response leads to, their period doublings followed over the parameter."""
-    for diagram in catalogue.responses(value, catalogue.omega, ByDepth(depth)):
+    for diagram in catalogue.responses(value, catalogue.omega, Followed(depth)):
         for node in diagram:
             if node.depth < depth:
                 _follow_doublings(catalogue, node.branch, value)

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from suboctave.analysis.diagram import ByPeriod, grown_from
+from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
@@ -151,7 +151,7 @@ class Slice:
     def _responses(self, reach: SearchRange) -> Iterator[Branch]:
         """The response from both ends with all that bifurcates from it."""
         known: list[Branch] = []
-        for diagram in self.catalogue.responses(self.value, reach, ByPeriod(self.longest)):
+        for diagram in self.catalogue.responses(self.value, reach, Followed(longest=self.longest)):
             for branch in diagram.branches:
                 if len(branch) and not any(same_branch(branch, other) for other in known):
                     yield branch
@@ -176,7 +176,7 @@ class Slice:
                 continue
             attached = [known for known, isolated in self.branches if not isolated]
             detached = catalogue.carrier(one, value, attached) is not None
-            diagram = grown_from(one, ByPeriod(self.longest), options)
+            diagram = grown_from(one, Followed(longest=self.longest), options)
             catalogue.note_failures(diagram, value)
             for branch in diagram.branches:
                 if not self._is_known(branch):

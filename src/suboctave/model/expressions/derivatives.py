@@ -80,11 +80,7 @@ def force_expression(text: str, where: str, names: Iterable[str] | None = None) 
     """The SymPy expression of a text in which forces may have corners and names primes, for derivatives by time.
 
     `where` begins messages; `names` are those that are known, None if any may occur. The primes of symbols are `PRIME`.
-
-    Raises
-    ------
-    InputError
-        With the column and the part of the text that is not allowed.
+    InputError tells the column and the part of the text that is not allowed.
     """
     known = None if names is None else frozenset(names)
 

@@ -93,10 +93,7 @@ def read(
 ) -> Form:
     """The form of a text in which these functions may occur, and names about which `refusal` has nothing to say.
 
-    Raises
-    ------
-    InputError
-        Beginning with `where`, if it is given, with the column and the part of the text that is not allowed.
+    InputError begins with `where`, if it is given, and tells the column and the part of the text that is not allowed.
     """
     start = f"{where}: " if where else ""
     if len(text) > LONGEST:
