@@ -1,16 +1,15 @@
 """The public names and where they are defined; read by type checkers and, lazily, by `__init__.py`."""
 
-from .analysis import (
+from .analysis.diagram import bifurcation_diagram as bifurcation_diagram
+from .analysis.frequency_response import continue_branch as continue_branch, frequency_response as frequency_response
+from .analysis.locate_extremum import locate_extremum as locate_extremum
+from .analysis.subharmonics import (
     Seeds as Seeds,
-    bifurcation_diagram as bifurcation_diagram,
-    continue_branch as continue_branch,
     find_subharmonics as find_subharmonics,
-    frequency_response as frequency_response,
-    locate_extremum as locate_extremum,
     periodic_orbit as periodic_orbit,
-    switch_branch as switch_branch,
-    track as track,
 )
+from .analysis.switching import switch_branch as switch_branch
+from .analysis.track import track as track
 from .bifurcation import Bifurcation as Bifurcation
 from .continuation import Event as Event, NewtonOptions as NewtonOptions, SteppingOptions as SteppingOptions
 from .curves.events.formulation import (
@@ -25,27 +24,23 @@ from .errors import (
     SuboctaveError as SuboctaveError,
     TimeLimitError as TimeLimitError,
 )
-from .experiments import (
-    Attractor as Attractor,
-    Basins as Basins,
-    BruteForceDiagram as BruteForceDiagram,
+from .experiments.basins import Basins as Basins, basins as basins
+from .experiments.brute_force import BruteForceDiagram as BruteForceDiagram, brute_force_diagram as brute_force_diagram
+from .experiments.lyapunov import (
     LyapunovExponents as LyapunovExponents,
-    LyapunovMap as LyapunovMap,
-    Measured as Measured,
-    PoincareSections as PoincareSections,
     Separation as Separation,
-    SteppedSine as SteppedSine,
-    Trajectory as Trajectory,
     TwoTrajectories as TwoTrajectories,
-    basins as basins,
-    brute_force_diagram as brute_force_diagram,
-    integrate as integrate,
     lyapunov_exponents as lyapunov_exponents,
-    lyapunov_map as lyapunov_map,
-    poincare_sections as poincare_sections,
-    read_measured as read_measured,
-    stepped_sine as stepped_sine,
 )
+from .experiments.lyapunov_map import LyapunovMap as LyapunovMap, lyapunov_map as lyapunov_map
+from .experiments.measured import Measured as Measured, read_measured as read_measured
+from .experiments.poincare import (
+    Attractor as Attractor,
+    PoincareSections as PoincareSections,
+    poincare_sections as poincare_sections,
+)
+from .experiments.stepped_sine import SteppedSine as SteppedSine, stepped_sine as stepped_sine
+from .experiments.trajectories import Trajectory as Trajectory, integrate as integrate
 from .floquet import Arbitration as Arbitration, Hill as Hill, KoopmanHill as KoopmanHill, Monodromy as Monodromy
 from .harmonic import (
     AdaptiveHarmonics as AdaptiveHarmonics,
@@ -53,15 +48,11 @@ from .harmonic import (
     HarmonicBasis as HarmonicBasis,
     PeriodicOrbit as PeriodicOrbit,
 )
-from .maps import (
-    Isola as Isola,
-    IsolaMap as IsolaMap,
-    Isolas as Isolas,
-    RegimeMap as RegimeMap,
-    find_isolas as find_isolas,
-    isola_map as isola_map,
-    regime_map as regime_map,
-)
+from .maps.isolas.map import IsolaMap as IsolaMap, isola_map as isola_map
+from .maps.isolas.result import Isola as Isola, Isolas as Isolas
+from .maps.isolas.verb import find_isolas as find_isolas
+from .maps.regimes.map import RegimeMap as RegimeMap
+from .maps.regimes.verb import regime_map as regime_map
 from .model import (
     BaseAcceleration as BaseAcceleration,
     BaseDisplacement as BaseDisplacement,

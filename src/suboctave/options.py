@@ -6,7 +6,8 @@ A verb takes `**options: Unpack[Declared]`, where `Declared` is a TypedDict whos
         max_step: Annotated[float | None, "Largest distance between neighbours."]
 
 and is decorated with `with_options(Declared)`. Its signature then lists the options as keywords, its docstring ends
-with their meanings, and a name that is not declared is refused.
+with their meanings and, unless it says more of its errors, with that of wrong input; a name that is not declared is
+refused.
 """
 
 from __future__ import annotations
@@ -65,7 +66,10 @@ def with_options(declared: Any) -> Callable[[Callable[Arguments, Result]], Calla
         described.__signature__ = inspect.Signature([*own, *more], return_annotation=returns)
         if verb.__doc__ is not None:
             listed = "".join(f"{p.name}\n{_indented(types[p.name][1])}" for p in more)
-            section = textwrap.indent(f"Other Parameters\n----------------\n{listed}", "    ")
+            section = f"Other Parameters\n----------------\n{listed}"
+            if "Raises\n" not in verb.__doc__:
+                section += "\nRaises\n------\nInputError\n    Wrong input, before any work.\n"
+            section = textwrap.indent(section, "    ")
             described.__doc__ = f"{verb.__doc__.rstrip()}\n\n{section}    "
         return described
 

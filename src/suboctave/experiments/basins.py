@@ -236,11 +236,6 @@ def basins(
     taken in 192 points of it, and the radius that passes is reduced by a tenth: no proof, so that up to 200 of the
     stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing contracts
     has no such neighbourhood; its trajectories are followed for all `periods`.
-
-    Raises
-    ------
-    InputError
-        Before any work.
     """
     values, state = read_values(system, parameters), start_state(system, rest)
     check_omega(omega)

@@ -191,11 +191,6 @@ def brute_force_diagram(
     transient, periods
         Periods of the load that are left out at every value, and those that are kept. A motion of period nT is
         recognised if `periods` is at least 3 n.
-
-    Raises
-    ------
-    InputError
-        Before any work.
     """
     first = start_state(system, state)
     name, at, grid = varied_grid(system, omega, parameter, values, count)

@@ -163,11 +163,6 @@ def lyapunov_map(
         Local error relative to the size of the motion.
     parameters
         Other values of some parameters, by name.
-
-    Raises
-    ------
-    InputError
-        Before any work.
     """
     first = start_state(system, state)
     check_parameter(system, parameter)

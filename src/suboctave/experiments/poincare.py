@@ -172,11 +172,6 @@ def poincare_sections(
         A number, or (B,) with one for each trajectory; parameters by name.
     transient, periods
         Periods of the load that are left out, and those that are kept.
-
-    Raises
-    ------
-    InputError
-        Before any work.
     """
     if states is None or not isinstance(states, list | tuple | np.ndarray):
         states = start_state(system, states)

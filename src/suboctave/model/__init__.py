@@ -3,74 +3,37 @@
 A room without any method: nothing here knows of harmonics of the response, of stability or of curves.
 """
 
-from __future__ import annotations
-
-from suboctave.model import library
-from suboctave.model.elements.base import Element
-from suboctave.model.elements.callable import Callable
-from suboctave.model.elements.coupled import CoupledElement, Expression
-from suboctave.model.elements.dampers import QuadraticDamper, TanhFriction
-from suboctave.model.elements.derivative_check import DerivativeReport, check_derivatives
-from suboctave.model.elements.hertz import HertzContact
+from suboctave.model import library as library
+from suboctave.model.elements.base import Element as Element
+from suboctave.model.elements.callable import Callable as Callable
+from suboctave.model.elements.coupled import CoupledElement as CoupledElement, Expression as Expression
+from suboctave.model.elements.dampers import QuadraticDamper as QuadraticDamper, TanhFriction as TanhFriction
+from suboctave.model.elements.derivative_check import (
+    DerivativeReport as DerivativeReport,
+    check_derivatives as check_derivatives,
+)
+from suboctave.model.elements.hertz import HertzContact as HertzContact
 from suboctave.model.elements.smoothness import (
-    AdaptiveSampling,
-    CornerSampling,
-    Piece,
-    PiecewiseLinear,
-    PolynomialSampling,
-    SharpSampling,
-    SharpVelocitySampling,
+    AdaptiveSampling as AdaptiveSampling,
+    CornerSampling as CornerSampling,
+    Piece as Piece,
+    PiecewiseLinear as PiecewiseLinear,
+    PolynomialSampling as PolynomialSampling,
+    SharpSampling as SharpSampling,
+    SharpVelocitySampling as SharpVelocitySampling,
 )
-from suboctave.model.elements.springs import CubicSpring, PolynomialSpring
-from suboctave.model.elements.stops import Clearance, ElasticStop, Freeplay
-from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.elements.springs import CubicSpring as CubicSpring, PolynomialSpring as PolynomialSpring
+from suboctave.model.elements.stops import Clearance as Clearance, ElasticStop as ElasticStop, Freeplay as Freeplay
+from suboctave.model.expressions.coefficients import Coefficient as Coefficient, coefficient as coefficient
 from suboctave.model.loads import (
-    BaseAcceleration,
-    BaseDisplacement,
-    Gravity,
-    HarmonicLoad,
-    Load,
-    LoadComponent,
-    RotatingUnbalance,
-    StaticLoad,
+    BaseAcceleration as BaseAcceleration,
+    BaseDisplacement as BaseDisplacement,
+    Gravity as Gravity,
+    HarmonicLoad as HarmonicLoad,
+    Load as Load,
+    LoadComponent as LoadComponent,
+    RotatingUnbalance as RotatingUnbalance,
+    StaticLoad as StaticLoad,
 )
-from suboctave.model.matrices import MatrixCoefficient, matrix_coefficient
-from suboctave.model.system import System
-
-__all__ = [
-    "AdaptiveSampling",
-    "BaseAcceleration",
-    "BaseDisplacement",
-    "Callable",
-    "Clearance",
-    "Coefficient",
-    "CornerSampling",
-    "CoupledElement",
-    "CubicSpring",
-    "DerivativeReport",
-    "ElasticStop",
-    "Element",
-    "Expression",
-    "Freeplay",
-    "Gravity",
-    "HarmonicLoad",
-    "HertzContact",
-    "Load",
-    "LoadComponent",
-    "MatrixCoefficient",
-    "Piece",
-    "PiecewiseLinear",
-    "PolynomialSampling",
-    "PolynomialSpring",
-    "QuadraticDamper",
-    "RotatingUnbalance",
-    "SharpSampling",
-    "SharpVelocitySampling",
-    "StaticLoad",
-    "System",
-    "TanhFriction",
-    "check_derivatives",
-    "coefficient",
-    "library",
-    "matrix_coefficient",
-]
+from suboctave.model.matrices import MatrixCoefficient as MatrixCoefficient, matrix_coefficient as matrix_coefficient
+from suboctave.model.system import System as System

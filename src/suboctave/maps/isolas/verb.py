@@ -104,11 +104,6 @@ def find_isolas(
         A sequence of `Isola`, in the order of the values at which they are born; `notes` says what could not be
         settled, `limit_points` and `doublings` are the curves that were followed. Ctrl-C ends it with what was found.
 
-    Raises
-    ------
-    InputError
-        Wrong input, before any work.
-
     Notes
     -----
     An isola is met if one of its limit points, followed over the parameter, leads to a branch that bifurcates from the

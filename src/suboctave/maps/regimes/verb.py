@@ -99,11 +99,6 @@ def regime_map(
     RegimeMap
         With `label(omega, value)`, `regions`, `plot`, `check`; `notes` says what could not be settled. Ctrl-C ends it
         with what is known by then.
-
-    Raises
-    ------
-    InputError
-        Wrong input, before any work.
     """
     catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
     for name, number, least in (("depth", depth, 0), ("values", values, 1), ("max_slices", max_slices, 1)):
