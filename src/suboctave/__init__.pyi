@@ -1,14 +1,17 @@
 """The public names and where they are defined; read by type checkers and, lazily, by `__init__.py`."""
 
+from .analysis.branches import (
+    continue_branch as continue_branch,
+    frequency_response as frequency_response,
+    switch_branch as switch_branch,
+)
 from .analysis.diagram import bifurcation_diagram as bifurcation_diagram
-from .analysis.frequency_response import continue_branch as continue_branch, frequency_response as frequency_response
 from .analysis.locate_extremum import locate_extremum as locate_extremum
 from .analysis.subharmonics import (
     Seeds as Seeds,
     find_subharmonics as find_subharmonics,
     periodic_orbit as periodic_orbit,
 )
-from .analysis.switching import switch_branch as switch_branch
 from .analysis.track import track as track
 from .bifurcation import Bifurcation as Bifurcation
 from .continuation import Event as Event, NewtonOptions as NewtonOptions, SteppingOptions as SteppingOptions

@@ -152,7 +152,7 @@ def test_a_mistake_in_the_program_is_not_taken_for_one_of_units(monkeypatch):
     def divides(*arguments):
         return 1 // 0
 
-    verbs = importlib.import_module("suboctave.analysis.frequency_response")
+    verbs = importlib.import_module("suboctave.analysis.branches")
     monkeypatch.setattr(verbs, "check_system", divides)
     with pytest.raises(ZeroDivisionError):
         so.frequency_response(DUFFING, (0.5, 0.6))

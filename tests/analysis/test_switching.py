@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.branching import branching_equation, doubled_direction
+from suboctave.bifurcation.bordered import branching_equation, doubled_direction, null_vectors
 from suboctave.curves.identity import relation
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import HarmonicBasis

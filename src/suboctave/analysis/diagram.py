@@ -13,9 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, Unpack
 
-from suboctave.analysis.frequency_response import frequency_response
+from suboctave.analysis.branches import frequency_response, switch_branch
 from suboctave.analysis.options import CurveOptions, SearchOptions, handed_on
-from suboctave.analysis.switching import switch_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.junction import Junction

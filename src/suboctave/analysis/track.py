@@ -26,8 +26,8 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from suboctave.analysis.branches import switch_branch
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
-from suboctave.analysis.switching import switch_branch
 from suboctave.bifurcation import Bifurcation
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH, TrackedEvent, kind_of
 from suboctave.bifurcation.bordered import null_vectors, transversality

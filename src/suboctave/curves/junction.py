@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.branching import doubled_direction
+from suboctave.bifurcation.bordered import doubled_direction
 from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import length

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.branching import branching_equation
+from suboctave.bifurcation.bordered import branching_equation
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import solved_again

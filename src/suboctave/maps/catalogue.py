@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from suboctave.analysis.branches import continue_branch, switch_branch
 from suboctave.analysis.diagram import Followed, diagram_of
-from suboctave.analysis.frequency_response import continue_branch
 from suboctave.analysis.options import SearchOptions, handed_on, settings_of
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
-from suboctave.analysis.switching import switch_branch
 from suboctave.analysis.track import track
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions

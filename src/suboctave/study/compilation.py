@@ -14,8 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from multiprocessing import get_context
 from typing import Any
 
-from suboctave.analysis.frequency_response import continue_branch, frequency_response
-from suboctave.analysis.switching import switch_branch
+from suboctave.analysis.branches import continue_branch, frequency_response, switch_branch
 from suboctave.analysis.track import track
 from suboctave.compiled import without_notice
 from suboctave.model import ElasticStop, Expression, HarmonicLoad, QuadraticDamper, System, library

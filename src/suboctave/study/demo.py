@@ -14,8 +14,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import bifurcation_diagram
-from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.analysis.track import track
 from suboctave.model import System, library
 from suboctave.pictures import plot_boundaries, plot_panels, plot_response

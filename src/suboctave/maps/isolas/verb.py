@@ -22,8 +22,8 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from suboctave.analysis.branches import continue_branch
 from suboctave.analysis.diagram import Followed
-from suboctave.analysis.frequency_response import continue_branch
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.curves.discretisation import Harmonics, own_linear_part

@@ -14,8 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import Followed, grown_from
-from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on, mirrored

@@ -21,7 +21,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.frequency_response import continue_branch
+from suboctave.analysis.branches import continue_branch
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.bifurcation.bifurcation import TrackedEvent

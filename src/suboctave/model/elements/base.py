@@ -4,14 +4,15 @@ An element acts on the relative displacement `u = d . x` and velocity `v = d . x
 left-hand side of the equation of motion. Its coefficients `c` are numbers or expressions in the system's parameters. A
 new element is a subclass that passes its coefficients to `Element.__init__` and provides the laws below as pure
 functions of arrays; `check_derivatives` compares them with finite differences. Forces that depend on several
-displacements, or on time, are in `coupled`.
+displacements, or on time, are in `coupled`. Derivatives that are not given are differences of fourth order,
+`f'(0) ~ (8 (f(h) - f(-h)) - (f(2h) - f(-2h))) / 12 h`.
 """
 
 from __future__ import annotations
 
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError, located
 from suboctave.model.description import Recorded
-from suboctave.model.differences import central_difference, shift_derivative, shifted, step_of
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
 from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
@@ -250,3 +250,30 @@ def required(owner: str, **given: Any) -> None:
     missing = [name for name, value in given.items() if value is None]
     if missing:
         raise InputError(f"{owner} needs {' and '.join(missing)}")
+
+
+#: step as a share of the length over which a law changes: truncation (step^4 / 30 times a fifth derivative) and
+#: rounding (1e-16 / step, more behind a sharp corner) both stay below 1e-7 there
+STEP = 2e-3
+
+
+def central_difference(law: Callable[[float], Any], step: float) -> Any:
+    """The derivative at 0 of a function of a shift."""
+    return (8.0 * (law(step) - law(-step)) - (law(2.0 * step) - law(-2.0 * step))) / (12.0 * step)
+
+
+def step_of(at: Any, width: float = np.inf) -> float:
+    """The step for an argument `at` of a law that changes over its largest size, or over a smaller width."""
+    return STEP * min(float(np.max(np.abs(at), initial=0.0)) or 1.0, width)
+
+
+def shifted(at: Any, i: Any, by: float) -> Any:
+    """A copy of an array with one of its entries, or rows, moved."""
+    moved = at.copy()
+    moved[i] += by
+    return moved
+
+
+def shift_derivative(law: Callable[[Any], Any], at: Any, i: Any, step: float) -> Any:
+    """The derivative of a function of an array by one of its entries, or along one of its rows."""
+    return central_difference(lambda h: law(shifted(at, i, h)), step)

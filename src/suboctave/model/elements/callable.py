@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, shortened
-from suboctave.model.differences import central_difference, shift_derivative, step_of
-from suboctave.model.elements.base import Array, Dof, Element, required
+from suboctave.model.elements.base import Array, Dof, Element, central_difference, required, shift_derivative, step_of
 from suboctave.model.elements.smoothness import AdaptiveSampling
 from suboctave.model.expressions.coefficients import Coefficient
 

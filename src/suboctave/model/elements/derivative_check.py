@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, check_numbers, shortened
-from suboctave.model.differences import STEP, central_difference, shifted, step_of
-from suboctave.model.elements.base import Array, BaseElement, Element
+from suboctave.model.elements.base import STEP, Array, BaseElement, Element, central_difference, shifted, step_of
 from suboctave.model.elements.coupled import CoupledElement, as_coupled
 from suboctave.model.elements.smoothness import (
     CornerSampling,

@@ -11,10 +11,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
+from suboctave.analysis.branches import check_left, continue_branch, frequency_response, switch_branch
 from suboctave.analysis.diagram import bifurcation_diagram
-from suboctave.analysis.frequency_response import continue_branch, frequency_response
 from suboctave.analysis.options import settings_of
-from suboctave.analysis.switching import check_left, switch_branch
 from suboctave.analysis.track import motion_kind, track
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH
 from suboctave.continuation import Event
