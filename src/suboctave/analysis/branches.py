@@ -23,7 +23,7 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import Harmonics, harmonics_of, own_linear_part
 from suboctave.curves.driver import same_event
 from suboctave.curves.events.locate import Singular
-from suboctave.curves.follow import follow
+from suboctave.curves.follow import both_ways, follow
 from suboctave.curves.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.points import BranchPoint
@@ -97,7 +97,7 @@ def frequency_response(
         if start is None and nu > 1:
             trace = subharmonic_start(curve, run)
         else:
-            trace = run.follow(start_point(curve, first, start, run.settings.newton))
+            trace = follow(start_point(curve, first, start, run.settings.newton), run.ahead, run.bounds, run.settings)
             given = _written(harmonics, options, subharmonic=subharmonic, linear=linear)
             _warn_of_return(trace, "omega", first, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
     return run.branch(trace)
@@ -171,7 +171,8 @@ def continue_branch(
             # two branches cross: go on along that on which the point was found
             trace = leave_along(crossing, curve, np.array(crossing.tangent), run)
         else:
-            trace = run.both_ways(start_point(curve, min(high, max(low, value)), orbit, run.settings.newton))
+            point = start_point(curve, min(high, max(low, value)), orbit, run.settings.newton)
+            trace = both_ways(point, run.ahead, run.bounds, run.settings)
     return run.branch(trace)
 
 
@@ -197,7 +198,7 @@ def _from_system(
     # the branch may begin at rest
     curve = run.scaled(run.curve(float(omega), 1, None))
     with run.reporting(options.get("progress"), f"along {parameter}") as run:
-        trace = run.follow(start_point(curve, first, None, run.settings.newton))
+        trace = follow(start_point(curve, first, None, run.settings.newton), run.ahead, run.bounds, run.settings)
     given = _written(wanted, options)
     call = f"so.continue_branch(system, {parameter!r}, ({last!r}, {first!r}), omega={float(omega)!r}{given})"
     _warn_of_return(trace, parameter, first, call)

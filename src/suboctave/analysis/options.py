@@ -8,17 +8,16 @@ What a verb follows, and the branch that comes of it.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, TypeVar, cast
 
 from suboctave.bifurcation import Bifurcation
-from suboctave.continuation import CurvePoint, Event, NewtonOptions, SteppingOptions
+from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import Harmonics, make_curve
 from suboctave.curves.events.formulation import FORMULATIONS, Formulation, formulation_of, written
-from suboctave.curves.follow import both_ways, follow
 from suboctave.curves.junction import Junction
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import linear_response
@@ -175,14 +174,11 @@ class Inherited:
                 inherited[name] = kind(**self.known[name])
         for name, names in (("stability", METHODS), ("formulation", FORMULATIONS)):
             if name not in given:
-                inherited[name] = self._by_name(name, names)
+                inherited[name] = known = self.known.get(name)
+                if known is not None and known not in names:
+                    what = f"{name}={known}, which has options"
+                    raise InputError(f"this {self.item.kind} was found with {what}: give it again")
         return cast("CurveOptions", inherited | given)
-
-    def _by_name(self, option: str, names: Container[str]) -> str | None:
-        known = self.known.get(option)
-        if known is None or known in names:
-            return known
-        raise InputError(f"this {self.item.kind} was found with {option}={known}, which has options: give it again")
 
 
 @dataclass(frozen=True)
@@ -229,14 +225,6 @@ class CurveRun:
         """Report a share of the work where that is not measured by the parameter."""
         if self.settings.report is not None:
             self.settings.report.report(share, where)
-
-    def follow(self, start: CurvePoint) -> Trace:
-        """The curve from a point at the first value on."""
-        return follow(start, self.ahead, self.bounds, self.settings)
-
-    def both_ways(self, start: CurvePoint) -> Trace:
-        """The curve to both sides of a point."""
-        return both_ways(start, self.ahead, self.bounds, self.settings)
 
     def branch(self, trace: Trace) -> Branch:
         """What was followed as a branch, with what it was computed with."""

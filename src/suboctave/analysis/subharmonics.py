@@ -25,6 +25,7 @@ from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import Harmonics, make_curve
+from suboctave.curves.follow import both_ways
 from suboctave.curves.identity import lies_on, relation
 from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
@@ -168,7 +169,7 @@ def _branches(curve: MotionProblem, seeds: Seeds, run: CurveRun, known: Sequence
         if any(lies_on(Sample(point).orbit, branch.points) for branch in branches):
             continue
         own = replace(run, settings=run.settings.reporting_to(following, run.ends))
-        trace = own.both_ways(point)
+        trace = both_ways(point, own.ahead, own.bounds, own.settings)
         if trace.points:
             branches.append(own.branch(trace))
             yield branches[-1]
@@ -189,7 +190,7 @@ def subharmonic_start(curve: MotionProblem, run: CurveRun) -> Trace:
             f"{last:g}: the search starts near nonlinear resonances of the linear modes at fractions of omega. Give a "
             "state or an orbit as start="
         )
-    return run.both_ways(point)
+    return both_ways(point, run.ahead, run.bounds, run.settings)
 
 
 @limited

@@ -364,23 +364,17 @@ class BasinRun:
             return
         place = path_of(keep)
         mark = self._mark()
-        if place.exists():
-            self.journal = Journal.reopen(place)
-            if self.journal.records:
-                try:
-                    self._restore(mark, given, place)
-                except BaseException:
-                    self.journal.close()
-                    raise
-                return
-        else:
-            if not place.parent.is_dir():
-                raise InputError(f"{place.parent} is no folder: make it, or keep elsewhere")
-            self.journal = Journal.create(place)
+        if not place.exists() and not place.parent.is_dir():
+            raise InputError(f"{place.parent} is no folder: make it, or keep elsewhere")
+        self.journal = Journal.reopen(place) if place.exists() else Journal.create(place)
+        goes_on = bool(self.journal.records)
         try:
+            if goes_on:
+                self._restore(mark, given, place)
+                return
             enter_attractors(self.catalogue, given)
         except BaseException:
-            self.journal.remove()
+            (self.journal.close if goes_on else self.journal.remove)()
             raise
         attractors = [[one.name, one.words, [[state.tolist(), nu] for state, nu in one.starts]] for one in given]
         self.journal.append("basins", {"mark": mark, "attractors": attractors})

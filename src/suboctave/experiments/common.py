@@ -229,9 +229,9 @@ class TimeResult(Stored, ABC):
     layout: ClassVar[Layout]
     system: System
 
-    @abstractmethod
     def to_xarray(self) -> xarray.Dataset:
         """The result as a labelled dataset, with what produced it."""
+        return self._dataset()
 
     @abstractmethod
     def to_dataframe(self) -> pandas.DataFrame:

@@ -44,7 +44,6 @@ from suboctave.timedomain.flow import Flow, Motions, check_extent, check_motions
 
 if TYPE_CHECKING:
     import pandas
-    import xarray
 
 _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
@@ -375,10 +374,6 @@ class SteppedSine(TimeResult):
         names = ["direction", "omega", "amplitude", "phase_deg"]
         names += [f"harmonic_{k:g}" for k in self.multiples if k != 1.0]
         return pd.DataFrame(rows, columns=[*names, "largest", "period"])
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Components on (direction, omega, multiple, dof), real and imaginary parts apart, and what produced them."""
-        return self._dataset()
 
     def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
         """Draw the measured fundamentals, over branches and beside data of a rig if any are given; saved to a path.

@@ -255,7 +255,8 @@ def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
     if selection == "imaginary":
         chosen = smallest_imaginary(values, count)
     elif selection == "symmetry":
-        chosen = most_central(_vectors(solved, harmonics, values), count)
+        waves = _Waves(solved, harmonics)
+        chosen = most_central(np.stack([waves.vectors(s)[0] for s in values], axis=-1), count)
     if not same_exponents(values[chosen], values[strip]):
         note = f"Selection by {selection} takes an exponent twice and misses another: its multipliers are not those"
     s, spread = _second_level(state, solved, values[chosen])
@@ -269,12 +270,6 @@ def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
         errors, checks["Liouville"] = liouville(mu, errors, solved.decay)
     order = np.argsort(-np.abs(mu), kind="stable")
     return FloquetResult(mu[order], errors[order], name, note, checks)
-
-
-def _vectors(system: Variational, harmonics: int, values: ComplexArray) -> ComplexArray:
-    """Right eigenvectors of some eigenvalues, shape (waves, n, len(values))."""
-    waves = _Waves(system, harmonics)
-    return np.stack([waves.vectors(s)[0] for s in values], axis=-1)
 
 
 def _second_level(state: BalanceState, solved: Variational, values: ComplexArray) -> tuple[ComplexArray, Array]:

@@ -154,7 +154,10 @@ class Arbitration(StabilityMethod):
         results, joint, contradictions = [result], result, []
         for witness in self.witnesses:
             check_time()
-            other = _witnessed(witness, state)
+            try:
+                other = witness.multipliers(state)
+            except ConvergenceError as failure:  # with more harmonics the motion may leave the range of the forces
+                other = FloquetResult.inapplicable(2 * state.balance.system.n, witness.name, str(failure))
             results.append(other)
             if not other.applicable:
                 continue
@@ -163,14 +166,6 @@ class Arbitration(StabilityMethod):
             if joint.decided:
                 break
         return replace(joint, note=_explanation(state, results, joint, contradictions), witnesses=tuple(results))
-
-
-def _witnessed(witness: StabilityMethod, state: BalanceState) -> FloquetResult:
-    """A witness's multipliers; inapplicable where the motion with more harmonics leaves the range of the forces."""
-    try:
-        return witness.multipliers(state)
-    except ConvergenceError as failure:
-        return FloquetResult.inapplicable(2 * state.balance.system.n, witness.name, str(failure))
 
 
 def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:

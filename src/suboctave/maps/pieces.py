@@ -234,6 +234,11 @@ class MonotonePiece:
 Piece = tuple[list[TrackedPoint], TrackedEvent | None, TrackedEvent | None]
 
 
+def across(end: MonotonePiece | float, values: Array | float) -> Array:
+    """Where the end of a range lies at values of `along`: on a piece, or at one place everywhere."""
+    return end.across(values) if isinstance(end, MonotonePiece) else np.full(np.shape(values), end)
+
+
 def pieces_of(curve: TrackedBranch, along: str, name: str = "omega") -> list[MonotonePiece]:
     """The monotone pieces of a curve, in order.
 

@@ -23,7 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from suboctave.errors import InputError, located, shortened, suggest
-from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.expressions.coefficients import Coefficient, restored
 
 Arrays = MutableMapping[str, np.ndarray]
 _PACKAGE = "suboctave."
@@ -225,7 +225,7 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
         case {"float": "inf" | "-inf" | "nan" as text}:
             return float(text)
         case {"expression": str()}:
-            return read_expression(value)
+            return restored(value["expression"], value.get("by", ()))
         case {"array": _, "dtype": _, "shape": _} | {"stored": str()}:
             return _read_array(value, arrays)
         case {"sparse": Mapping()}:
@@ -241,13 +241,6 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
         int(name) if isinstance(name, str) and name.isdecimal() else name: from_plain(item, arrays, allow_code)
         for name, item in value.items()
     }
-
-
-def read_expression(value: Mapping[str, Any]) -> Coefficient:
-    result = coefficient(value["expression"])
-    for name in value.get("by", ()):
-        result = result.derivative(name)
-    return result
 
 
 def _place_of(function: Any) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, Key, Refusals, located, shortened, suggest
-from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value, read_expression
+from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient
@@ -419,7 +419,7 @@ def _plain_matrix(matrix: MatrixCoefficient, arrays: Arrays | None) -> dict[str,
 
 def _read_matrix(description: Mapping[str, Any], what: str, arrays: Mapping[str, np.ndarray]) -> MatrixCoefficient:
     base = from_plain(description["base"], arrays)
-    terms = [(read_expression(c), from_plain(pattern, arrays)) for c, pattern in description["terms"]]
+    terms = [(from_plain(c, arrays), from_plain(pattern, arrays)) for c, pattern in description["terms"]]
     shapes = {matrix.shape for matrix in (base, *(pattern for _, pattern in terms))}
     if len(shapes) != 1 or len(base.shape) != 2 or base.shape[0] != base.shape[1]:
         raise InputError(f"this is not the description of a system: {what} has shapes {sorted(shapes)}")

@@ -30,7 +30,7 @@ from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, pass_on
 from suboctave.maps.catalogue import FAILURES, SearchRange, Work, branch_through, carrier_of, is_count, listed
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
-from suboctave.maps.pieces import MonotonePiece, pieces_of
+from suboctave.maps.pieces import MonotonePiece, across, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, timed
 from suboctave.model.system import System
 from suboctave.results.tracked_branch import TrackedBranch
@@ -273,15 +273,15 @@ class Span:
 
     def range(self, value: float) -> tuple[float, float]:
         """Between which values of q the isola exists at a value of s."""
-        low, high = (float(e.across(value)) if isinstance(e, MonotonePiece) else e for e in self.ends)
+        low, high = (float(across(end, value)) for end in self.ends)
         return low, high
 
     def outline(self, count: int = 241) -> tuple[Array, Array, Array]:
         """Values of s, dense towards both ends, and both ends of the range of q there."""
         share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
         values = self.low + share * (self.high - self.low)
-        low, high = (e.across(values) if isinstance(e, MonotonePiece) else np.full(count, e) for e in self.ends)
-        return values, np.asarray(low), np.asarray(high)
+        low, high = (across(end, values) for end in self.ends)
+        return values, low, high
 
 
 def spans_of(
@@ -334,8 +334,7 @@ def _crossing(start: float, reach: float, ends: Sequence[MonotonePiece | float],
     ):
         return None
     values = np.linspace(start, reach, 400)[:-1]
-    first, last = (e.across(values) if isinstance(e, MonotonePiece) else np.full(len(values), e) for e in (low, high))
-    crossed = np.nonzero(np.asarray(first) > np.asarray(last))[0]
+    crossed = np.nonzero(across(low, values) > across(high, values))[0]
     return float(values[crossed[0]]) if len(crossed) else None
 
 

@@ -23,7 +23,7 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.points import BranchPoint
 from suboctave.interruption import pass_on
 from suboctave.maps.catalogue import FAILURES, Catalogue, SearchRange, branch_through
-from suboctave.maps.pieces import MonotonePiece, Stretch, same_branch, stretches
+from suboctave.maps.pieces import MonotonePiece, Stretch, across, same_branch, stretches
 from suboctave.results.branch import Branch
 
 #: ends of branches this close to the end of the range, relatively, lie on it
@@ -48,9 +48,7 @@ class Edge:
 
     def across(self, values: Array | float) -> Array:
         """The frequency at values of the design parameter; nan where the border does not reach."""
-        if self.border is not None:
-            return self.border.across(values)
-        return np.full(np.shape(values), self.omega)
+        return across(self.omega if self.border is None else self.border, values)
 
 
 @dataclass(frozen=True, eq=False)

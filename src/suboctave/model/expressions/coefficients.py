@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from suboctave.errors import InputError, suggest
@@ -100,10 +100,11 @@ class Coefficient:
         return hash((self.text, self.by))
 
     def __reduce__(self) -> tuple[Any, ...]:  # closures cannot be pickled: read again on the other side
-        return _restore, (self.text, self.by)
+        return restored, (self.text, self.by)
 
 
-def _restore(text: str, by: tuple[str, ...]) -> Coefficient:
+def restored(text: str, by: Iterable[str] = ()) -> Coefficient:
+    """A coefficient, or its derivative by several names, from its text."""
     result = coefficient(text)
     for name in by:
         result = result.derivative(name)
