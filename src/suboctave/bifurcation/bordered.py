@@ -192,11 +192,6 @@ def at_values(values: Mapping[str, float], name: str, value: float, omega: float
     return omega, {**values, name: value}
 
 
-def residual_scale(state: BalanceState) -> Array:
-    """Weights of residual entries, shape (dimension,): 1/sqrt(mass) per DOF."""
-    return state.balance.row_weights(state.balance.dimension)
-
-
 #: discriminant of the branching equation, relative to its coefficients, below which two branches are not told apart
 _DISTINCT = 1e-10
 

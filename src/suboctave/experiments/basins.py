@@ -23,7 +23,7 @@ from suboctave.experiments.common import BasinOptions, Layout, TimeResult, check
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption, pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, check_range, read_values, start_state, timed
+from suboctave.model.inputs import check_count, check_omega, check_range, start_state, timed
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -237,7 +237,7 @@ def basins(
     stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing contracts
     has no such neighbourhood; its trajectories are followed for all `periods`.
     """
-    values, state = read_values(system, parameters), start_state(system, rest)
+    state, values = start_state(system, rest), system.read_values(parameters)
     check_omega(omega)
     how = checked_integration(system, options, tolerance=1e-8)
     columns = check_plane(system, plane, how.observe)

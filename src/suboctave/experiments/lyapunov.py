@@ -32,7 +32,7 @@ from suboctave.experiments.common import Layout, ParallelOptions, TimeResult, ch
 from suboctave.experiments.poincare import state_sizes
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, read_values, start_state, timed
+from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -248,7 +248,7 @@ def lyapunov_exponents(
         If a motion leaves the range of numbers.
     """
     first = start_state(system, state)
-    values, omega = read_values(system, parameters), check_omega(omega)
+    values, omega = system.read_values(parameters), check_omega(omega)
     if method == "two_trajectories":
         method = TwoTrajectories()
     if isinstance(method, TwoTrajectories):

@@ -20,7 +20,7 @@ from suboctave.experiments.common import (
 )
 from suboctave.experiments.lyapunov import smooth_weights
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_parameter, read_values, start_state, timed
+from suboctave.model.inputs import check_count, check_parameter, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -166,7 +166,7 @@ def lyapunov_map(
     """
     first = start_state(system, state)
     check_parameter(system, parameter)
-    fixed = read_values(system, parameters)
+    fixed = system.read_values(parameters)
     if parameter in fixed:
         raise InputError(f"parameters= fixes {parameter}, which is to be varied")
     if not (isinstance(counts, tuple | list) and len(counts) == 2):

@@ -11,7 +11,7 @@ import numpy as np
 from suboctave.experiments.common import FEW, Layout, TimeResult, steps_of
 from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, read_values, start_state, timed
+from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import reporting
@@ -156,7 +156,7 @@ def integrate(
     start = start_state(system, state)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
     transient = check_count("transient", transient, 0)
-    values, omega = read_values(system, parameters), check_omega(omega)
+    values, omega = system.read_values(parameters), check_omega(omega)
     with reporting(options.get("progress"), "integrating") as report:
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report

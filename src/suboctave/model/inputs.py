@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from time import perf_counter
 from typing import Any, ParamSpec, Protocol, TypeVar
 
@@ -128,19 +128,6 @@ def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
             except InputError as failure:
                 raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
     return first, last
-
-
-def read_values(system: System, parameters: Any) -> dict[str, float]:
-    """Values of some parameters of a system; InputError for what is none."""
-    if parameters is None:
-        return {}
-    if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
-    for name, value in parameters.items():
-        system.check_parameter(name)
-        if isinstance(value, bool) or not is_number(value):
-            raise InputError(f"parameters: {name!r} must be a finite number, not {shortened(value)}")
-    return {name: float(value) for name, value in parameters.items()}
 
 
 def start_state(system: System, state: Any) -> Array:

@@ -222,10 +222,18 @@ def check_mass(mass: Any) -> None:
             f"inertia (condense one without out of the model)"
         )
     scale = 1.0 / np.sqrt(diagonal)
-    scaled = mass * scale[:, None] * scale if isinstance(mass, np.ndarray) else _scaled_sparse(mass, scale)
+    if not isinstance(mass, np.ndarray) and len(diagonal) <= _DENSE:
+        mass = mass.toarray()
+    if isinstance(mass, np.ndarray):
+        scaled = mass * scale[:, None] * scale
+    else:
+        import scipy.sparse
+
+        factor = scipy.sparse.diags_array(scale)
+        scaled = (factor @ mass @ factor).tocsr()
     difference = abs(scaled - scaled.T)
     if difference.max() > _ASYMMETRY:
-        i, j = _where_largest(difference)
+        i, j = divmod(int(difference.argmax()), len(diagonal))
         raise InputError(f"the mass is not symmetric: M[{i}, {j}] = {mass[i, j]:g}, M[{j}, {i}] = {mass[j, i]:g}")
     lowest = _lowest(scaled)
     if lowest < -1e-12:
@@ -234,26 +242,10 @@ def check_mass(mass: Any) -> None:
         raise InputError("the mass is singular: some motion has no kinetic energy; condense it out of the model")
 
 
-def _scaled_sparse(mass: Any, scale: Any) -> Any:
-    import scipy.sparse
-
-    factor = scipy.sparse.diags_array(scale)
-    return (factor @ mass @ factor).tocsr()
-
-
-def _where_largest(matrix: Any) -> tuple[int, int]:
-    if isinstance(matrix, np.ndarray):
-        i, j = np.unravel_index(int(np.argmax(matrix)), matrix.shape)
-        return int(i), int(j)
-    coordinates = matrix.tocoo()
-    k = int(np.argmax(coordinates.data))
-    return int(coordinates.row[k]), int(coordinates.col[k])
-
-
 def _lowest(scaled: Any) -> float:
     """The lowest eigenvalue, or for a large matrix the smallest pivot, which has its sign."""
     if scaled.shape[0] <= _DENSE:
-        return float(np.linalg.eigvalsh(scaled if isinstance(scaled, np.ndarray) else scaled.toarray())[0])
+        return float(np.linalg.eigvalsh(scaled)[0])
     import scipy.sparse
     from scipy.sparse.linalg import splu
 

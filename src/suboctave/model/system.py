@@ -114,15 +114,18 @@ class System:
     # ------------------------------------------------------------------------------------------------- parameters
     def with_parameters(self, changes: Mapping[str, float] | None = None, /, **more: float) -> System:
         """The same system with other values of some parameters; the sides of its stops stay as they are."""
-        if changes is not None and not isinstance(changes, Mapping):
-            raise InputError(f"values of parameters are given as a mapping {{name: number}}, not {shortened(changes)}")
-        changed = {**(changes or {}), **more}
-        for name, value in changed.items():
-            self.check_parameter(name)
-            changed[name] = _number(name, value)
+        changed = self.read_values(changes) | self.read_values(more)
         result = self.moved_to(changed)
         result._check_values(changed)
         return result
+
+    def read_values(self, values: Any) -> dict[str, float]:
+        """Values of some of its parameters as floats, none for None; InputError for what is none."""
+        if values is not None and not isinstance(values, Mapping):
+            raise InputError(f"values of parameters are given as a mapping {{name: number}}, not {shortened(values)}")
+        for name in values or ():
+            self.check_parameter(name)
+        return {name: _number(name, value) for name, value in (values or {}).items()}
 
     def moved_to(self, values: Mapping[str, float]) -> System:
         """As `with_parameters`, at values where a motion was solved: nothing is checked, or said, any more."""

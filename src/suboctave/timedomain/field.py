@@ -21,7 +21,6 @@ from suboctave.model import System
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import switches
-from suboctave.model.inputs import read_values
 
 __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
@@ -106,7 +105,7 @@ class Field:
         self.system = system
         self.omega = float(omega)
         self.reference = float(reference if reference is not None else omega)
-        self.values = {**system.parameters, **read_values(system, values)}
+        self.values = {**system.parameters, **system.read_values(values)}
         self.n = system.n
         self.mass, self.damping, self.stiffness = (np.asarray(a, dtype=float) for a in system.matrices(self.values))
         self.inverse_mass = np.linalg.inv(self.mass)

@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.bordered import at_values, bordered, residual_scale
+from suboctave.bifurcation.bordered import at_values, bordered
 from suboctave.bifurcation.gaps import GrazingContact, gap_extrema
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
@@ -161,7 +161,7 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     state = grazing.state
     weights = _weights(state, guess)
     dimension = state.balance.dimension
-    rows = residual_scale(state) / max(state.balanced.scale, np.finfo(float).tiny)
+    rows = state.balance.row_weights(state.balance.dimension) / max(state.balanced.scale, np.finfo(float).tiny)
     matrix = np.zeros((dimension + 1, dimension + 1), order="F")
     matrix[:-1, :-1] = state.jacobian * rows[:, None] / weights[:-1]
     matrix[:-1, -1] = state.residual_by(guess.name) * rows / weights[-1]
