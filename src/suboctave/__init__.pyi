@@ -13,7 +13,7 @@ from .analysis.subharmonics import (
     periodic_orbit as periodic_orbit,
 )
 from .analysis.track import track as track
-from .bifurcation import Bifurcation as Bifurcation
+from .bifurcation.bifurcation import Bifurcation as Bifurcation
 from .continuation import Event as Event, NewtonOptions as NewtonOptions, SteppingOptions as SteppingOptions
 from .curves.events.formulation import (
     Alcorta2019 as Alcorta2019,
@@ -44,7 +44,12 @@ from .experiments.poincare import (
 )
 from .experiments.stepped_sine import SteppedSine as SteppedSine, stepped_sine as stepped_sine
 from .experiments.trajectories import Trajectory as Trajectory, integrate as integrate
-from .floquet import Arbitration as Arbitration, Hill as Hill, KoopmanHill as KoopmanHill, Monodromy as Monodromy
+from .floquet.methods import (
+    Arbitration as Arbitration,
+    Hill as Hill,
+    KoopmanHill as KoopmanHill,
+    Monodromy as Monodromy,
+)
 from .harmonic import (
     AdaptiveHarmonics as AdaptiveHarmonics,
     HarmonicBalance as HarmonicBalance,

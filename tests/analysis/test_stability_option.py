@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.floquet import FloquetResult, StabilityMethod, floquet_multipliers
+from suboctave.floquet.methods import StabilityMethod
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult
 from suboctave.timedomain import shoot
 
 OMEGA = (4.5, 1.3)

@@ -10,8 +10,8 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.floquet import FloquetResult, StabilityMethod, method_of
-from suboctave.floquet.methods import combined
+from suboctave.floquet.methods import StabilityMethod, combined, method_of
+from suboctave.floquet.result import FloquetResult
 from suboctave.timedomain import shoot
 
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import suboctave as so
-from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.model import Element, PolynomialSampling
 from suboctave.timedomain import shoot

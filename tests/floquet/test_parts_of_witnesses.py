@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.floquet import floquet_multipliers, hill
+from suboctave.floquet import hill
 from suboctave.floquet.hill import transition
+from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.variational import Variational, two_sided
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.timedomain import shoot

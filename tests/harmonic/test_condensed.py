@@ -10,7 +10,7 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.floquet import floquet_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 
 N = 6

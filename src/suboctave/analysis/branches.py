@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, settings_of
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import branching_equation, null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length

@@ -15,7 +15,7 @@ from typing import Any, Protocol, Unpack
 
 from suboctave.analysis.branches import frequency_response, switch_branch
 from suboctave.analysis.options import CurveOptions, SearchOptions, handed_on
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.junction import Junction
 from suboctave.errors import ConvergenceError, InputError

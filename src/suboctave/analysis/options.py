@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, TypeVar, cast
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.discretisation import Harmonics, make_curve
@@ -24,8 +24,7 @@ from suboctave.curves.starts import linear_response
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.verdicts import with_verdicts
 from suboctave.errors import InputError, is_number, shortened
-from suboctave.floquet import StabilityMethod, method_of
-from suboctave.floquet.methods import METHODS
+from suboctave.floquet.methods import METHODS, StabilityMethod, method_of
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS

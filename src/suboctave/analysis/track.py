@@ -28,8 +28,7 @@ import numpy as np
 
 from suboctave.analysis.branches import switch_branch
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
-from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bifurcation import CURVES_THROUGH, TrackedEvent, kind_of
+from suboctave.bifurcation.bifurcation import CURVES_THROUGH, Bifurcation, TrackedEvent, kind_of
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread

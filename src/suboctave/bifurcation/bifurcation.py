@@ -12,7 +12,7 @@ import numpy as np
 from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import FORMS, NormalForm, normal_form
 from suboctave.errors import ConvergenceError, InputError, suggest
-from suboctave.floquet import FloquetResult
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS, TRACKED_KINDS

@@ -24,7 +24,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.continuation.linear import Factor
-from suboctave.floquet import FloquetResult
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 

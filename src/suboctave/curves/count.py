@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.sample import Sample
 
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.ending import Ending
 from suboctave.curves.identity import relation

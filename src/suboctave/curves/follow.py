@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.measures import fold
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending, EndReason

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import doubled_direction
 from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.continuation.ending import Ending, EndReason
@@ -25,7 +25,8 @@ from suboctave.curves.events.locate import Guess, Singular, locate_singular
 from suboctave.curves.identity import apart
 from suboctave.curves.motion import MotionProblem
 from suboctave.errors import ConvergenceError
-from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind

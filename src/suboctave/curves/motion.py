@@ -23,7 +23,8 @@ from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.curves.kinds.response import PLAIN
 from suboctave.errors import ConvergenceError
-from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.truncation import (

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from suboctave.floquet import FloquetResult, StabilityMethod
+from suboctave.floquet.methods import StabilityMethod
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import branching_equation
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length

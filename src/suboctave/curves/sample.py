@@ -24,7 +24,8 @@ from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
-from suboctave.floquet import FloquetResult, Monodromy, StabilityMethod
+from suboctave.floquet.methods import Monodromy, StabilityMethod
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit

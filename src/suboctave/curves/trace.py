@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
 from suboctave.curves.audit import Audit
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.points import BranchPoint
-from suboctave.floquet import StabilityMethod
+from suboctave.floquet.methods import StabilityMethod
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.progress import CurveProgress, Report
 

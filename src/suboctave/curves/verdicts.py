@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.measures import fold_sign, half_sign, in_doubt
 from suboctave.continuation.ending import Ending
 from suboctave.curves.audit import Unsettled, joined
 from suboctave.curves.points import BranchPoint
 from suboctave.curves.trace import Trace
-from suboctave.floquet import FloquetResult, StabilityMethod
-from suboctave.floquet.result import written
+from suboctave.floquet.methods import StabilityMethod
+from suboctave.floquet.result import FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.interruption import Interruption
 from suboctave.kinds import KINDS

@@ -19,7 +19,7 @@ from suboctave.analysis.diagram import Followed, diagram_of
 from suboctave.analysis.options import SearchOptions, handed_on, settings_of
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.analysis.track import track
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions
 from suboctave.curves.discretisation import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of
 from suboctave.curves.identity import gap_to, lies_on

@@ -25,7 +25,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import InputError
-from suboctave.floquet import Arbitration, Hill, KoopmanHill, Monodromy, StabilityMethod
+from suboctave.floquet.methods import Arbitration, Hill, KoopmanHill, Monodromy, StabilityMethod
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
 from suboctave.maps.catalogue import Catalogue, SearchRange

@@ -21,8 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bifurcation import TrackedEvent
+from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import own_linear_part

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation, BifurcationList
+from suboctave.bifurcation.bifurcation import Bifurcation, BifurcationList
 from suboctave.continuation.ending import Ending, interruption_of, sentence
 from suboctave.continuation.problem import Array
 from suboctave.curves.audit import Audit

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError
 from suboctave.interruption import Interruption

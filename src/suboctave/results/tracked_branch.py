@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bifurcation import target_multiplier
+from suboctave.bifurcation.bifurcation import Bifurcation, target_multiplier
 from suboctave.continuation.ending import sentence
 from suboctave.continuation.problem import Array
 from suboctave.curves.points import BranchPoint, TrackedPoint

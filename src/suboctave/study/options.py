@@ -13,7 +13,7 @@ from suboctave.analysis.subharmonics import Seeds
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, ExtendedSystem, formulation_of
 from suboctave.errors import InputError, suggest
-from suboctave.floquet import Hill, KoopmanHill, Monodromy, method_of
+from suboctave.floquet.methods import Hill, KoopmanHill, Monodromy, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 
 _METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.floquet import FloquetResult
+from suboctave.floquet.result import FloquetResult
 from suboctave.interruption import Interruption
 from suboctave.kinds import KINDS
 from suboctave.progress import reporting

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.bifurcation import TrackedEvent
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation, TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.curves.points import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.floquet import FloquetResult, StabilityMethod, method_of
+from suboctave.floquet.methods import StabilityMethod, method_of
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, overload
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.points import BranchPoint
 from suboctave.errors import InputError
 from suboctave.harmonic.orbit import PeriodicOrbit

@@ -20,7 +20,8 @@ from suboctave.curves.kinds.response import PLAIN
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError
-from suboctave.floquet import FloquetResult, floquet_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.perturbation import Kind

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import Bordered, NullVectors, bordered, null_vectors
 from suboctave.curves.augmentation import Augmentation, Equations, Gradient
 from suboctave.harmonic.basis import Array, HarmonicBasis

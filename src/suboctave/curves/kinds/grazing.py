@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.gaps import basis_rows, level_rate, levels, read_direction
 from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.harmonic.basis import Array

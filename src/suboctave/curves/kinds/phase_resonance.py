@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import Array, harmonic_index

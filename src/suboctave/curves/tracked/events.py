@@ -27,7 +27,7 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.tracked.nearest import BEGINNING, nearest_point, same_discretisation, zero_along
 from suboctave.curves.tracked.tests import CurveTest, Cusp, Extremum
 from suboctave.errors import ConvergenceError
-from suboctave.floquet import StabilityMethod
+from suboctave.floquet.methods import StabilityMethod
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.truncation import choose_harmonics
 

@@ -9,8 +9,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bifurcation import TrackedEvent, kind_of
+from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct, tangent

@@ -22,7 +22,7 @@ import numpy as np
 
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.junction import period_name
 from suboctave.curves.points import TrackedPoint

@@ -27,7 +27,7 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.starts import linear_response
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.experiments.poincare import Attractor, poincare_sections
-from suboctave.floquet import floquet_multipliers
+from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import limited, pass_on
 from suboctave.maps.catalogue import Catalogue, motion_near

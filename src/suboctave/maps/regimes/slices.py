@@ -16,7 +16,7 @@ import numpy as np
 
 from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import Followed, grown_from
-from suboctave.bifurcation import Bifurcation
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name

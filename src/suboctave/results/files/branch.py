@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.bifurcation import Bifurcation
-from suboctave.bifurcation.bifurcation import TrackedEvent
+from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import NormalForm
@@ -25,7 +24,7 @@ from suboctave.curves.audit import Audit, Unsettled
 from suboctave.curves.junction import Junction
 from suboctave.curves.points import BranchPoint
 from suboctave.errors import InputError
-from suboctave.floquet import FloquetResult
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
