@@ -349,13 +349,10 @@ def _lasts(curve: MotionProblem, u: Array) -> bool:
     x = curve.split(u)[0] * curve.balance.scales()[0]
     whole = length(x)
     k = np.arange(1, basis.harmonics + 1)
-    for factor in _primes(basis.nu):
+    primes = [p for p in range(2, basis.nu + 1) if basis.nu % p == 0 and all(p % q for q in range(2, p))]
+    for factor in primes:
         rows = k[k % factor != 0]
         part = np.hypot(length(x[2 * rows - 1]), length(x[2 * rows]))
         if part <= _SUBHARMONIC * whole:
             return False
     return True
-
-
-def _primes(number: int) -> list[int]:
-    return [p for p in range(2, number + 1) if number % p == 0 and all(p % q for q in range(2, p))]

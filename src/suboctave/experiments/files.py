@@ -116,10 +116,6 @@ def _brute_force(d: _Read) -> dict[str, Any]:
     return {"starts": starts, "points": d.state(), "omega": None if omega is None else float(omega)}
 
 
-def _separation(d: _Read) -> dict[str, Any]:
-    return {"settings": np.stack([d["value"], d["offset"]], axis=1), "method": d.record["method"]}
-
-
 def _basins(d: _Read) -> dict[str, Any]:
     points, of, multipliers = d["points"], d["point_of"], d["multipliers"]
     known = [
@@ -150,7 +146,11 @@ for _kind in (
     _Kind(SteppedSine, lambda d: {"directions": tuple(d.texts("direction"))}),
     _Kind(LyapunovExponents),
     _Kind(LyapunovMap),
-    _Kind(Separation, _separation, lambda item: {"method": item.method}),
+    _Kind(
+        Separation,
+        lambda d: {"settings": np.stack([d["value"], d["offset"]], axis=1), "method": d.record["method"]},
+        lambda item: {"method": item.method},
+    ),
     _Kind(Basins, _basins, _of_basins),
 ):
     register(Codec(_kind.made.layout.contents, _kind.made, partial(_written, _kind), partial(_read, _kind)))

@@ -107,7 +107,8 @@ def isola_map(
             f"the isola was found at {parameter} = {here:g}, outside the bounds ({low:g}, {high:g}): widen them, or "
             f"search with a system whose {parameter} lies within"
         )
-    _check_probes(probes, low, high)
+    if not is_count(probes, 0) and not all(is_number(value) and low <= value <= high for value in listed(probes)):
+        raise InputError(f"probes must be how many, or numbers within the bounds ({low:g}, {high:g}), not {probes!r}")
     options = first.options if max_step is None else {**first.options, "max_step": max_step}
     regions = _Regions(system, name, parameter, (low, high), options)
     with regions.reporting(progress, f"isolas over {name} and {parameter}"):
@@ -127,11 +128,6 @@ def _checked(isolas: Any) -> list[Isola]:
     if len({(id(item.system), item.parameter) for item in items}) > 1:
         raise InputError("the isolas belong to several searches: give those of one find_isolas")
     return items
-
-
-def _check_probes(probes: Any, low: float, high: float) -> None:
-    if not is_count(probes, 0) and not all(is_number(value) and low <= value <= high for value in listed(probes)):
-        raise InputError(f"probes must be how many, or numbers within the bounds ({low:g}, {high:g}), not {probes!r}")
 
 
 @dataclass(eq=False)

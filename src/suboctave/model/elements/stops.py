@@ -174,6 +174,13 @@ def _laws_of(
     return tuple((index, kind(side, *(c[i] for i in index))) for index, side in own)
 
 
+def _sharp(rows: list[tuple[int, float, float, float, float]]) -> SharpSampling:
+    """Arctan steps of the side, the stiffness, the place, the width and the constant of each."""
+    sides, stiffness, places, widths, constants = zip(*rows, strict=True)
+    steps = tuple(side * k for side, k in zip(sides, stiffness, strict=True))
+    return SharpSampling(places, widths, sum(constants), sum(0.5 * k for k in stiffness), steps)
+
+
 # ---------------------------------------------------------------------------------------------------------- elements
 class _Stops(Element):
     """Stops of one stiffness: its coefficients are that, a gap for every stop and, of a regularised law, the sharpness.
@@ -231,25 +238,13 @@ class _Stops(Element):
         if not self.regularised:
             return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
         laws = [law for _, law in self._laws(c) if isinstance(law, _Rounded)]
-        return SharpSampling(
-            tuple(law.b for law in laws),
-            tuple(1.0 / law.s for law in laws),
-            sum(law.constant(law.k, 0.0, 0.0) for law in laws),
-            sum(0.5 * law.k for law in laws),
-            tuple(law.side * law.k for law in laws),
-        )
+        return _sharp([(law.side, law.k, law.b, 1.0 / law.s, law.constant(law.k, 0.0, 0.0)) for law in laws])
 
     def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
         if not self.regularised:
             return None
         moved = [(law, *rates[index].tolist()) for index, law in self._laws(c) if isinstance(law, _Rounded)]
-        return SharpSampling(
-            tuple(b for _, _, b, _ in moved),
-            tuple(-s / law.s**2 for law, _, _, s in moved),
-            sum(law.constant(k, b, s) for law, k, b, s in moved),
-            sum(0.5 * k for _, k, _, _ in moved),
-            tuple(law.side * k for law, k, _, _ in moved),
-        )
+        return _sharp([(law.side, k, b, -s / law.s**2, law.constant(k, b, s)) for law, k, b, s in moved])
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         forces, slopes = zip(*(law.tangent(u) for _, law in self._laws(c)), strict=True)

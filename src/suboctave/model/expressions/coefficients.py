@@ -147,7 +147,8 @@ ZERO = _number(0.0)
 
 
 def _from_text(text: str) -> Coefficient:
-    form = read(text, "", FUNCTIONS, _not_in_coefficients)
+    refused = {"t": "time cannot occur in a coefficient; periodic forces are loads"}
+    form = read(text, "", FUNCTIONS, refused.get)
     if form.constant is not None:
         return _number(form.constant, text)
 
@@ -157,7 +158,3 @@ def _from_text(text: str) -> Coefficient:
         return expression_of(form)
 
     return Coefficient(text, form.names, form.evaluate, form.affine, symbolic)
-
-
-def _not_in_coefficients(name: str) -> str | None:
-    return "time cannot occur in a coefficient; periodic forces are loads" if name == "t" else None
