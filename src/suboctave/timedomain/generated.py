@@ -43,8 +43,10 @@ import numpy as np
 from numba import njit
 
 from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control, follow
-from suboctave.timedomain.lane_functions import absolute, arccos, arcsin, arctan, arctan_log, call_back, cos, cosh, exp
-from suboctave.timedomain.lane_functions import heaviside, log, maximum, sign, sin, sine_cosine, sinh, sqrt, tan, tanh
+from suboctave.timedomain.lane_functions import arccos, arcsin, arctan, arctan_log, call_back, cos, cosh, exp
+from suboctave.timedomain.lane_functions import heaviside, log, sin, sine_cosine, sinh, sqrt, tan, tanh
+
+absolute, maximum, sign = abs, max, np.sign
 '''
 _DECORATOR = '@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})'
 

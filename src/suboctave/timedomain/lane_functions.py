@@ -20,11 +20,6 @@ from llvmlite import ir
 from numba import config, njit, types
 from numba.extending import intrinsic
 
-__all__ = [
-    "CALLBACK", "absolute", "arccos", "arcsin", "arctan", "arctan_log", "call_back", "cos", "cosh", "exp", "heaviside",
-    "log", "maximum", "sign", "sin", "sine_cosine", "sinh", "sqrt", "tan", "tanh",
-]  # fmt: skip
-
 #: interpreted, the functions of `math` would raise where compiled ones give inf or nan
 _functions: Any = np if config.DISABLE_JIT else math
 sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, exp, log, sqrt = (
@@ -165,20 +160,5 @@ def sine_cosine(x):
 
 
 @njit(inline="always")
-def maximum(a, b):
-    return a if a > b else b
-
-
-@njit(inline="always")
-def absolute(a):
-    return abs(a)
-
-
-@njit(inline="always")
 def heaviside(a, b):
     return 1.0 if a > 0.0 else 0.0
-
-
-@njit(inline="always")
-def sign(a):
-    return 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
