@@ -59,11 +59,12 @@ def motion(c: ComplexArray, zr: Array, zi: Array) -> Array:
 
 def wave_sums(coefficients: ComplexArray, zr: Array, zi: Array) -> ComplexArray:
     """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
-    parts = np.empty((len(coefficients), 2, 1, len(zr)))
-    for c, (real, imaginary) in zip(coefficients, parts, strict=True):
-        displacement(c, zr, zi, real)
-        displacement(-1j * c, zr, zi, imaginary)
-    sums: ComplexArray = parts[:, 0, 0] + 1j * parts[:, 1, 0]
+    sums = np.empty((len(coefficients), len(zr)), dtype=complex)
+    parts = np.empty((2, 1, len(zr)))
+    for c, out in zip(coefficients, sums, strict=True):
+        displacement(c, zr, zi, parts[0])
+        displacement(-1j * c, zr, zi, parts[1])
+        out.real, out.imag = parts[0], parts[1]
     return sums
 
 

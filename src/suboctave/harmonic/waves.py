@@ -92,12 +92,16 @@ def as_waves(shaped: np.ndarray, kind: Kind, left: bool) -> ComplexArray:
     """Amplitudes (F, size) of rows of the operator's basis, frequencies ascending."""
     if kind is Kind.FREE:
         return shaped.astype(complex)
-    scale = 1.0 if left else 0.5
-    if kind is Kind.HALF:
-        positive = scale * (shaped[::2] - 1j * shaped[1::2])
-        return np.concatenate((positive[::-1].conj(), positive))
-    positive = scale * (shaped[1::2] - 1j * shaped[2::2])
-    return np.concatenate((positive[::-1].conj(), shaped[:1].astype(complex), positive))
+    mean = kind is Kind.INTEGER
+    count = len(shaped) // 2
+    scale, waves = 1.0 if left else 0.5, np.empty((2 * count + mean, shaped.shape[1]), dtype=complex)
+    real, imaginary = waves.real, waves.imag
+    np.multiply(shaped[mean::2], scale, out=real[count + mean :])
+    np.multiply(shaped[mean + 1 :: 2], -scale, out=imaginary[count + mean :])
+    real[:count], imaginary[:count] = real[: -count - 1 : -1], -imaginary[: -count - 1 : -1]
+    if mean:
+        waves[count] = shaped[0]
+    return waves
 
 
 def fourier(values: np.ndarray, weights: Array, zr: Array, zi: Array, top: int) -> ComplexArray:

@@ -20,6 +20,7 @@ from suboctave.harmonic.aft.sampled import Sampled
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import graded_nodes
 from suboctave.harmonic.trigonometric import motion, spectra
+from suboctave.lazy import lazy
 from suboctave.model.elements.base import Element
 from suboctave.model.elements.smoothness import SharpSampling
 
@@ -49,23 +50,24 @@ class ArctanSteps(Sampled):
         """See `LawAlong.add_spectra`."""
         add_law(self.along, out, steps=self.steps, line=self.line)
 
+    @lazy
+    def _bell(self) -> tuple[Array, Array, Array]:
+        """`y / w` and `1 / (1 + (y / w)^2)` of every step at the nodes, (S, N), and `s / (pi w)`, (S,)."""
+        place, width, size = self.steps.T
+        ratio = (self.path[3] - place[:, None]) / width[:, None]
+        return ratio, 1.0 / (1.0 + ratio * ratio), size / (math.pi * width)
+
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
-        zr, zi, w, u, _ = self.path
-        weights = np.zeros_like(u)
-        for place, width, size in self.steps.tolist():
-            ratio = (u - place) / width
-            weights += size / (math.pi * width) / (1.0 + ratio * ratio)
-        return [Second(zr, zi, self.along.in_displacement(w * weights, 2))]
+        zr, zi, w, _, _ = self.path
+        _, share, factors = self._bell
+        return [Second(zr, zi, self.along.in_displacement(w * (factors @ share), 2))]
 
     def third(self) -> list[Third]:
         """See `LawAlong.third`."""
-        zr, zi, w, u, _ = self.path
-        weights = np.zeros_like(u)
-        for place, width, size in self.steps.tolist():
-            ratio = (u - place) / width
-            share = 1.0 / (1.0 + ratio * ratio)
-            weights -= 2.0 * size / (math.pi * width**2) * ratio * share * share
+        zr, zi, w, _, _ = self.path
+        ratio, share, factors = self._bell
+        weights = (factors / self.steps[:, 1]) @ (-2.0 * ratio * share * share)
         return [Third(zr, zi, self.along.in_displacement(w * weights, 3), None)]
 
     def add_change(self, rates: dict[int, Array], out: ComplexArray) -> None:
