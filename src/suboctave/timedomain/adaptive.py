@@ -40,13 +40,15 @@ _DRIVER = """
 @njit(cache=True, nogil=True, error_model="numpy")
 def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks, measure, growth):
     rows = z.reshape(-1, {lanes})
+    # not literals, for each of which `control` would be compiled anew
+    n, corners, count = np.int64({n}), np.int64({corners}), np.int64({count})
     if start:
         begin(z, address)
     for tried in range(budget):
         attempt(z, address)
         done = 0
         for l in range({lanes}):
-            done += control(rows, l, at, {n}, {corners}, samples, skip, tolerance, out, peaks, measure)
+            done += control(rows, l, at, n, corners, samples, skip, tolerance, out, peaks, measure)
             {follow}
         if done == {lanes}:
             return 1
@@ -75,8 +77,8 @@ def adaptive_rows(layout: Layout, lanes: int, count: int) -> Rows:
 def adaptive_functions(layout: Layout, lanes: int, count: int) -> list[str]:
     """The functions that integrate `lanes` trajectories of this layout, each with `count` tangent vectors."""
     rows = adaptive_rows(layout, lanes, count)
-    follow = f"follow(rows, l, at, {layout.n}, {count}, skip, growth)" if count else ""
-    driver = _DRIVER.format(lanes=lanes, n=layout.n, corners=layout.corners, follow=follow)
+    follow = "follow(rows, l, at, n, count, skip, growth)" if count else ""
+    driver = _DRIVER.format(lanes=lanes, n=layout.n, corners=layout.corners, count=count, follow=follow)
     return [_AdaptiveCode(layout, rows, count).begin(), _AdaptiveCode(layout, rows, count).attempt(), driver]
 
 
