@@ -30,36 +30,34 @@ from suboctave.model.expressions.reader import CORNERS, FUNCTIONS, PRIME, Evalua
 _LARGEST_INTEGER = 10**12
 
 
-class Step(sympy.Function):
+class _Corner(sympy.Function):
+    """A function with a corner or a jump where its argument is zero; `slope` is its derivative on either side."""
+
+    slope: type[sympy.Function] | None = None
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """The regular part."""
+        return sympy.S.Zero if self.slope is None else self.slope(self.args[0])
+
+
+class Step(_Corner):
     """1 where its argument is positive, else 0."""
 
-    def fdiff(self, argindex: int = 1) -> Any:
-        """Zero away from the jump."""
-        return sympy.S.Zero
 
-
-class Sign(sympy.Function):
+class Sign(_Corner):
     """Sign of its argument."""
 
-    def fdiff(self, argindex: int = 1) -> Any:
-        """Zero away from the jump."""
-        return sympy.S.Zero
 
-
-class Ramp(sympy.Function):
+class Ramp(_Corner):
     """`max(a, 0)`."""
 
-    def fdiff(self, argindex: int = 1) -> Any:
-        """On either side of the"""
-        return Step(self.args[0])
+    slope = Step
 
 
-class Modulus(sympy.Function):
+class Modulus(_Corner):
     """`|a|` of a real argument."""
 
-    def fdiff(self, argindex: int = 1) -> Any:
-        """On either side of the"""
-        return Sign(self.args[0])
+    slope = Sign
 
 
 class PositiveRamp(sympy.Function):

@@ -58,18 +58,21 @@ class Law:
         Names that are neither states nor time, sorted.
     corner_input
         Which of the displacements has the corners; they are known as such if it is the first.
+    phase, rough
+        The symbol of omega t; whether a power that is no integer begins at a corner.
     depends_on_velocity, time_harmonic
         Whether a velocity occurs; the highest multiple of the load's frequency, 0 without time.
     """
 
     def __init__(self, expression: Any, states: tuple[str, ...], where: str) -> None:
-        self.where = where
+        self.where, self.phase = where, symbol(_THETA)
+        self._compiled: dict[str, Callable[..., Array]] = {}
         rates = [name + PRIME for name in states]
         self.depends_on_velocity = any(symbol(rate) in expression.free_symbols for rate in rates)
         self.q = [symbol(name) for name in (*states, *(rates if self.depends_on_velocity else ()))]
         self.count = len(states)
         self.expression, self.time_harmonic = _with_phase(expression, where)
-        taken = {*self.q, symbol(_THETA)}
+        taken = {*self.q, self.phase}
         for one in sorted(self.expression.free_symbols - taken, key=str):
             if PRIME in one.name:
                 raise InputError(f"{where}: {one.name.replace(PRIME, chr(39))} cannot occur in a force")
@@ -80,7 +83,7 @@ class Law:
         self.corner_input = 0
         self._degree, self._corner_places = self._smoothness()
         powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
-        self._rough = any(power.base.has(Ramp, Modulus, Step) for power in powers)
+        self.rough = any(power.base.has(Ramp, Modulus, Step) for power in powers)
 
     # ------------------------------------------------------------------------------------------------ smoothness
     def _smoothness(self) -> tuple[int | None, list[tuple[int, Any]] | None]:
@@ -108,7 +111,7 @@ class Law:
     def _place(self, argument: Any) -> tuple[int, Any] | None:
         """Row of q and its value at which an argument vanishes, if it depends on that one alone, and linearly."""
         rows = [r for r, state in enumerate(self.q) if state in argument.free_symbols]
-        if len(rows) != 1 or symbol(_THETA) in argument.free_symbols:
+        if len(rows) != 1 or self.phase in argument.free_symbols:
             return None
         slope = argument.diff(self.q[rows[0]])
         if slope.free_symbols.intersection(self.q):
@@ -140,14 +143,14 @@ class Law:
 
     def _polynomial(self) -> int | None:
         """Total degree in q of a polynomial whose time enters by sines and cosines, else None."""
-        waves = [a for a in _functions(self.expression) if symbol(_THETA) in a.free_symbols]
+        waves = [a for a in _functions(self.expression) if self.phase in a.free_symbols]
         swapped, generators, harmonics = self.expression, list(self.q), [0] * len(self.q)
         for i, wave in enumerate(waves):
             stand_in = sympy.Symbol(f"wave_{i}")
             swapped = swapped.subs(wave, stand_in)
             generators.append(stand_in)
-            harmonics.append(abs(int(wave.args[0].coeff(symbol(_THETA)))))
-        if symbol(_THETA) in swapped.free_symbols or not swapped.is_polynomial(*generators):
+            harmonics.append(abs(int(wave.args[0].coeff(self.phase))))
+        if self.phase in swapped.free_symbols or not swapped.is_polynomial(*generators):
             return None
         if expanded_size(swapped) > 1000:
             return None
@@ -170,13 +173,9 @@ class Law:
         rows = [row for row, _ in self._corner_places]
         points = sorted({float(v) for row, v in zip(rows, values, strict=True) if row == 0})
         velocities = sorted({float(v) for row, v in zip(rows, values, strict=True) if row})
-        return CornerSampling(tuple(points), tuple(velocities), self._rough)
+        return CornerSampling(tuple(points), tuple(velocities), self.rough)
 
     # ------------------------------------------------------------------------------------------------ derivatives
-    @functools.cached_property
-    def _compiled(self) -> dict[str, Callable[..., Array]]:
-        return {}
-
     def _code(self, what: str, parts: list[Any] | Callable[[], list[Any]]) -> Callable[..., Array]:
         if what not in self._compiled:
             self._compiled[what] = self._compile(parts() if callable(parts) else parts)
@@ -202,16 +201,6 @@ class Law:
         names = {state.name: states[i] for i, state in enumerate(self.q)}
         names |= {one.name: number(i) for i, one in enumerate(self.c)} | {_THETA: "theta", **more}
         return lines_of_code([_off_corners(part) for part in parts], names, f"{prefix}w")
-
-    @property
-    def phase(self) -> Any:
-        """The symbol of omega t."""
-        return symbol(_THETA)
-
-    @property
-    def rough(self) -> bool:
-        """Whether a power that is no integer begins at a"""
-        return self._rough
 
     def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         """`(f, f_q)`, shapes (N,), (Q, N)."""
