@@ -31,7 +31,7 @@ import suboctave as so
 from suboctave.continuation import newton
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.tracked import events as tracked_events, follow as track_follow, hidden as tracked_hidden
-from suboctave.results.tracked_branch import TrackedBranch
+from suboctave.results.branch import TrackedBranch
 
 REPEATS = 7
 

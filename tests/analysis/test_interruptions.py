@@ -13,7 +13,7 @@ from suboctave import interruption
 from suboctave.continuation.ending import Ending, EndReason, interruption_of, read_endings, sentence
 from suboctave.curves import follow as follow_module
 from suboctave.interruption import Interruption
-from suboctave.results.files.branch import branch_from_dataset, branch_to_dataset
+from suboctave.results.files import branch_from_dataset, branch_to_dataset
 
 #: everything public that may take long
 VERBS = (

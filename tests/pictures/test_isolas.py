@@ -13,12 +13,10 @@ from suboctave.pictures import plot, plot_boundaries, plot_space
 from suboctave.pictures.boundary import boundary_drawing
 from suboctave.pictures.browser import figure_data
 from suboctave.pictures.isolas import surface
-from suboctave.pictures.periods import period_colour
 from suboctave.pictures.report import write_report
 from suboctave.pictures.space import space_drawing
-from suboctave.pictures.style import tinted
-from suboctave.store.isolas import isolas_dataset
-from suboctave.store.layout import EventRow, curve_dataset
+from suboctave.pictures.style import period_colour, tinted
+from suboctave.store.layout import EventRow, curve_dataset, isolas_dataset
 
 TOP, BOTTOM, MIDDLE = 0.5, 0.1, 2.0
 

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.pictures.periods import period_colour
+from suboctave.pictures.style import period_colour
 from suboctave.store.motions import motion_dataset, motion_datasets
 
 OMEGA = 1.7

@@ -10,9 +10,8 @@ from matplotlib.colors import to_hex, to_rgb
 
 from suboctave.pictures import plot_response
 from suboctave.pictures.browser import figure_data
-from suboctave.pictures.periods import period_colour, period_name
 from suboctave.pictures.response import response_drawing
-from suboctave.pictures.style import INK, KINDS, tinted
+from suboctave.pictures.style import INK, KINDS, period_colour, period_name, tinted
 from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.linspace(1.0, 2.0, 21)

@@ -9,8 +9,7 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.results.readings.contacts import contact_of, gapped_elements, peak_force
-from suboctave.results.readings.readings import read_reading
+from suboctave.results.readings import contact_of, gapped_elements, peak_force, read_reading
 from suboctave.timedomain import integrate
 
 M, C, K, P = 2.0, 0.1, 3.0, 0.4

@@ -7,7 +7,7 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.results.readings.sweep import hysteresis, sweep_path
+from suboctave.results.sweep import hysteresis, sweep_path
 from suboctave.store.layout import EventRow, curve_dataset
 from suboctave.timedomain import integrate
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from slow import slow
 
 import suboctave as so
-from suboctave.store.columns import led_by, parameter_column
+from suboctave.store.layout import led_by, parameter_column
 from suboctave.study.screen import print_events
 
 

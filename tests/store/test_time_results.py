@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import suboctave as so
-from suboctave.store.blocks import pack, unpack
+from suboctave.store.files import pack, unpack
 from suboctave.store.registry import from_datasets, to_datasets
 from suboctave.store.table import Table
 from suboctave.study.results import Results

@@ -55,7 +55,7 @@ from suboctave.kinds import KINDS, MOTION_KINDS, TRACKED_KINDS
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, timed
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.results.tracked_branch import TrackedBranch
+from suboctave.results.branch import TrackedBranch
 
 Range = tuple[float, float]
 

@@ -27,9 +27,8 @@ from suboctave.model.inputs import check_count, check_omega, check_range, start_
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.store.arrays import padded
 from suboctave.store.journal import Journal
-from suboctave.store.plain import from_json, to_json
+from suboctave.store.plain import from_json, padded, to_json
 from suboctave.timedomain.flow import Flow, Report, check_extent
 
 if TYPE_CHECKING:
@@ -175,7 +174,7 @@ class Basins(TimeResult):
 
         Options are those of `pictures.plot_basins`: `points`, `title`, `size`.
         """
-        from suboctave.pictures.chaos import plot_basins
+        from suboctave.pictures.in_time import plot_basins
 
         marks = [one.points[:, self._columns()] for one in self.attractors] if self.system.n == 1 else None
         return plot_basins(self.to_xarray(), path, **{"points": marks, **options})

@@ -33,7 +33,7 @@ from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
-from suboctave.store.columns import parameter_column
+from suboctave.store.layout import parameter_column
 from suboctave.timedomain.flow import Flow, check_extent
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, numbers_of, observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
-from suboctave.store.arrays import flat
+from suboctave.store.plain import flat
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table, write_csv
 from suboctave.timedomain.flow import METHODS, Flow

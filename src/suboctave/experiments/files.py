@@ -24,10 +24,8 @@ from suboctave.experiments.poincare import PoincareSections
 from suboctave.experiments.stepped_sine import SteppedSine
 from suboctave.experiments.trajectories import Trajectory
 from suboctave.model.system import System, build
-from suboctave.store.arrays import array_of, flat
-from suboctave.store.plain import from_json, to_json
+from suboctave.store.plain import array_of, flat, from_json, system_arrays, to_json, written_system
 from suboctave.store.registry import Codec, Datasets, register
-from suboctave.store.systems import system_arrays, written_system
 from suboctave.timedomain.trapping import Trap
 
 if TYPE_CHECKING:

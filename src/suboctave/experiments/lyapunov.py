@@ -154,7 +154,7 @@ class LyapunovExponents(TimeResult):
 
         Options are those of `pictures.plot_lyapunov`: `count`, `title`, `size`.
         """
-        from suboctave.pictures.chaos import plot_lyapunov
+        from suboctave.pictures.in_time import plot_lyapunov
 
         return plot_lyapunov(self.to_xarray(), path, **options)
 
@@ -473,7 +473,7 @@ class Separation(TimeResult):
 
         Options are those of `pictures.plot_separation`: `most`, `title`, `size`.
         """
-        from suboctave.pictures.chaos import plot_separation
+        from suboctave.pictures.in_time import plot_separation
 
         return plot_separation(self.to_xarray(), path, **options)
 

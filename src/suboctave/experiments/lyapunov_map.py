@@ -24,7 +24,7 @@ from suboctave.model.inputs import check_count, check_parameter, start_state, ti
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.store.columns import parameter_column
+from suboctave.store.layout import parameter_column
 from suboctave.timedomain.flow import Flow, check_extent
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class LyapunovMap(TimeResult):
 
         Options are those of `pictures.plot_lyapunov_map`: `title`, `size`.
         """
-        from suboctave.pictures.chaos import plot_lyapunov_map
+        from suboctave.pictures.in_time import plot_lyapunov_map
 
         lines = []
         for curve in [curves] if isinstance(curves, CriticalCurve) else curves:

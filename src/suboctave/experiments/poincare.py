@@ -16,7 +16,7 @@ from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.store.columns import parameter_column
+from suboctave.store.layout import parameter_column
 from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.period_recognition import extents, period_of, same_cycle
 

@@ -33,9 +33,8 @@ from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_count, check_parameter, check_range, check_system
 from suboctave.model.system import System
 from suboctave.progress import reporting
-from suboctave.results.branch import Branch
+from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.results.tracked_branch import TrackedBranch
 
 #: share of the range of omega by which branches are followed beyond what they are to hold
 _MARGIN = 0.02

@@ -2,7 +2,7 @@
 
 Isolas as datasets that a file or the journal can hold, and back.
 
-A head as `suboctave.store.isolas` lays it out; curves of limit points and of period doublings as `limit_points_0`, ...,
+A head as `suboctave.store.layout` lays it out; curves of limit points and of period doublings as `limit_points_0`, ...,
 `doublings_0`, ...; the closed branches that are known as `closed_0`, ..., in the order of the head's dimension
 `closed`. What else there is of the isolas is JSON in `record`: the pieces of curves that their limit points lie on, by
 the curve and the number along it, their ends, by the curve and the index of the event, and the options.
@@ -35,14 +35,11 @@ from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.slices import Arc, Edge, Slice, Strip
 from suboctave.model.system import System, build
-from suboctave.results.branch import Branch
-from suboctave.results.files.branch import branch_from_dataset, branch_to_dataset
-from suboctave.results.tracked_branch import TrackedBranch
-from suboctave.store.arrays import flat
-from suboctave.store.columns import parameter_column
-from suboctave.store.plain import from_json, to_json
+from suboctave.results.branch import Branch, TrackedBranch
+from suboctave.results.files import branch_from_dataset, branch_to_dataset
+from suboctave.store.layout import parameter_column
+from suboctave.store.plain import flat, from_json, system_arrays, to_json, written_system
 from suboctave.store.registry import Codec, parts_of, register
-from suboctave.store.systems import system_arrays, written_system
 
 if TYPE_CHECKING:
     import xarray

@@ -35,8 +35,7 @@ from suboctave.curves.refine import solved_bifurcation
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.results.branch import Branch
-from suboctave.results.tracked_branch import TrackedBranch
+from suboctave.results.branch import Branch, TrackedBranch
 
 #: places between two points of a curve at which the interpolation is tabulated
 _BETWEEN = 16

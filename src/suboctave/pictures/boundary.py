@@ -32,13 +32,19 @@ from suboctave.pictures.drawing import (
     plain,
 )
 from suboctave.pictures.isolas import CENTRE, MERGING, end_text, shade, split, with_ends
-from suboctave.pictures.layers import add_strokes, check_count, checked, events_of, named_axis
+from suboctave.pictures.layers import (
+    add_strokes,
+    check_count,
+    checked,
+    differing,
+    events_of,
+    fixed_parameters,
+    named_axis,
+)
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import figure_of
-from suboctave.pictures.periods import period_colour, period_name, period_of
 from suboctave.pictures.strokes import Line, line_through
-from suboctave.pictures.style import Mark, Pen, places_among, tinted
-from suboctave.pictures.words import differing, fixed_parameters
+from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
 
 if TYPE_CHECKING:
     import xarray

@@ -1,6 +1,6 @@
 """Isolas in pictures: their regions and ends in a plane, the surfaces that their closed branches lie on in space.
 
-Drawn from the dataset that `suboctave.store.isolas` describes, given among those of the curves. `plot_isola_map` shows
+Drawn from the dataset that `suboctave.store.layout` describes, given among those of the curves. `plot_isola_map` shows
 where in the plane of two design parameters isolas exist.
 """
 
@@ -16,8 +16,7 @@ import numpy as np
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Region
 from suboctave.pictures.paper import figure_of
-from suboctave.pictures.periods import period_colour, period_name
-from suboctave.pictures.style import Pen, tinted
+from suboctave.pictures.style import Pen, period_colour, period_name, tinted
 from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:

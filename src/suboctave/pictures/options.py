@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 import numpy as np
 
 from suboctave.errors import InputError, suggest
-from suboctave.pictures.periods import period_of
+from suboctave.pictures.style import period_of
 from suboctave.store.layout import check_component, coordinate, has_component, reading_name
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Raster
 from suboctave.pictures.layers import check_count
 from suboctave.pictures.paper import DOT, figure_of
-from suboctave.pictures.periods import period_colour
-from suboctave.pictures.style import Pen, rgb, tinted
+from suboctave.pictures.style import Pen, period_colour, rgb, tinted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,12 +16,19 @@ from suboctave.errors import InputError
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, ordered, plain
-from suboctave.pictures.layers import Seen, add_strokes, check_count, checked, events_of, named_axis
+from suboctave.pictures.layers import (
+    Seen,
+    add_strokes,
+    check_count,
+    checked,
+    differing,
+    events_of,
+    fixed_parameters,
+    named_axis,
+)
 from suboctave.pictures.options import Coordinates, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
-from suboctave.pictures.periods import curve_styles, period_name, period_of, several_periods
-from suboctave.pictures.style import Pen
-from suboctave.pictures.words import differing, fixed_parameters
+from suboctave.pictures.style import Pen, curve_styles, period_name, period_of, several_periods
 
 if TYPE_CHECKING:
     import xarray

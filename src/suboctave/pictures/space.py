@@ -33,9 +33,8 @@ from suboctave.pictures.isolas import CENTRE, is_isolas, shade, split, surface, 
 from suboctave.pictures.layers import add_strokes, checked, events_of, seen_as
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
-from suboctave.pictures.periods import period_colour, period_name, period_of
 from suboctave.pictures.strokes import cut, line_through
-from suboctave.pictures.style import Pen, tinted
+from suboctave.pictures.style import Pen, period_colour, period_name, period_of, tinted
 from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:

@@ -14,10 +14,9 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError
 from suboctave.interruption import Interruption
-from suboctave.results.branch import Branch
-from suboctave.results.curve_tables import CurveTables
-from suboctave.results.readings.readings import shared
-from suboctave.store.columns import led_by
+from suboctave.results.branch import Branch, CurveTables
+from suboctave.results.readings import shared
+from suboctave.store.layout import led_by
 
 if TYPE_CHECKING:
     import pandas

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from suboctave.errors import InputError, path_of
-from suboctave.store.blocks import pack, unpack
+from suboctave.store.files import pack, unpack
 
 if TYPE_CHECKING:
     import xarray

@@ -1,4 +1,5 @@
-"""Options, contacts, audits and the like as plain data that JSON holds, and back without loss.
+"""What files hold as JSON and as arrays: options, contacts, audits and the like as plain data, and back without loss;
+complex arrays as pairs of real variables; systems with their large arrays as variables.
 
 Tuples, complex numbers, numbers that are not finite, arrays and dataclasses are wrapped in a mapping of one key that
 says what they are. Dataclasses come back only as one of the classes that the reader names: a file cannot choose.
@@ -9,13 +10,17 @@ from __future__ import annotations
 import dataclasses
 import json
 import numbers
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.model.description import plain_number
+from suboctave.model.system import System, describe
+
+if TYPE_CHECKING:
+    import xarray
 
 
 def to_json(value: Any) -> str:
@@ -77,3 +82,66 @@ def _value(plain: Any, classes: Mapping[str, type]) -> Any:
                 name, fields = inside
                 return classes[name](**{key: _value(item, classes) for key, item in fields.items()})
     return {name: _value(item, classes) for name, item in plain.items()}
+
+
+# --------------------------------------------------------------------------------------------------------------- arrays
+_PARTS = ("real", "imag")
+
+
+def flat(variables: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
+    """Variables (dimensions, values, ...) with complex ones as pairs `..._real`, `..._imag`, objects as texts."""
+    for name, (dims, values, *attributes) in variables.items():
+        array = np.asarray(values)
+        if array.dtype.kind == "c":
+            for part in _PARTS:
+                yield f"{name}_{part}", (dims, getattr(array, part), *attributes)
+        else:
+            yield str(name), (dims, array.astype(str) if array.dtype.kind == "O" else array, *attributes)
+
+
+def array_of(dataset: xarray.Dataset, name: str) -> np.ndarray:
+    """A variable that `flat` wrote, complex again if it was."""
+    if name in dataset:
+        return np.asarray(dataset[name].values)
+    real, imag = (np.asarray(dataset[f"{name}_{part}"].values) for part in _PARTS)
+    # arithmetic would change zeros and spread what is not finite
+    joined = np.empty(real.shape, dtype=complex)
+    joined.real, joined.imag = real, imag
+    return joined
+
+
+def padded(rows: Sequence[Any], kind: type) -> np.ndarray:
+    """Rows of several lengths as a table, nan behind the shorter ones."""
+    table: np.ndarray = np.full((len(rows), max((len(row) for row in rows), default=0)), np.nan, dtype=kind)
+    for line, row in zip(table, rows, strict=True):
+        line[: len(row)] = row
+    return table
+
+
+# -------------------------------------------------------------------------------------------------------------- systems
+class Prefixed(dict[str, np.ndarray]):
+    """Gives the arrays of systems names of their own among the variables of a file."""
+
+    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
+        self.arrays = arrays
+
+    def __len__(self) -> int:
+        return len(self.arrays)
+
+    def __setitem__(self, key: str, value: np.ndarray) -> None:
+        self.arrays[f"system_{key}"] = value
+
+
+def written_system(system: System) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """A system as plain data, and its large arrays as variables of a file."""
+    arrays: dict[str, np.ndarray] = {}
+    return describe(system, Prefixed(arrays)), arrays
+
+
+def system_arrays(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
+    """The large arrays of systems among the variables of a file, by the names that descriptions have for them."""
+    return {
+        str(name)[len("system_") :]: np.asarray(variable.values)
+        for name, variable in dataset.variables.items()
+        if str(name).startswith("system_array_")
+    }

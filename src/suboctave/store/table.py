@@ -13,7 +13,7 @@ from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
-from suboctave.store.arrays import array_of, flat
+from suboctave.store.plain import array_of, flat
 from suboctave.store.registry import Codec, Datasets, Stored, from_datasets, parts_of, register, to_datasets
 
 if TYPE_CHECKING:

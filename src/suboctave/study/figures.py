@@ -24,7 +24,7 @@ from suboctave.pictures.plot import datasets_of
 from suboctave.pictures.style import size_in_inches
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.results.readings.contacts import gapped_elements
+from suboctave.results.readings import gapped_elements
 from suboctave.store.motions import motion_datasets
 from suboctave.study.results import Result
 from suboctave.study.steps.base import (

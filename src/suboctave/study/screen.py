@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from suboctave.store.columns import parameter_column
+from suboctave.store.layout import parameter_column
 
 if TYPE_CHECKING:
     import xarray

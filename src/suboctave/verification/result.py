@@ -17,10 +17,13 @@ import numpy as np
 from suboctave.continuation.problem import Array
 from suboctave.experiments.common import TimeResult
 from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch
-from suboctave.store.arrays import flat, padded
-from suboctave.store.columns import parameter_column
+from suboctave.results.files import branch_from_dataset, branch_to_dataset
+from suboctave.store.layout import parameter_column
+from suboctave.store.plain import array_of, flat, from_json, padded, to_json
+from suboctave.store.registry import Codec, parts_of, register
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -28,7 +31,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["BranchVerification", "VerifiedBifurcation", "VerifiedPoint", "verification_dataset"]
 
 AGREES, DISAGREES, OPEN = "agrees", "disagrees", "cannot tell"
 
@@ -197,7 +199,7 @@ class BranchVerification(TimeResult):
 
         Options are those of `pictures.plot_verified`: `title`, `size`.
         """
-        from suboctave.pictures.verified import plot_verified
+        from suboctave.pictures.in_time import plot_verified
 
         name = self.branch.name
         at = self.branch.parameter(name)
@@ -245,3 +247,48 @@ def verification_dataset(check: BranchVerification) -> xarray.Dataset:
         "suboctave": __version__,
     }
     return xarray.Dataset(dict(flat(variables)), attrs=attributes)
+
+
+# ---------------------------------------------------------------------------------------- files: a head, and the branch
+def verification_to_datasets(check: BranchVerification) -> dict[str, xarray.Dataset]:
+    """The head under the name "", and the branch."""
+    import xarray
+
+    head = verification_dataset(check)
+    record = {
+        "multipliers": [len(p.multipliers) for p in check.points],
+        "errors": [len(p.errors) for p in check.points],
+        "parameters": [dict(e.parameters) for e in check.bifurcations],
+    }
+    variables = {name: (v.dims, v.values, v.attrs) for name, v in head.variables.items()}
+    variables["record"] = ((), np.array(to_json(record)), {"long_name": "numbers of multipliers, parameters, as JSON"})
+    stored = xarray.Dataset(variables, attrs={**head.attrs, "parts": "branch"})
+    return {"": stored, "branch": branch_to_dataset(check.branch)}
+
+
+def verification_from_datasets(
+    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
+) -> BranchVerification:
+    """The verification that `verification_to_datasets` wrote."""
+    branch = branch_from_dataset(parts_of(groups, ["branch"], "verification")["branch"], allow_code, linear)
+    head = groups[""]
+    record = from_json(str(head["record"].item()))
+    columns = {name: array_of(head, name) for name in (*POINT_COLUMNS, *VERDICTS, "multipliers", "multiplier_errors")}
+    points = []
+    for i, (count, errors) in enumerate(zip(record["multipliers"], record["errors"], strict=True)):
+        known: dict[str, Any] = {name: kind(columns[name][i]) for name, kind in POINT_COLUMNS.items()}
+        known |= {name: None if columns[name][i] < 0 else bool(columns[name][i]) for name in VERDICTS}
+        points.append(VerifiedPoint(
+            multipliers=columns["multipliers"][i, :count].copy(),
+            errors=columns["multiplier_errors"][i, :errors].copy(), **known,
+        ))  # fmt: skip
+    met = {name: array_of(head, f"event_{name}") for name in EVENT_COLUMNS}
+    events = [
+        VerifiedBifurcation(parameters=values, **{name: kind(met[name][i]) for name, kind in EVENT_COLUMNS.items()})
+        for i, values in enumerate(record["parameters"])
+    ]
+    tolerance, complete = float(head.attrs["tolerance"]), bool(head.attrs["complete"])
+    return BranchVerification(branch, tuple(points), tuple(events), tolerance, complete)
+
+
+register(Codec("verification", BranchVerification, verification_to_datasets, verification_from_datasets))

@@ -33,8 +33,8 @@ from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece, across, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, timed
 from suboctave.model.system import System
-from suboctave.results.tracked_branch import TrackedBranch
-from suboctave.store.columns import parameter_column
+from suboctave.results.branch import TrackedBranch
+from suboctave.store.layout import parameter_column
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table
 

@@ -21,11 +21,9 @@ from suboctave.interruption import Interruption, limited
 from suboctave.maps.catalogue import SearchRange, branch_through, is_count, listed
 from suboctave.maps.pieces import MonotonePiece, stable_ranges
 from suboctave.model.system import System
-from suboctave.results.branch import Branch
-from suboctave.results.readings.readings import shared
-from suboctave.results.tracked_branch import TrackedBranch
-from suboctave.store.columns import led_by
-from suboctave.store.isolas import isolas_dataset
+from suboctave.results.branch import Branch, TrackedBranch
+from suboctave.results.readings import shared
+from suboctave.store.layout import isolas_dataset, led_by
 from suboctave.store.registry import Stored
 from suboctave.store.table import write_csv
 
@@ -375,7 +373,7 @@ class Isolas(Stored, Sequence[Isola]):
     def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
         """Datasets by name: "isolas" (one entry each, and their edges), all curves, the closed branches known.
 
-        `suboctave.store.isolas` describes the first, `Branch.to_xarray` the others.
+        `suboctave.store.layout` describes the first, `Branch.to_xarray` the others.
         """
         words = {"LP": "limit points", "PD": "period doublings"}
         named: dict[str, tuple[Branch, dict[str, Any]]] = {

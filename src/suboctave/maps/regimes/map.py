@@ -35,8 +35,8 @@ from suboctave.maps.regimes.slices import Arc, Regime, Strip, regime_of
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.progress import reporting
-from suboctave.results.tracked_branch import TrackedBranch
-from suboctave.store.columns import parameter_column
+from suboctave.results.branch import TrackedBranch
+from suboctave.store.layout import parameter_column
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table
 

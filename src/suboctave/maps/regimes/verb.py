@@ -38,8 +38,7 @@ from suboctave.maps.regimes.slices import Slice, Strip, follow_curves_beside, fo
 from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
-from suboctave.results.branch import Branch
-from suboctave.results.tracked_branch import TrackedBranch
+from suboctave.results.branch import Branch, TrackedBranch
 
 #: a multiplier this close to -1 asks for slices beside it, as far as this share of the range apart
 _NEARLY, _FINE = 0.6, 1.0 / 32.0

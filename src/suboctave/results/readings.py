@@ -4,10 +4,23 @@ A motion is `x(t) = Re sum_k c_k exp(i k omega t / nu)`. With the c_k known, eve
 that was solved: mean squares by Parseval's identity, largest values by Newton's method on the derivative, contacts by
 the instants at which gaps are crossed. Phases: `c_k = |c_k| exp(i phase)`, so that the component at `k omega` is
 `|c_k| cos(k omega t + phase)`; a response that lags behind a load `cos(omega t)` has a negative phase.
+
+Contact is told by the place of the gap: a piecewise-linear law is in contact where one of its pieces acts, a law with a
+rounded corner (`SharpSampling`) or a corner in a text where the displacement is beyond the place at which it is sharp,
+on its stiffer side. The instants at which gaps are crossed are exact up to rounding (`harmonic.instants`).
+
+In a rigid translation r no internal force does work, so that the force on the ground along r is that of everything that
+holds the structure,
+
+    F(t) = r . (K x + C x' + sum_e d_e f_e),
+
+springs, dampers and elements between degrees of freedom cancelling out by themselves. With the force applied,
+`P(t) = r . p(t)`, the transmissibility of harmonic k is `|F_k| / |P_k|`.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +30,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.continuation.problem import Array
+from suboctave.bifurcation.gaps import contact_side, levels
 from suboctave.errors import InputError, shortened, suggest
-from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_complex
+from suboctave.harmonic.orbit import PeriodicOrbit, force_along
+from suboctave.harmonic.quadrature import search_grid
+from suboctave.harmonic.trigonometric import crossings, extrema, peak
+from suboctave.model.elements.smoothness import levels as levels_of
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
-from suboctave.results.readings import contacts, transmission
-from suboctave.store.columns import parameter_column
-from suboctave.store.layout import check_component, has_component, reading_name
+from suboctave.store.layout import check_component, has_component, parameter_column, reading_name
 
 if TYPE_CHECKING:
     import xarray
@@ -87,15 +102,15 @@ class BranchReadings:
         return self._of("impacts", None, self._gapped(element))
 
     def _gapped(self, element: int | None) -> int:
-        return check_element(self.system, element, contacts.gapped_elements(self.system))
+        return check_element(self.system, element, gapped_elements(self.system))
 
     def transmitted_force(self, direction: ArrayLike | None = None) -> Array:
         """Largest |F| over a period of the force that springs, dampers and elements pass on to the ground.
 
         `direction`: the rigid translation r (n,) along which it is taken; all DOFs alike unless told.
         """
-        r = transmission.translation(self.system.n, direction)
-        return self._over(lambda orbit: transmission.largest(transmission.ground_and_load(orbit, r)[0]))
+        r = translation(self.system.n, direction)
+        return self._over(lambda orbit: largest(ground_and_load(orbit, r)[0]))
 
     def transmissibility(self, harmonic: float | None = 1, direction: ArrayLike | None = None) -> Array:
         """Force on the ground over force applied, by amplitudes at `harmonic`, or by largest values (None).
@@ -108,7 +123,7 @@ class BranchReadings:
         InputError
             If no force is applied along the direction at that harmonic anywhere on the branch.
         """
-        r = transmission.translation(self.system.n, direction)
+        r = translation(self.system.n, direction)
         return _somewhere(self._over(lambda orbit: _force_ratio(orbit, harmonic, r)), harmonic)
 
     def motion_ratio(self, dof: int, reference: int, harmonic: float | None = 1) -> Array:
@@ -138,11 +153,11 @@ class BranchReadings:
             return []
         names = [*_OF_A_DOF, "harmonic_1", "phase_1"]
         names += [f"peak_force_{i}" for i in range(len(self.system.elements))]
-        names += [f"{what}_{i}" for i in contacts.gapped_elements(self.system) for what in _OF_A_GAP]
+        names += [f"{what}_{i}" for i in gapped_elements(self.system) for what in _OF_A_GAP]
         orbit = self.orbits[0]
         if orbit.balance.size == self.system.n:
             names.append("transmitted_force")
-            if any(transmission.of_harmonic(_applied(o), 1, o.basis.nu) for o in self.orbits):
+            if any(of_harmonic(_applied(o), 1, o.basis.nu) for o in self.orbits):
                 names.append("transmissibility")
         return names
 
@@ -170,7 +185,7 @@ class Reading:
         kind = READINGS[self.what]
         if self.what in _OF_AN_ELEMENT and len(orbits):
             system = orbits[0].balance.system
-            gapped = contacts.gapped_elements(system) if self.what in _OF_A_GAP else None
+            gapped = gapped_elements(system) if self.what in _OF_A_GAP else None
             check_element(system, int(self.number or 0), gapped)
         values = np.array([kind.read(orbit, dof, self.number or 0.0) for orbit in orbits])
         return _phases(values) if self.what == "phase" else values.astype(float)
@@ -195,12 +210,12 @@ class _Kind:
 
 
 def _force_ratio(orbit: PeriodicOrbit, harmonic: float | None, r: Array) -> float:
-    ground, load = transmission.ground_and_load(orbit, r)
+    ground, load = ground_and_load(orbit, r)
     if harmonic is None:
-        sizes = transmission.largest(ground), transmission.largest(load)
+        sizes = largest(ground), largest(load)
     else:
         nu = orbit.basis.nu
-        sizes = transmission.of_harmonic(ground, harmonic, nu), transmission.of_harmonic(load, harmonic, nu)
+        sizes = of_harmonic(ground, harmonic, nu), of_harmonic(load, harmonic, nu)
     return sizes[0] / sizes[1] if sizes[1] else np.nan
 
 
@@ -216,11 +231,11 @@ def _somewhere(ratios: Array, harmonic: float | None) -> Array:
 
 
 def _applied(orbit: PeriodicOrbit) -> np.ndarray:
-    return transmission.ground_and_load(orbit, np.ones(orbit.balance.system.n))[1]
+    return ground_and_load(orbit, np.ones(orbit.balance.system.n))[1]
 
 
 def _ground(orbit: PeriodicOrbit) -> float:
-    return transmission.largest(transmission.ground_and_load(orbit, np.ones(orbit.balance.system.n))[0])
+    return largest(ground_and_load(orbit, np.ones(orbit.balance.system.n))[0])
 
 
 READINGS: Mapping[str, _Kind] = {
@@ -234,14 +249,10 @@ READINGS: Mapping[str, _Kind] = {
     "acceleration_rms": _Kind(lambda o, dof, _: o.rms(dof, 2), "root mean square of d2x/dt2", "length / time^2"),
     "harmonic": _Kind(lambda o, dof, k: abs(o.harmonic(k, dof)), "amplitude of x", "length", "harmonic"),
     "phase": _Kind(lambda o, dof, k: o.harmonic(k, dof), "phase of x, negative where it lags", "rad", "harmonic"),
-    "peak_force": _Kind(
-        lambda o, _, i: contacts.peak_force(o, int(i)), "largest |force| over a period", "force", "element"
-    ),
-    "contact_share": _Kind(
-        lambda o, _, i: contacts.contact_of(o, int(i))[0], "share of the period in contact", "1", "element"
-    ),
+    "peak_force": _Kind(lambda o, _, i: peak_force(o, int(i)), "largest |force| over a period", "force", "element"),
+    "contact_share": _Kind(lambda o, _, i: contact_of(o, int(i))[0], "share of the period in contact", "1", "element"),
     "impacts": _Kind(
-        lambda o, _, i: contacts.contact_of(o, int(i))[1], "contacts begun per period of the motion", "1", "element"
+        lambda o, _, i: contact_of(o, int(i))[1], "contacts begun per period of the motion", "1", "element"
     ),
     "transmitted_force": _Kind(lambda o, _dof, _: _ground(o), "largest |force| on the ground over a period", "force"),
     "transmissibility": _Kind(
@@ -332,3 +343,107 @@ def _phases(amplitudes: np.ndarray) -> Array:
     there = np.isfinite(phases)
     phases[there] = np.unwrap(phases[there])
     return phases
+
+
+# ----------------------------------------------------------------------------------- contacts: force, duration, impacts
+#: samples around each candidate, and how often the search narrows around the best of them: 16^-9 = 1e-11 of a sample
+_AROUND, _ROUNDS = 33, 9
+#: candidates whose surroundings are searched
+_CANDIDATES = 8
+
+
+def gapped_elements(system: System) -> list[int]:
+    """Indices of the elements that have a gap: a displacement at which contact begins."""
+    coefficients = [(element, element.coefficient_values(system.parameters)) for element in system.elements]
+    return [index for index, (element, c) in enumerate(coefficients) if levels_of(element.sampling(c), c)]
+
+
+def contact_of(orbit: PeriodicOrbit, element: int) -> tuple[float, int]:
+    """Share of the period in which an element is in contact, and how often contact begins in one period of the motion.
+
+    An element with several gaps is in contact where any of its sides is. One that is always in contact is never struck.
+    """
+    local = orbit.state().local(element)
+    grid = search_grid(local.motion.shape[0] - 1)
+    sides = []
+    for index, level in enumerate(levels(local)):
+        crossed, above = crossings(local.motion, level, grid.zr, grid.zi)
+        sides.append((np.sort(crossed), bool(above), contact_side(local, index) > 0))
+    every = np.sort(np.concatenate([crossed for crossed, _, _ in sides]))
+    if every.size == 0:
+        return (1.0 if any(above == right for _, above, right in sides) else 0.0), 0
+    ends = np.append(every, every[0] + 2.0 * math.pi)
+    middle = np.mod(0.5 * (ends[:-1] + ends[1:]), 2.0 * math.pi)
+    touching = np.zeros(middle.size, dtype=bool)
+    for crossed, above, right in sides:
+        now = (np.searchsorted(crossed, middle) % 2 == 1) != above
+        touching |= now == right
+    share = float(np.sum(np.diff(ends)[touching]) / (2.0 * math.pi))
+    return share, int(np.count_nonzero(touching & ~np.roll(touching, 1)))
+
+
+def peak_force(orbit: PeriodicOrbit, element: int) -> float:
+    """Largest |f| of an element over a period, of its law on the motion (not of a truncated series of the force).
+
+    Candidates are the extrema of the displacements it reads, where a law of displacement alone that only grows has its
+    peaks, and the largest samples; the surroundings of each are narrowed down to rounding.
+    """
+    state = orbit.state()
+    motions, force = state.local(element).motions, force_along(state, element)
+    high = motions[0].shape[0] - 1
+    step = 2.0 * math.pi / (8 * high + 64)
+    grid = search_grid(high)
+    turns = np.concatenate([extrema(motion, grid.zr, grid.zi)[0] for motion in motions])
+    tau = np.concatenate([turns, step * np.arange(8 * high + 64)])
+
+    size = np.abs(force(tau))
+    best = float(size.max())
+    centres = tau[np.argsort(-size, kind="stable")[:_CANDIDATES]]
+    offsets = np.linspace(-1.0, 1.0, _AROUND)
+    for _ in range(_ROUNDS):
+        around = centres[:, None] + step * offsets
+        size = np.abs(force(around.ravel())).reshape(around.shape)
+        centres = around[np.arange(len(centres)), size.argmax(axis=1)]
+        best = max(best, float(size.max()))
+        step *= 2.0 / (_AROUND - 1)
+    return best
+
+
+# ---------------------------------------------------------- the force on the ground, and its ratio to the force applied
+def translation(n: int, direction: ArrayLike | None) -> Array:
+    """The rigid translation r (n,): all DOFs alike unless told."""
+    if direction is None:
+        return np.ones(n)
+    given: Any = direction
+    try:
+        r = np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        r = np.zeros(0)
+    if r.shape != (n,) or not np.all(np.isfinite(r)) or not r.any():
+        raise InputError(f"direction must be a vector of {n} finite numbers, not all zero, not {given!r}")
+    return r
+
+
+def ground_and_load(orbit: PeriodicOrbit, r: Array) -> tuple[ComplexArray, ComplexArray]:
+    """Complex amplitudes (H + 1,) of the force on the ground and of the force applied, along r."""
+    state, balance = orbit.state(), orbit.balance
+    if balance.size != balance.system.n:
+        raise InputError(
+            "the force on the ground needs the motion of the whole structure; this model is condensed onto "
+            f"{balance.size} of its {balance.system.n} degrees of freedom"
+        )
+    _, damping, stiffness = balance.system.matrices(orbit.values)
+    rate = 1j * orbit.basis.multiples * orbit.omega
+    held = orbit.amplitudes @ (r @ stiffness) + rate * (orbit.amplitudes @ (r @ damping))
+    return held + to_complex(state.force) @ r, to_complex(balance.load(orbit.values, orbit.omega)) @ r
+
+
+def of_harmonic(amplitudes: ComplexArray, k: float, nu: int) -> float:
+    """Amplitude at `k omega` of a force or motion with these complex amplitudes; 0 beyond them."""
+    index = harmonic_index(k, nu)
+    return float(abs(amplitudes[index])) if index < len(amplitudes) else 0.0
+
+
+def largest(amplitudes: ComplexArray) -> float:
+    """Largest modulus over a period."""
+    return peak(np.ascontiguousarray(amplitudes), 8 * len(amplitudes))[0]

@@ -1,9 +1,16 @@
-"""A branch as a dataset that holds all of it, and back: what `Branch.save`, `load` and the journal of a study keep.
+"""Branches and diagrams as datasets that hold all of them, and back: what `save` and the journal of a study keep.
 
-The dataset of `Branch.to_xarray()` (`suboctave.store.layout`) with complex numbers as pairs of variables `..._real`,
-`..._imag`, and besides on `point`: `coefficients` (point x coefficient x unknown, padded with zeros), `arclength`,
-`iterations`, `multiplier_errors`; on `event` the same under `event_...` and the null vectors. What is neither a number
-per point nor per event is JSON in the variable `record`. docs/results.md describes it for readers without this package.
+Of a branch: the dataset of `Branch.to_xarray()` (`suboctave.store.layout`) with complex numbers as pairs of variables
+`..._real`, `..._imag`, and besides on `point`: `coefficients` (point x coefficient x unknown, padded with zeros),
+`arclength`, `iterations`, `multiplier_errors`; on `event` the same under `event_...` and the null vectors. What is
+neither a number per point nor per event is JSON in the variable `record`. docs/results.md describes it for readers
+without this package.
+
+Of a diagram: a head with one entry for each branch on the dimension `branch`, by number: `label`, `period`, `depth`,
+`parent` (the number of the branch that it leaves, -1 for the response) and `origin` (the index of the bifurcation that
+it leaves at on the dimension `event` of its parent, -1 for a response; that from the other end has the first one for
+its parent); and the branches. Bifurcations that were left out or where nothing could be followed are JSON in `record`,
+by branch and index of the event.
 """
 
 from __future__ import annotations
@@ -30,14 +37,13 @@ from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.interruption import Interruption
 from suboctave.model.system import System, build, describe
-from suboctave.results.branch import Branch
-from suboctave.results.tracked_branch import TrackedBranch, tracked_points, tracked_record
-from suboctave.store.arrays import array_of, flat, padded
+from suboctave.results.branch import Branch, TrackedBranch, tracked_points, tracked_record
+from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.store.layout import branch_dataset, events_met
-from suboctave.store.plain import from_json, to_json
-from suboctave.store.registry import Codec, register
-from suboctave.store.systems import Prefixed, system_arrays
+from suboctave.store.plain import Prefixed, array_of, flat, from_json, padded, system_arrays, to_json
+from suboctave.store.registry import Codec, parts_of, register
 
 if TYPE_CHECKING:
     import xarray
@@ -327,3 +333,79 @@ class _Reader:
             event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
             events.append(event.with_normal_form(stored["normal_form"]) if "normal_form" in stored else event)
         return events
+
+
+# ------------------------------------------------------------------------------------------------------------- diagrams
+_HEAD = {
+    "label": "period, and where the branch begins and ends",
+    "period": "load periods in one response period",
+    "depth": "how many bifurcations away from the response",
+    "parent": "the branch that it leaves, -1 for the response",
+    "origin": "the event of the parent that it leaves at, -1 for a response",
+}
+
+
+def diagram_to_datasets(diagram: BifurcationDiagram) -> dict[str, xarray.Dataset]:
+    """The head under the name "", the branches under "branch_0", "branch_1", ..."""
+    import xarray
+
+    nodes = list(diagram)
+    place = {id(event): i for node in nodes for i, event in enumerate(events_met(node.branch))}
+    parents = [diagram.parent(node) for node in nodes]
+    columns = {
+        "label": np.array([node.label for node in nodes]),
+        "period": np.array([node.branch.nu for node in nodes]),
+        "depth": np.array([node.depth for node in nodes]),
+        "parent": np.array([-1 if parent is None else parent.number for parent in parents]),
+        "origin": np.array([-1 if node.origin is None else place[id(node.origin)] for node in nodes]),
+    }
+    record = {
+        "failures": [[place[id(item)], why] for node in nodes for item, why in node.failures],
+        "failures_of": [node.number for node in nodes for _ in node.failures],
+        "left": [place[id(item)] for node in nodes for item in node.left],
+        "left_of": [node.number for node in nodes for _ in node.left],
+        "interruption": diagram.interruption,
+    }
+    variables: dict[str, Any] = {
+        name: ("branch", values, {"long_name": _HEAD[name]}) for name, values in columns.items()
+    }
+    variables["record"] = ((), np.array(to_json(record)), {"long_name": "what was left out, as JSON"})
+    head = xarray.Dataset(variables, attrs={"branches": len(nodes), "stopped": diagram.stopped})
+    if diagram.seconds == diagram.seconds:
+        head.attrs["seconds"] = float(diagram.seconds)
+    return {"": head} | {f"branch_{node.number}": branch_to_dataset(node.branch) for node in nodes}
+
+
+def diagram_from_datasets(
+    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
+) -> BifurcationDiagram:
+    """The diagram that `diagram_to_datasets` wrote, the same tree with equal branches."""
+    head = groups[""]
+    count = int(head.attrs["branches"])
+    parts = parts_of(groups, [f"branch_{i}" for i in range(count)], "diagram")
+    branches = [branch_from_dataset(part, allow_code, linear) for part in parts.values()]
+    met: list[Any] = [events_met(branch) for branch in branches]
+    nodes = [DiagramBranch(branches[0])]
+    for number in range(1, count):
+        parent = nodes[int(head["parent"].values[number])]
+        event = int(head["origin"].values[number])
+        if event < 0:
+            nodes.append(DiagramBranch(branches[number], number=number))
+        else:
+            origin, crossed = met[parent.number][event], parent.branch.bifurcations["BP"]
+            nodes.append(DiagramBranch(branches[number], origin, parent.depth + 1, number, met=crossed))
+        parent.children.append(nodes[-1])
+    record = from_json(str(head["record"].item()), {"Interruption": Interruption})
+    for number, (event, why) in zip(record["failures_of"], record["failures"], strict=True):
+        nodes[number].failures.append((met[number][event], why))
+    for number, event in zip(record["left_of"], record["left"], strict=True):
+        nodes[number].left.append(met[number][event])
+    stopped = str(head.attrs.get("stopped", ""))
+    # older files hold the words alone
+    noted = Interruption() if stopped.startswith("interrupted") else None
+    diagram = BifurcationDiagram(nodes[0], stopped, record.get("interruption", noted))
+    diagram.seconds = float(head.attrs.get("seconds", np.nan))
+    return diagram
+
+
+register(Codec("diagram", BifurcationDiagram, diagram_to_datasets, diagram_from_datasets))

@@ -1,1 +1,0 @@
-"""Quantities read off the motions of a branch."""
