@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 
 from suboctave.errors import InputError
-from suboctave.pictures.strokes import bent, strokes, without_repeats
+from suboctave.pictures.strokes import bent, cut, line, without_repeats
 from suboctave.store.layout import EventRow, curve_dataset
 
 X = np.arange(5.0)
+
+
+def strokes(dataset, x):
+    return cut(dataset, line(dataset, x))
 
 
 def curve(stable, events, **more):

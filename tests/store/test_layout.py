@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from suboctave.pictures.strokes import strokes
+from suboctave.pictures.strokes import cut, line
 from suboctave.store.layout import branch_dataset
 
 
@@ -76,7 +76,8 @@ def test_an_event_at_the_very_end_lies_in_the_last_step():
 
 def test_between_two_events_of_one_step_the_multipliers_tell():
     def verdicts(stable, first, second):
-        return [piece.stable for piece in strokes(branch_dataset(branch(stable, [first, second])), "p")]
+        data = branch_dataset(branch(stable, [first, second]))
+        return [piece.stable for piece in cut(data, line(data, "p"))]
 
     lone = event("PD", 0.2, [-1, 0.3], -1), event("PD", 0.8, [-1, 0.3], -1)
     assert verdicts([1, 1], *lone) == [True, False, True]
@@ -94,5 +95,5 @@ def test_a_users_event_changes_nothing():
     mine = event("mine", 0.2, [0.5, 0.2], 0.5)
     doubling = event("PD", 0.8, [-1, 0.3], -1)
     dataset = branch_dataset(branch([1, 0], [doubling], [mine]))
-    assert [piece.stable for piece in strokes(dataset, "p")] == [True, False]
+    assert [piece.stable for piece in cut(dataset, line(dataset, "p"))] == [True, False]
     assert list(dataset["event_stable_after"].to_numpy()) == [1, 0]

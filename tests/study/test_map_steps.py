@@ -71,7 +71,7 @@ def test_a_region_of_isolas(study_file, suboctave):
         (STUDY, "bounds = [0.05, 0.4]", "bounds = [0.4, 0.4]", ["bounds", "different"]),
         (STUDY, "omega = [2.0, 0.8]", "omega = [2.0, -0.8]", ["omega", "positive"]),
         (STUDY, "depth = 0", "depth = -1", ["depth"]),
-        (STUDY, "depth = 0", "search = [3, 0]", ["search", "at least 1"]),
+        (STUDY, "depth = 0", "search = [3, 0]", ["search", "1 or more"]),
         (STUDY, "depth = 0", "parameters = { F = 1.0 }", ["parameters", "varies"]),
         (STUDY, "depth = 0", "observe = 3", ["observe", "out of range"]),
         (ISOLAS, 'second = "k1"', 'second = "F"', ["second", "another parameter"]),

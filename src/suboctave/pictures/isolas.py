@@ -7,7 +7,6 @@ where in the plane of two design parameters isolas exist.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,29 +33,6 @@ _PALE, _PALE_MAP = 0.82, 0.72
 _SAMPLES = 60
 
 
-@dataclass(frozen=True)
-class IsolaRegion:
-    """Where one isola is, in the plane of frequency and parameter: `low` and `high` omega at ascending values.
-
-    `parameter` is the name of the design parameter, `words` what a legend says, `colour` that of its period.
-    """
-
-    parameter: str
-    words: str
-    colour: str
-    value: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-    def outline(self, names: Sequence[str | None]) -> np.ndarray | None:
-        """Once around it in the plane of two axes, (2, vertices); None where these are not omega and its parameter."""
-        if set(names) != {"omega", self.parameter}:
-            return None
-        omega = np.concatenate([self.low, self.high[::-1], self.low[:1]])
-        value = np.concatenate([self.value, self.value[::-1], self.value[:1]])
-        return np.array([omega if name == "omega" else value for name in names])
-
-
 def is_isolas(dataset: xarray.Dataset) -> bool:
     """Whether a dataset is that of isolas."""
     return bool(dataset.attrs.get("isolas"))
@@ -73,35 +49,25 @@ def split(datasets: Sequence[xarray.Dataset]) -> tuple[list[xarray.Dataset], lis
     return [dataset for dataset in datasets if not is_isolas(dataset)], heads
 
 
-def isola_regions(heads: Sequence[xarray.Dataset]) -> list[IsolaRegion]:
-    """The region of each isola."""
-    regions = []
-    for head in heads:
-        which = head["edge_isola"].to_numpy()
-        value, low, high = (head[f"edge_{name}"].to_numpy() for name in ("value", "low", "high"))
-        for number, nu in enumerate(head["period"].to_numpy()):
-            own, words = which == number, f"{period_name(int(nu))} isola"
-            colour = period_colour(int(nu))
-            regions.append(IsolaRegion(parameter_of(head), words, colour, value[own], low[own], high[own]))
-    return regions
-
-
 def shade(
     heads: Sequence[xarray.Dataset], names: Sequence[str | None], factors: np.ndarray, floor: float | None = None
 ) -> list[Region]:
     """The regions of isolas in the plane of two axes, if it is theirs; in space on the floor, at this height."""
     shaded = []
-    for region in isola_regions(heads):
-        outline = region.outline(names)
-        if outline is None:
+    for head in heads:
+        if set(names) != {"omega", parameter_of(head)}:
             continue
-        outline = outline * factors[:2, None]
-        colour = tinted(region.colour, _PALE)
-        if floor is None:
-            shaded.append(Region(outline, colour, role="isola", layer=1.5, name=region.words, group=region.words))
-        else:
-            outline = np.vstack([outline, np.full(outline.shape[1], floor)])
-            shaded.append(Region(outline, colour, role="isola-floor", layer=0.9))
+        for number, nu in enumerate(head["period"].to_numpy()):
+            own, words = head["edge_isola"].to_numpy() == number, f"{period_name(int(nu))} isola"
+            value, low, high = (head[f"edge_{name}"].to_numpy()[own] for name in ("value", "low", "high"))
+            around = np.concatenate([low, high[::-1], low[:1]]), np.concatenate([value, value[::-1], value[:1]])
+            outline = np.array([around[name != "omega"] for name in names]) * factors[:2, None]
+            colour = tinted(period_colour(int(nu)), _PALE)
+            if floor is None:
+                shaded.append(Region(outline, colour, role="isola", layer=1.5, name=words, group=words))
+            else:
+                outline = np.vstack([outline, np.full(outline.shape[1], floor)])
+                shaded.append(Region(outline, colour, role="isola-floor", layer=0.9))
     return shaded
 
 

@@ -71,11 +71,6 @@ def line(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> Line:
     return line_through(dataset, np.array(points), np.array(events))
 
 
-def strokes(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> list[Stroke]:
-    """The curve over parameter `x`, cut where stability changes; `y` is a variable of the dataset."""
-    return cut(dataset, line(dataset, x, y))
-
-
 def cut(dataset: xarray.Dataset, whole: Line) -> list[Stroke]:
     """The line of a curve, cut where stability changes."""
     drawn = Stroke(whole.at, whole.point, whole.event, None)

@@ -106,7 +106,10 @@ def _laid_out(
 
 
 def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]) -> xarray.Dataset:
-    check_motion_layout(dataset)
+    if dataset.attrs.get("contents") != _CONTENTS:
+        raise InputError("this dataset is no motion: give the branch with points=, or one of its orbits")
+    if int(dataset.attrs["layout"]) > LAYOUT:
+        raise InputError(f"this dataset has layout {dataset.attrs['layout']}, newer than {LAYOUT}: update suboctave")
     there = int(dataset.attrs["dof"])
     if dof is not None and dof != there:
         raise InputError(f"this dataset holds the motion of DOF {there}, not of DOF {dof}")
@@ -114,14 +117,6 @@ def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]
     if missing:
         raise InputError(f"this dataset has no force of element {min(missing)}: lay it out with elements=")
     return dataset
-
-
-def check_motion_layout(dataset: xarray.Dataset) -> None:
-    """Raises InputError where the dataset is not one of `motion_dataset` of this version."""
-    if dataset.attrs.get("contents") != _CONTENTS:
-        raise InputError("this dataset is no motion: give the branch with points=, or one of its orbits")
-    if int(dataset.attrs["layout"]) > LAYOUT:
-        raise InputError(f"this dataset has layout {dataset.attrs['layout']}, newer than {LAYOUT}: update suboctave")
 
 
 def motion_dataset(

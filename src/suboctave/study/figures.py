@@ -224,17 +224,22 @@ def _branches_of(item: Result) -> list[Branch]:
     return [item] if isinstance(item, Branch) and len(item) else []
 
 
-class ResponseFigure(CurveFigure):
+class PlaneFigure(CurveFigure):
+    """Curves in a plane: their names, what of the axes is shown, and the kinds of events that are marked."""
+
+    labels: list[str] | None = None
+    xlim: _Limits | None = None
+    ylim: _Limits | None = None
+    marks: list[str] | None = None
+
+
+class ResponseFigure(PlaneFigure):
     """Response curves. Curves of bifurcations are drawn among them where `x` is given and they are named.
 
     Of isolas that are named the closed branches known are drawn, or those at the values `at`.
     """
 
     kind: str = "response"
-    labels: list[str] | None = None
-    xlim: _Limits | None = None
-    ylim: _Limits | None = None
-    marks: list[str] | None = None
     at: list[float] | None = None
 
     def drawn(self, planes: Mapping[str, tuple[str, str] | None]) -> list[str]:
@@ -255,15 +260,11 @@ class ResponseFigure(CurveFigure):
         plot_response(datasets, path, x=self.x, labels=labels, title=self.title, size=self.size, view=view)
 
 
-class BoundaryFigure(CurveFigure):
+class BoundaryFigure(PlaneFigure):
     """Curves of bifurcations and regions of isolas in the plane of two parameters; with a `quantity`, this upwards."""
 
     kind: Literal["boundary"]
     y: str | None = None
-    labels: list[str] | None = None
-    xlim: _Limits | None = None
-    ylim: _Limits | None = None
-    marks: list[str] | None = None
 
     @property
     def projected(self) -> bool:

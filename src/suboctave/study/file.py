@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from suboctave.errors import InputError, path_of, suggest
+from suboctave.errors import path_of, suggest
 from suboctave.model.system import System, describe
 from suboctave.study.figures import FIGURES, Figure, StudyCurves
 from suboctave.study.mistakes import Lines, Mistake, Mistakes, StudyError
@@ -220,11 +220,14 @@ def _steps(
             step = _validated(STEPS[kind], named, place, mistakes)
             steps.append(step)
             if step is not None and system is not None:
-                around = _around(step, system, before, known, mistakes, place, allow_code)
-                wrong = list(_checked(step, around)) if around is not None else []
-                for where, text in wrong:
-                    mistakes.add((*place, *where), text)
-                motions = step.known(around) if around is not None and not wrong else None
+                here, motions = overridden(system, step.parameters, (*place, "parameters"), mistakes), None
+                if here is not None:
+                    around = CheckContext(here, before, allow_code, known)
+                    with mistakes.at(*place):
+                        wrong = list(step.check(around))
+                        for where, text in wrong:
+                            mistakes.add((*place, *where), text)
+                        motions = None if wrong else step.known(around)
                 if motions is not None:
                     known[step.name] = motions
         name = given.get("name", kind)
@@ -240,26 +243,6 @@ def _steps(
         if isinstance(kind, str) and kind in STEPS:
             before[name] = STEPS[kind]
     return steps
-
-
-def _around(
-    step: Step,
-    system: System,
-    before: Mapping[str, type[Step]],
-    known: Mapping[str, Known],
-    mistakes: Mistakes,
-    place: tuple[str | int, ...],
-    allow_code: bool,
-) -> CheckContext | None:
-    here = overridden(system, step.parameters, (*place, "parameters"), mistakes)
-    return None if here is None else CheckContext(here, before, allow_code, known)
-
-
-def _checked(step: Step, around: CheckContext) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    try:
-        yield from step.check(around)
-    except InputError as error:
-        yield (), str(error)
 
 
 def _outputs(

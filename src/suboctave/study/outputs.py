@@ -18,10 +18,10 @@ from suboctave.pictures.paper import SUFFIXES
 from suboctave.pictures.style import check_text
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.study.figures import Figure, StudyCurves, drawable
+from suboctave.study.figures import StudyCurves, drawable
 from suboctave.study.results import Result, Results
 from suboctave.study.steps import Step
-from suboctave.study.steps.base import Complaint
+from suboctave.study.steps.base import Complaint, tried
 
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 #: bytes of a file name: disks take 255, and half a name more is needed while it is written
@@ -55,7 +55,8 @@ def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
         key = ("figures", index)
         names.append(((*key, "file"), figure.file))
         yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
-        yield from _wrong_texts(figure, key)
+        for where, text in figure.texts:
+            yield from (((*key, *where), why) for _, why in tried("", partial(check_text, text)))
         yield from (((*key, *where), text) for where, text in figure.check(study))
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):
@@ -76,14 +77,6 @@ def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
 
 def _printable(name: str) -> bool:
     return all(character.isprintable() for character in name)
-
-
-def _wrong_texts(figure: Figure, key: Key) -> Iterator[Complaint]:
-    for where, text in figure.texts:
-        try:
-            check_text(text)
-        except InputError as error:
-            yield (*key, *where), str(error)
 
 
 def _wrong_suffix(key: Key, name: str, suffixes: Sequence[str]) -> Iterator[Complaint]:

@@ -168,7 +168,35 @@ class BranchVerification(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Points and bifurcations with their outcomes; the branch itself is `branch.to_xarray()`."""
-        return verification_dataset(self)
+        import xarray
+
+        points, events = self.points, self.bifurcations
+        variables: dict[str, Any] = {
+            name: ("point", np.array([getattr(p, name) for p in points], dtype=kind))
+            for name, kind in POINT_COLUMNS.items()
+        }
+        for name in VERDICTS:
+            verdicts = (getattr(p, name) for p in points)
+            variables[name] = (
+                "point",
+                np.array([-1 if verdict is None else int(verdict) for verdict in verdicts], dtype=int),
+            )
+        variables["multipliers"] = (("point", "multiplier"), padded([p.multipliers for p in points], complex))
+        variables["multiplier_errors"] = (("point", "error"), padded([p.errors for p in points], float))
+        variables |= {
+            f"event_{name}": ("event", np.array([getattr(e, name) for e in events], dtype=kind))
+            for name, kind in EVENT_COLUMNS.items()
+        }
+        attributes = {
+            "contents": "verification",
+            "free": self.branch.name,
+            "tolerance": self.tolerance,
+            "complete": int(self.complete),
+            "said": self.summary,
+            "system": self.branch.system.name,
+            "suboctave": __version__,
+        }
+        return xarray.Dataset(dict(flat(variables)), attrs=attributes)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per point: distance, true multiplier that leads, errors, verdicts, outcome and reason."""
@@ -216,45 +244,12 @@ class BranchVerification(TimeResult):
         return "\n".join(lines)
 
 
-def verification_dataset(check: BranchVerification) -> xarray.Dataset:
-    """Points and bifurcations that were looked at, and what was found; see the top of this module."""
-    import xarray
-
-    points, events = check.points, check.bifurcations
-    variables: dict[str, Any] = {
-        name: ("point", np.array([getattr(p, name) for p in points], dtype=kind))
-        for name, kind in POINT_COLUMNS.items()
-    }
-    for name in VERDICTS:
-        verdicts = (getattr(p, name) for p in points)
-        variables[name] = (
-            "point",
-            np.array([-1 if verdict is None else int(verdict) for verdict in verdicts], dtype=int),
-        )
-    variables["multipliers"] = (("point", "multiplier"), padded([p.multipliers for p in points], complex))
-    variables["multiplier_errors"] = (("point", "error"), padded([p.errors for p in points], float))
-    variables |= {
-        f"event_{name}": ("event", np.array([getattr(e, name) for e in events], dtype=kind))
-        for name, kind in EVENT_COLUMNS.items()
-    }
-    attributes = {
-        "contents": "verification",
-        "free": check.branch.name,
-        "tolerance": check.tolerance,
-        "complete": int(check.complete),
-        "said": check.summary,
-        "system": check.branch.system.name,
-        "suboctave": __version__,
-    }
-    return xarray.Dataset(dict(flat(variables)), attrs=attributes)
-
-
 # ---------------------------------------------------------------------------------------- files: a head, and the branch
 def verification_to_datasets(check: BranchVerification) -> dict[str, xarray.Dataset]:
     """The head under the name "", and the branch."""
     import xarray
 
-    head = verification_dataset(check)
+    head = check.to_xarray()
     record = {
         "multipliers": [len(p.multipliers) for p in check.points],
         "errors": [len(p.errors) for p in check.points],

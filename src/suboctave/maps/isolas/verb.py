@@ -113,7 +113,7 @@ def find_isolas(
     catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
     search_at = checked_values(values, catalogue.bounds)
     check_count("depth", depth, 0)
-    other_levels, fine = _checked_levels(levels), check_seeds(seeds) or COARSE
+    other_levels, fine = checked_levels(levels), check_seeds(seeds) or COARSE
     orders = None if search is None else checked_orders(search, 2)
     state = Search(catalogue, search_at)
     with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
@@ -123,7 +123,8 @@ def find_isolas(
     return _result(state)
 
 
-def _checked_levels(levels: Any) -> tuple[float, ...] | None:
+def checked_levels(levels: Any) -> tuple[float, ...] | None:
+    """Levels of the loads at which responses are followed besides; None where the search chooses."""
     if levels is None:
         return None
     given = listed(levels)

@@ -8,9 +8,10 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from suboctave.errors import ConvergenceError, suggest
+from suboctave.maps.catalogue import checked_orders
 from suboctave.maps.isolas.map import isola_map
 from suboctave.maps.isolas.result import Isolas
-from suboctave.maps.isolas.verb import find_isolas
+from suboctave.maps.isolas.verb import checked_levels, find_isolas
 from suboctave.maps.regimes.verb import regime_map
 from suboctave.model.inputs import check_bounds, check_parameter
 from suboctave.store.table import Table
@@ -88,14 +89,8 @@ class FindIsolas(DesignStep):
             yield ("values",), f"must be how many, or values of {self.parameter}, at least one"
         yield from self._check_values(self.values)
         yield from self._check_values(self.at, "at")
-        for i, order in enumerate(self.search or ()):
-            if order < 2:
-                yield ("search", i), f"is a period of at least 2 periods of the load, not {order}"
-        for i, level in enumerate(self.levels or ()):
-            if level <= 0.0:
-                yield ("levels", i), f"is a level of the loads in units of their own, positive, not {level:g}"
-            if level == 1.0:
-                yield ("levels", i), "is that of the loads themselves, at which responses are followed anyway"
+        yield from tried("search", lambda: checked_orders(self.search or (), 2))
+        yield from tried("levels", lambda: checked_levels(self.levels))
 
     def run(self, context: Context) -> Isolas:
         given = self.own("at") | {"seeds": as_seeds(self.seeds)}
@@ -175,9 +170,7 @@ class Regimes(DesignStep):
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        for i, order in enumerate(self.search):
-            if order < 1:
-                yield ("search", i), f"is a period in periods of the load, at least 1, not {order}"
+        yield from tried("search", lambda: checked_orders(self.search, 1))
 
     def run(self, context: Context) -> Table:
         given = self.own("check_points", "seed") | self.options(context)
