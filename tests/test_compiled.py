@@ -103,17 +103,15 @@ def test_several_threads_may_call_a_kernel_while_one_of_them_compiles_it(made):
 
 DIGITS = """
 import numpy as np
-from suboctave.harmonic.aft.closed_form import add_law, product_spectrum
-from suboctave.harmonic.aft.law import Along
+from suboctave.harmonic.quadrature import search_grid
+from suboctave.harmonic.trigonometric import extrema, motion, spectra
 
 high = np.arange(1.0, 41.0)
-motion = np.append(0.1, np.exp(1j * high**2) / high**2)
-pieces, steps = np.array([[2.0, 0.1, 1.0], [1.5, -0.2, -1.0]]), np.array([[0.3, 1e-3, 4.0]])
-out = np.zeros((2, 81), dtype=complex)
-add_law(Along(motion[None], 1.0, 1, False, 80), out, pieces, np.array([0.1, 0.2, 0.3]), steps)
-force, stiffness = out
-product = product_spectrum(motion, 0.0, np.append(stiffness, stiffness[1:41]), 80)
-print(force.tobytes().hex(), stiffness.tobytes().hex(), product.tobytes().hex())
+c, grid = np.append(0.1, np.exp(1j * high**2) / high**2), search_grid(40)
+turns = extrema(c, grid.zr, grid.zi)
+values = motion(c, grid.zr, grid.zi)
+sums = spectra(values, grid.weights, grid.zr, grid.zi, 80)
+print(turns.tobytes().hex(), values.tobytes().hex(), sums.tobytes().hex())
 """
 
 

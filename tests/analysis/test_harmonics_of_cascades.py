@@ -18,6 +18,7 @@ def _shooting(reference, period):
     return sorted(omega for kind, omega, _ in rows if kind == "PD")
 
 
+@pytest.mark.slow
 def test_four_periods_are_those_of_shooting(doubled, reference, tmp_path):
     quadrupled = so.switch_branch(doubled.bifurcations["PD"][1], bounds=(2.5, 3.06))
     # a new choice follows when the estimate has passed the tolerance

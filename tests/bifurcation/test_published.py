@@ -49,6 +49,7 @@ def test_duffing_breaks_its_symmetry(reference, same_events, omega):
     assert even < 1e-9 * curve.amplitude.max()
 
 
+@pytest.mark.slow
 def test_chain_of_ten_masses(chain_data, same_events):
     """Kinds, order and places of shooting. Default options reach what adaptive harmonics promise for events, 3e-7 of
     the motion; the two folds and the Neimark-Sacker points lie within 1e-3 of each other in omega."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 from suboctave.floquet.hill import transition
@@ -27,10 +28,11 @@ def exponents(system):
 
 
 # ------------------------------------------------------------------------------------------------------- shooting
+@pytest.mark.parametrize("each", [4, *slow(1)])
 @each_method
-def test_fifty_motions_by_shooting(fifty, distances, method):
+def test_fifty_motions_by_shooting(fifty, distances, method, each):
     """Within its own error estimate of shooting everywhere, the estimate below 1e-3, every verdict the same."""
-    for draw in fifty:
+    for draw in fifty[::each]:
         result = so.stability(draw.orbit, method)
         assert result.applicable, (draw.name, result)
         assert np.all(distances(result.multipliers, draw.exact) <= result.errors + SHOOTING), (draw.name, result)
@@ -38,6 +40,7 @@ def test_fifty_motions_by_shooting(fifty, distances, method):
         assert result.stable == draw.stable, (draw.name, result)
 
 
+@pytest.mark.slow
 def test_truncations_cancel_in_hills_method(fifty, distances):
     """With contacts the truncated motion alone, or the truncated perturbation alone, move multipliers by up to 1e-4."""
     contacts = [d for d in fifty if d.name.startswith("p=") and "j=0.0" in d.name]
@@ -56,9 +59,9 @@ def test_truncations_cancel_in_hills_method(fifty, distances):
 def test_hill_checks_itself(fifty):
     """Exactly 2 n eigenvalues in the strip, reported on the result."""
     for draw in fifty[::7]:
-        checks = so.stability(draw.orbit, "hill").checks
-        assert checks["inside the strip"] == checks["expected"] == len(draw.exact)
-        assert checks["gap"] >= 0.99 / len(draw.exact)
+        checks, size = so.stability(draw.orbit, "hill").checks, 2 * draw.orbit.system.n
+        assert checks["inside the strip"] == checks["expected"] == size
+        assert checks["gap"] >= 0.99 / size
         assert checks["Liouville"] < 1e-6
 
 
@@ -225,14 +228,14 @@ def check(result, expected):
 def test_multipliers_are_closed_under_conjugation(fifty, method):
     """Of a real equation; a negative real one must not carry an imaginary part."""
     negative = 0
-    for draw in fifty:
+    for draw in fifty[::4]:
         mu = so.stability(draw.orbit, method).multipliers
         assert np.abs(mu[:, None] - mu.conj()[None, :]).min(axis=1).max() < 1e-12 * np.abs(mu).max()
         real = (draw.exact.real < 0.0) & (np.abs(draw.exact.imag) < 1e-9)
         if real.all():
             negative += 1
             assert not mu.imag.any()
-    assert negative >= 3
+    assert negative >= 1
 
 
 @each_witness

@@ -76,6 +76,7 @@ def without_points(tree):
     return re.sub(r"\d+ points, \d+ unstable", "", tree)
 
 
+@pytest.mark.slow
 def test_its_cascade(suboctave, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     made, _ = blocks("python")
