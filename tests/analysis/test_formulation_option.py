@@ -8,7 +8,7 @@ import pytest
 import suboctave as so
 from suboctave.curves.count import CountCheck
 from suboctave.errors import InputError
-from suboctave.study.options import as_formulation
+from suboctave.study.steps.base import as_formulation
 
 #: period doublings of one rattling oscillator with 7 harmonics
 UPPER, LOWER = 3.9697276189, 2.2937474090

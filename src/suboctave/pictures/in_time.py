@@ -33,7 +33,7 @@ from suboctave.pictures.drawing import (
 from suboctave.pictures.layers import check_count
 from suboctave.pictures.options import Coordinates, View, as_multiple, shown_multiple
 from suboctave.pictures.paper import figure_of
-from suboctave.pictures.response import response_frame
+from suboctave.pictures.response import datasets_of, response_frame
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, places_among, rgb, tinted
 
 if TYPE_CHECKING:
@@ -221,8 +221,6 @@ def _beneath(curves: Any, x: str, view: View) -> tuple[Frame, dict[str, Entry]]:
     """The frame with branches over `x`, if any are given, and their entries in the legend."""
     if curves is None:
         return Frame(), {}
-    from suboctave.pictures.plot import datasets_of
-
     return response_frame(datasets_of(curves, view), Coordinates((x, None), view))
 
 

@@ -33,6 +33,7 @@ from suboctave.pictures.isolas import CENTRE, is_isolas, shade, split, surface, 
 from suboctave.pictures.layers import add_strokes, checked, events_of, seen_as
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
+from suboctave.pictures.response import datasets_of
 from suboctave.pictures.strokes import cut, line_through
 from suboctave.pictures.style import Pen, period_colour, period_name, period_of, tinted
 from suboctave.store.layout import coordinate
@@ -90,8 +91,6 @@ def plot_space(
     InputError
         For what cannot be drawn, before anything is.
     """
-    from suboctave.pictures.plot import datasets_of
-
     view = View(**dict[str, Any](options))
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):

@@ -23,7 +23,6 @@ from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
-from suboctave.study.options import as_formulation, as_harmonics, as_newton, as_stability, as_stepping, read_by
 from suboctave.study.steps.base import (
     CheckContext,
     Complaint,
@@ -32,9 +31,15 @@ from suboctave.study.steps.base import (
     Motion,
     Range,
     Step,
+    as_formulation,
+    as_harmonics,
+    as_newton,
+    as_stability,
+    as_stepping,
     check_branch,
     check_motion,
     chosen,
+    read_by,
     tried,
 )
 

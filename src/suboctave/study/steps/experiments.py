@@ -17,7 +17,6 @@ from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine
 from suboctave.model.inputs import check_range, start_state
 from suboctave.results.branch import TrackedBranch
 from suboctave.store.table import Table
-from suboctave.study.options import as_stability
 from suboctave.study.steps.base import (
     CheckContext,
     Complaint,
@@ -28,6 +27,7 @@ from suboctave.study.steps.base import (
     Range,
     Step,
     as_curve,
+    as_stability,
     as_table,
     check_branch,
     check_motion,

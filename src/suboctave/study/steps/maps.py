@@ -15,8 +15,7 @@ from suboctave.maps.isolas.verb import checked_levels, find_isolas
 from suboctave.maps.regimes.verb import regime_map
 from suboctave.model.inputs import check_bounds, check_parameter
 from suboctave.store.table import Table
-from suboctave.study.options import as_seeds, read_by
-from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, tried
+from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, as_seeds, read_by, tried
 from suboctave.study.steps.curves import FollowingStep, check_sweep
 
 
