@@ -176,7 +176,10 @@ def plane_of(dataset: xarray.Dataset) -> tuple[str, str]:
 
 def boundary_names(group: Sequence[xarray.Dataset]) -> list[str]:
     """Kind and period of each, and the parameters in which those of one kind and period differ."""
-    names = [_words(kind_of(dataset), period_of(dataset)) for dataset in group]
+    names = []
+    for kind, nu in ((kind_of(dataset), period_of(dataset)) for dataset in group):
+        periods = f" {period_name(nu)}→{period_name(2 * nu)}" if kind == "PD" else f" of {period_name(nu)}" * (nu > 1)
+        names.append(f"{style.kind_style(kind).name}{periods}")
     full = list(names)
     for name in dict.fromkeys(names):
         alike = [index for index, other in enumerate(names) if other == name]
@@ -184,13 +187,6 @@ def boundary_names(group: Sequence[xarray.Dataset]) -> list[str]:
         for index, own in zip(alike, words, strict=True):
             full[index] = ", ".join([name, *own])
     return full
-
-
-def _words(kind: str, nu: int) -> str:
-    name = style.kind_style(kind).name
-    if kind == "PD":
-        return f"{name} {period_name(nu)}→{period_name(2 * nu)}"
-    return name if nu == 1 else f"{name} of {period_name(nu)}"
 
 
 def boundary_styles(group: Sequence[xarray.Dataset], names: Sequence[str]) -> list[Pen]:

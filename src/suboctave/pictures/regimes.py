@@ -104,8 +104,9 @@ def _colours(regimes: Sequence[Regime]) -> list[str]:
             if nu == 1:
                 colours[key] = tinted("#000000", _GREYS[min(len(key[0]), len(_GREYS)) - 1])
                 continue
+            dark = "#" + "".join(f"{round(0.45 * 255.0 * part):02x}" for part in rgb(period_colour(nu)))
             share = _PALE[0] + (_PALE[1] - _PALE[0]) * place / max(len(group) - 1, 1)
-            colours[key] = tinted(_dark(period_colour(nu)) if beyond else period_colour(nu), share)
+            colours[key] = tinted(dark if beyond else period_colour(nu), share)
     return [colours[_key(regime)] for regime in regimes]
 
 
@@ -128,7 +129,3 @@ def _rank(regime: Regime) -> tuple[Any, ...]:
 
 def _isolated(regime: Regime) -> bool:
     return any(isolated for motions in regime[1:] for _, isolated in motions)
-
-
-def _dark(colour: str) -> str:
-    return "#" + "".join(f"{round(0.45 * 255.0 * part):02x}" for part in rgb(colour))

@@ -78,18 +78,10 @@ class Mistakes:
     def __len__(self) -> int:
         return len(self._mistakes)
 
-    def __bool__(self) -> bool:
-        return bool(self._mistakes)
-
-    @property
-    def sorted(self) -> list[Mistake]:
-        """In the order of the file."""
-        return sorted(self._mistakes, key=lambda mistake: mistake.line)
-
     def refuse(self) -> None:
-        """Raises StudyError if there is any."""
+        """Raises StudyError if there is any, with all of them in the order of the file."""
         if self._mistakes:
-            raise StudyError(self.source, self.sorted)
+            raise StudyError(self.source, sorted(self._mistakes, key=lambda mistake: mistake.line))
 
 
 def _cut(text: str, most: int) -> str:

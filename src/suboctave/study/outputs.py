@@ -131,7 +131,9 @@ def write_outputs(
     path = folder / (outputs.html or "")
     if outputs.html is not None and path not in left and any(drawable(item) for item in results.values()):
         report: Any = importlib.import_module(_REPORT)
-        shown = {name: _shown(item, results.details.get(name, {})) for name, item in results.items() if _worth(item)}
+        # of isolas that none was found is said
+        worth = {name: item for name, item in results.items() if isinstance(item, Isolas) or len(item)}
+        shown = {name: _shown(item, results.details.get(name, {})) for name, item in worth.items()}
         report.write_report(shown, path, title=title or "Study", overwrite=True)
         yield path
     if missing:
@@ -144,11 +146,6 @@ def _shown(item: Result, details: Mapping[str, Any]) -> Any:
     if isinstance(item, BifurcationDiagram | Isolas):
         return item
     return item.to_xarray().assign_attrs(seconds=details.get("seconds", float("nan")))
-
-
-def _worth(item: Result) -> bool:
-    """Whether there is anything to show; that no isola was found is said."""
-    return isinstance(item, Isolas) or bool(len(item))
 
 
 def tables_of(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:
