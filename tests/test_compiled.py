@@ -137,20 +137,22 @@ def signatures() -> dict[str, list[str]]:
     return {name: sorted(texts) for name, texts in called.items() if texts}
 
 
-def after(script: str) -> dict[str, list[str]]:
-    """`signatures` of a process that has run this."""
+def after(script: str, generated: Path) -> dict[str, list[str]]:
+    """`signatures` of a process that has run this; generated code kept before would hide the kernels that it calls."""
     code = f"import json, test_compiled; from suboctave.study import compilation\n{script}\n"
     code += "print('\\n' + json.dumps(test_compiled.signatures()))"
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True, check=True
-    )
+        [sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True, check=True,
+        env={**os.environ, "SUBOCTAVE_CACHE": str(generated)},
+    )  # fmt: skip
     return json.loads(done.stdout.splitlines()[-1])
 
 
 @pytest.mark.slow
-def test_after_the_command_no_example_compiles_anything():
+def test_after_the_command_no_example_compiles_anything(tmp_path):
     examples = [str(path) for path in sorted((Path(__file__).parents[1] / "examples").glob("ex*.py"))]
-    there = after(f"for i in range({len(compilation.COMPUTATIONS)}): compilation.run(i)")
-    used = after(f"import runpy, sys; sys.argv = ['']\nfor path in {examples!r}: runpy.run_path(path)")
+    there = after(f"for i in range({len(compilation.COMPUTATIONS)}): compilation.run(i)", tmp_path / "command")
+    script = f"import runpy, sys; sys.argv = ['']\nfor path in {examples!r}: runpy.run_path(path)"
+    used = after(script, tmp_path / "examples")
     missing = {name: set(texts) - set(there.get(name, ())) for name, texts in used.items()}
     assert not {name: texts for name, texts in missing.items() if texts}

@@ -18,6 +18,7 @@ from suboctave.analysis.branches import continue_branch, frequency_response, swi
 from suboctave.analysis.track import track
 from suboctave.compiled import without_notice
 from suboctave.model import ElasticStop, Expression, HarmonicLoad, QuadraticDamper, System, library
+from suboctave.timedomain.flow import Flow
 
 Report = Callable[[float, str], None]
 
@@ -89,6 +90,12 @@ def _methods_of_stability() -> None:
         frequency_response(library.two_mass_unilateral(), (0.75, 0.8), stability=method, harmonics=9)
 
 
+def _in_time() -> None:
+    """A trajectory with located contacts, and tangent vectors beside it: what judges their steps."""
+    system = System(1.0, 0.05, 1.0, [ElasticStop(0, 5.0, 0.3)], [HarmonicLoad(0, 1.0)])
+    Flow(system, tangents=1).over([0.0, 0.0], 1.0, 1)
+
+
 #: title and computation; those at one end of the list have few kernels in common with those at the other
 COMPUTATIONS: tuple[tuple[str, Callable[..., None], tuple[Any, ...]], ...] = (
     ("one degree of freedom, exact contact", _two_stops, (None,)),
@@ -98,6 +105,7 @@ COMPUTATIONS: tuple[tuple[str, Callable[..., None], tuple[Any, ...]], ...] = (
     ("grazing", _grazing, ()),
     ("laws as text", _laws_as_text, ()),
     ("laws of several inputs", _several_inputs, ()),
+    ("motions in time", _in_time, ()),
     ("methods of stability", _methods_of_stability, ()),
     ("two degrees of freedom, rounded contact", _two_masses, (100.0,)),
     ("two degrees of freedom, exact contact", _two_masses, (None,)),
