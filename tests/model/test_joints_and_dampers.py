@@ -208,3 +208,10 @@ def test_a_law_with_corners_must_have_nodes_of_its_own():
 
     with pytest.raises(InputError, match="own_nodes must be False"):
         system_with(Needless(0, 1.0, 1.0))
+
+
+def test_a_function_is_shown_by_its_name():
+    def spring(x, v):
+        return x**3
+
+    assert repr(so.Callable(0, spring)) == "Callable(dof=0, function=spring)"

@@ -99,6 +99,8 @@ def _shown(value: Any) -> str:
         return f"({', '.join(map(_shown, value[:4]))}{', ...' * (len(value) > 4)})"
     if isinstance(value, np.generic):
         value = value.item()
+    if callable(value):  # by name: where it lies in memory says nothing
+        return getattr(value, "__name__", type(value).__name__)
     return value if isinstance(value, str) else value.text if isinstance(value, Coefficient) else shortened(value)
 
 
