@@ -102,7 +102,7 @@ def test_with_parameters_leaves_the_original_alone():
     assert other.with_parameters({"k": 2.0, "c": 0.3}).parameters == {"k": 2.0, "c": 0.3, "m": 3.0}
     with pytest.raises(InputError, match=r"no parameter 'K' \(did you mean 'k'\?\)"):
         system.with_parameters(K=1.0)
-    with pytest.raises(InputError, match="must be finite"):
+    with pytest.raises(InputError, match="must be a finite number"):
         system.with_parameters(k=float("nan"))
     with pytest.raises(InputError, match="mass is not positive definite"):
         system.with_parameters(m=-1.0)
@@ -209,9 +209,9 @@ def test_observed_degree_of_freedom():
         (lambda: System(1, 0, "omega"), "only loads may depend on the frequency"),
         (lambda: System(1, 0, 1, [CubicSpring(0, "omega")]), "only loads may depend on the frequency"),
         (lambda: System(1, 0, 1, parameters={"k": 1.0}), "parameter 'k' not used"),
-        (lambda: System(1, 0, "k", parameters={"k": "1"}), "must be a number"),
-        (lambda: System(1, 0, "k", parameters={"k": True}), "must be a number"),
-        (lambda: System(1, 0, "k", parameters={"k": float("inf")}), "must be finite"),
+        (lambda: System(1, 0, "k", parameters={"k": "1"}), "must be a finite number"),
+        (lambda: System(1, 0, "k", parameters={"k": True}), "must be a finite number"),
+        (lambda: System(1, 0, "k", parameters={"k": float("inf")}), "must be a finite number"),
         (lambda: System(1, 0, "k", parameters=["k"]), "must be a mapping"),
         (lambda: System(1, 0, 1, parameters={"omega": 1.0}), "already has a meaning"),
         (lambda: System(1, 0, 1, parameters={"sin": 1.0}), "already has a meaning"),

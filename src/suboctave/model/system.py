@@ -361,13 +361,13 @@ def _name(name: Any) -> str:
 
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise InputError(f"parameter {name!r} must be a number, not {value!r}")
+        raise InputError(f"parameter {name!r} must be a finite number, not {value!r}")
     try:
         number = float(value)
     except OverflowError:  # a whole number of hundreds of digits
         number = math.inf
     if not math.isfinite(number):
-        raise InputError(f"parameter {name!r} must be finite, not {number}")
+        raise InputError(f"parameter {name!r} must be a finite number, not {number}")
     return number
 
 
