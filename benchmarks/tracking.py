@@ -30,7 +30,7 @@ from threadpoolctl import threadpool_limits
 import suboctave as so
 from suboctave.continuation import newton
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.tracked import events as tracked_events, follow as track_follow, hidden as tracked_hidden
+from suboctave.curves.tracked import events as tracked_events, follow as track_follow
 from suboctave.results.branch import TrackedBranch
 
 REPEATS = 7
@@ -115,7 +115,7 @@ def main(repeats: int) -> None:
         for name, run in work.items():
             unit += [seconds(lambda: np.linalg.eigvals(matrix)) for _ in range(20)]
             times[name].append(seconds(run))
-            with patch.object(tracked_events, "located", nothing), patch.object(tracked_hidden, "located", nothing):
+            with patch.object(tracked_events, "located", nothing):
                 alone[name].append(seconds(run))
     least, middle = min(unit), float(np.median(unit))
     print(

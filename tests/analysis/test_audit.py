@@ -327,10 +327,10 @@ def test_audits_of_two_directions_are_joined():
 
 def test_what_is_unsettled_is_said_in_words():
     """A test that never settles: every step is stated, once, with its range."""
-    from suboctave.curves import guard
+    from suboctave.curves import interior
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(guard, "MOST_PROBES", 0)
+        patch.setattr(interior, "MOST_PROBES", 0)
         curve = so.frequency_response(so.library.duffing(c=0.1, F=0.3), (3.0, 0.5), max_step=0.3)
     assert curve.audit.unsettled
     assert not curve.audit.complete

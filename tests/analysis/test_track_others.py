@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.curves.tracked.hidden import falling
 from suboctave.timedomain import shoot
 
 VAN_DER_POL = "mu*x**2*v"
@@ -177,21 +176,6 @@ def test_a_curve_that_misses_the_tip():
         tori = so.track(response.bifurcations["NS"][0], "eps", (0.05, 0.6), max_step=max_step)
         assert not tori.bifurcations["PDNS"]
         assert not tori.warnings
-
-
-@pytest.mark.parametrize("shift", np.linspace(-0.4, 0.4, 9))
-def test_where_a_function_falls(shift):
-    """Of a parabola with two zeros inside a step, and of a cubic, the place is told; of a monotone function nothing."""
-    x = np.array([-1.6, -0.5, 0.5, 1.4])
-    share = falling(x, (x - shift) ** 2 - 0.003, 1)
-    assert share is not None
-    assert -0.5 + share == pytest.approx(shift, abs=0.05)
-    assert falling(x, -((x - shift) ** 2) + 0.003, 1) is not None
-    assert falling(x, (x - shift) ** 2 * (2.5 + x) - 0.003, 1) is not None
-    assert falling(x, np.exp(x), 1) is None
-    assert falling(x, np.exp(-x), 1) is None
-    assert falling(x, 1.0 + 0.3 * (x - shift) ** 2, 1) is None
-    assert falling(x, x - 0.1, 1) is None
 
 
 def test_coefficients_that_are_not_linear_in_the_parameter():

@@ -67,8 +67,8 @@ def test_is_found_once(kind, before, after, heading):
     assert again is not middle
     assert test.value(middle) * test.value(again) < 0.0
     warnings = []
-    found = events_between(first, middle, (test,), OPTIONS, warnings)
-    found += events_between(middle, last, (test,), OPTIONS, warnings)
+    found = events_between([first, middle], (test,), OPTIONS, warnings)
+    found += events_between([middle, last], (test,), OPTIONS, warnings)
     assert warnings == []
     (item,) = found
     assert float(item.sample.point.u[-2]) == pytest.approx(float(own.u[-2]), abs=2.0 * abs(shift))

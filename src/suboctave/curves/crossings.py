@@ -174,9 +174,12 @@ def _first_doubtful(places, tests, at):
         top = -np.inf
         for i in range(count):
             top = max(top, tests[i, 1, k])
+        if top == -np.inf:
+            # it says nothing all along
+            continue
         for i in range(count):
             # in units of the largest: products of many factors leave the range of numbers
-            values[i] = tests[i, 0, k] * math.exp(tests[i, 1, k] - top) if top > -np.inf else 0.0
+            values[i] = tests[i, 0, k] * math.exp(tests[i, 1, k] - top)
         share = _doubtful(places, values, at)
         if share >= 0.0:
             return k, share

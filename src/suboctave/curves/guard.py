@@ -1,19 +1,14 @@
-"""Whether a step hides something: its interior is looked at until every test function is known well enough.
+"""Whether a step along a response hides something, or has left its curve.
 
-Two events inside one step cancel in every test at its ends. A step is therefore cut into intervals between samples
-(solved motions with all their tests), and an interval is done when
+What `interior` looks at are the smooth test functions of `bifurcation.measures`. An interval is not done either while
 
-- the smooth test functions of `bifurcation.measures` have no zero in it that is not seen at its ends
-  (`analysis.crossings`: interpolation through its ends and the samples beside it);
-- the number of unstable multipliers changes across it by what the tests at its ends explain;
-- no contact begins or ceases to touch in it, or it is short: behind a grazing everything changes like a square root,
-  which no interpolation across it foretells;
-- no multiplier of modulus above one half moves further than MOVEMENT (a fast rotation may look like none).
+- the number of unstable multipliers changes across it by what the tests at its ends do not explain;
+- a multiplier of modulus above one half moves further than MOVEMENT (a fast rotation may look like none).
 
-Otherwise a motion is solved for where the doubt is largest, and its two halves are looked at. A branch point in the
-step is located first. Where the curve turns back exactly there (the unsymmetric motions of a pitchfork, mirror images
-of each other on either side of it), turn is odd and fold even in the way s from it: turn / s and (fold - fold_BP) / s^2
-show whatever else there is, and no motion is solved for where the equations are almost singular.
+A branch point in the step is located first. Where the curve turns back exactly there (the unsymmetric motions of a
+pitchfork, mirror images of each other on either side of it), turn is odd and fold even in the way s from it: turn / s
+and (fold - fold_BP) / s^2 show whatever else there is, and no motion is solved for where the equations are almost
+singular.
 
 A step whose interior is not where its two ends say has jumped from one curve to another that passes close by, as has
 one across which the orientation of the curve changes without a branch point: it is refused and halved by the engine.
@@ -32,24 +27,16 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array
 from suboctave.curves.audit import Audit, Unsettled, joined
-from suboctave.curves.crossings import first_doubtful
 from suboctave.curves.events.finder import Located
 from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, changes
-from suboctave.curves.nearing import CUT, GRAZES, contacts_between
+from suboctave.curves.interior import FINEST, Contacts, Interior, unsettled
+from suboctave.curves.nearing import GRAZES
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 
-#: intervals of scaled arclength that are not cut any further: events closer together are not told apart
-FINEST = 1e-5
-#: samples inside one step after which it is halved, or called unsettled
-MOST_PROBES = 60
-#: pairs of samples whose contacts are remembered, at least
-_REMEMBERED = 64
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
-#: intervals shorter than this are not cut because a contact grazes in them
-_LAYER = 1e-3
 #: intervals shorter than this are not cut for the multipliers' movement, nor for that at +1 beside a branch point
 _EXAMINED = 0.01
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
@@ -126,7 +113,7 @@ class StepGuard:
         self._finest, self._longest = np.inf, 0.0
         self._unsettled: list[Unsettled] = []
         self._last: tuple[Sample, Sample, _Step] | None = None
-        self._contacts: dict[tuple[Sample, Sample], int] = {}
+        self._contacts = Contacts()
 
     @property
     def audit(self) -> Audit:
@@ -153,26 +140,17 @@ class StepGuard:
         for interval in step.settled:
             self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
         self._behind = step.samples[-4:]
-        if len(self._contacts) > _REMEMBERED:
-            kept = set(self._behind)
-            self._contacts = {pair: known for pair, known in self._contacts.items() if kept.issuperset(pair)}
+        self._contacts.keep(self._behind)
         inside = step.inside
         return Passage(_separating(inside), inside, step.crossings, step.unsettled)
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""
-        self._unsettled.append(_unsettled(old, new, reason))
+        self._unsettled.append(unsettled(old, new, reason))
 
     def grazes(self, p: Sample, q: Sample) -> bool:
         """Whether a contact begins or ceases to touch between two samples."""
-        return self._between(p, q) == GRAZES
-
-    def _between(self, p: Sample, q: Sample) -> int:
-        """What contacts do between two samples."""
-        known = self._contacts.get((p, q))
-        if known is None:
-            known = self._contacts[p, q] = contacts_between(p, q)
-        return known
+        return self._contacts.between(p, q) == GRAZES
 
     def forget(self) -> None:
         """What lies behind says nothing of what comes (a corner of the equations)."""
@@ -185,12 +163,12 @@ class StepGuard:
             behind = [s for s in self._behind if s.place < old.place]
             behind.append(old)
             turned = self._turned if self._turned and behind[0].place < self._turned.place else None
-            self._last = (old, new, _Step(behind, new, self._solve, self._branch_point, self._between, turned))
+            self._last = (old, new, _Step(behind, new, self._solve, self._branch_point, self._contacts, turned))
         return self._last[2]
 
 
-class _Step:
-    """One step under examination; `samples` are all that are known, in order, those behind the step included."""
+class _Step(Interior):
+    """One step along a response under examination."""
 
     def __init__(
         self,
@@ -198,77 +176,46 @@ class _Step:
         new: Sample,
         solve: Callable[[Sample, Sample, float, bool], Sample],
         branch_point: Callable[[Sample, Sample], Crossing | None],
-        contacts: Callable[[Sample, Sample], int],
+        contacts: Contacts,
         turned: Crossing | None = None,
     ) -> None:
-        self.contacts = contacts
-        self.samples = [*behind, new]
-        self.old, self.new, self.first = behind[-1], new, len(behind) - 1
+        super().__init__(behind, new, contacts.between, _REASONS)
         self.solve = solve
         self.branch_point = branch_point
         self.crossings: list[Crossing] = []
         self.turned = turned
-        self.size = new.place - self.old.place
-        self.probes = 0
-        self.refused = False
-        self.unsettled: list[Unsettled] = []
-        self.settled: list[float] = []
         pending = [(self.old, new)]
-        # a step may be short already
-        least = min(FINEST, self.size / 30.0)
         if self.size > _JUMP:
             self._look_for_crossing(self.old, new)
             if not self.refused and self.size > FINEST and _disagreement(self.old.point, new.point) > _AGREE:
-                pending = self._cut(self.old, new, 0.5)
-        while pending and not self.refused:
-            p, q = pending.pop()
-            doubt = self._doubt(p, q)
-            if doubt is None:
-                self.settled.append(q.place - p.place)
-                continue
-            share, reason = doubt
-            if q.place - p.place <= least:
-                self.settled.append(q.place - p.place)
-                if reason == _BESIDE or (not changes(p, q) and not (reason in _REASONS[1:] and _open(p, q))):
-                    # no event, but too close to one to tell it from two; open verdicts are stated as such
-                    self.unsettled.append(_unsettled(p, q, reason))
-                continue
-            halves = self._cut(p, q, share) if self.probes < MOST_PROBES else []
-            if not halves and not self.refused:
-                self.unsettled.append(_unsettled(p, q, reason))
-            pending += halves
+                pending = self.cut(self.old, new, 0.5)
+        self.examine(pending)
 
-    @property
-    def inside(self) -> list[Sample]:
-        """The samples of the step, both ends included."""
-        return self.samples[self.first :]
+    def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
+        # no event, but too close to one to tell it from two; open verdicts are stated as such
+        return reason != _BESIDE and (bool(changes(p, q)) or (reason in _REASONS[1:] and _open(p, q)))
 
-    def _cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
-        """The two parts of an interval, the second first; none if there is no motion where the curve should be."""
-        a, b = self.old.point, self.new.point
-        h = q.place - p.place
+    def cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
+        """See `Interior.cut`: not right at a branch point."""
         for crossing in self.crossings:
-            at = (crossing.place - p.place) / h
+            at = (crossing.place - p.place) / (q.place - p.place)
             if abs(share - at) < _CLEAR:
                 share = at + math.copysign(2.0 * _CLEAR, 0.5 - at)
-        place = p.place + share * h
-        fraction = (place - a.arclength) / self.size
-        self.probes += 1
+        return super().cut(p, q, share)
+
+    def solved(self, fraction: float) -> Sample | None:
+        a, b = self.old.point, self.new.point
         try:
             sample = self.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
         except ConvergenceError:
             self.refused = self.size > _JUMP
-            return []
-        point = sample.point
-        away = length(b.weights * (point.u - between(a, b, fraction)))
-        if away > _AWAY * self.size and self.size > FINEST:
-            self.refused = True
-            return []
-        self.samples.insert(self.samples.index(q), sample)
-        return [(sample, q), (p, sample)]
+            return None
+        away = length(b.weights * (sample.point.u - between(a, b, fraction)))
+        self.refused = away > _AWAY * self.size and self.size > FINEST
+        return None if self.refused else sample
 
-    def _doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
-        """Where to look into an interval, as a fraction of it, and why; None if it is done."""
+    def doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
+        """See `Interior.doubt`."""
         h = q.place - p.place
         crossing = self._look_for_crossing(p, q)
         if self.refused:
@@ -281,23 +228,13 @@ class _Step:
             )
         if eventful and _mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
-        if crossing is not None and self._measures(p)[0, 0] != self._measures(q)[0, 0]:
+        if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
-        contacts = self.contacts(p, q)
-        if contacts == GRAZES:
-            return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
-        if contacts and h > _LAYER:
-            return CUT[contacts], "a contact that is about to begin or cease changes everything like a square root"
-        stencil, at = self._around(p, q)
-        if len(stencil) < 3:
-            return 0.5, "nothing was looked at"
-        if h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
+        doubt = super().doubt(p, q)
+        if doubt is None and h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
-        doubt = first_doubtful([s.place for s in stencil], [self._measures(s) for s in stencil], at)
-        if doubt is None or (_REASONS[doubt[0]] == _RETURNS and h <= _EXAMINED and self.turned):
-            # right beside the branch point the multiplier at +1 is known up to its error only
-            return None
-        return doubt[1], _REASONS[doubt[0]]
+        # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
+        return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
 
     def _look_for_crossing(self, p: Sample, q: Sample) -> Crossing | None:
         """The branch point between two samples; the step is refused if the orientation changes without one, which it
@@ -314,7 +251,7 @@ class _Step:
         self.refused = self.refused or (known is None and self.size > _JUMP)
         return known
 
-    def _measures(self, sample: Sample) -> Array:
+    def measures(self, sample: Sample) -> Array:
         """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
         crossing = self.turned
         if crossing is None or crossing.turned is None:
@@ -327,51 +264,6 @@ class _Step:
         tests[0, 1] = math.copysign(1.0, change)
         tests[1, 1] = (math.log(abs(change)) if change else -math.inf) - 2.0 * math.log(abs(way))
         return tests
-
-    def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
-        """The samples to interpolate through, up to two on either side, and the position of p among them.
-
-        They should be about as far apart as p and q: farther ones foretell nothing, and closer ones only rounding.
-        """
-        i = self.samples.index(p)
-        h = q.place - p.place
-        left, before = self._beside(i, -1, h)
-        right, behind = self._beside(i + 1, 1, h)
-        if not left and not right and (before is not None or behind is not None):
-            # one at least
-            if behind is None or (before is not None and p.place - before.place <= behind.place - q.place):
-                left = [before] if before is not None else []
-            else:
-                right = [behind]
-        left.reverse()
-        return [*left, p, q, *right], len(left)
-
-    def _beside(self, start: int, way: int, h: float) -> tuple[list[Sample], Sample | None]:
-        """Up to two of the four samples beyond one, neither too close together nor too far for an interval of length
-        h, as far as no contact begins or ceases to touch on the way; and the first one beyond.
-        """
-        chosen: list[Sample] = []
-        first: Sample | None = None
-        samples, last = self.samples, 0.0
-        here, end = samples[start], samples[start].place
-        for k in range(start + way, start + 5 * way, way):
-            if not 0 <= k < len(samples):
-                break
-            beyond = samples[k]
-            if (self.contacts(beyond, here) if way < 0 else self.contacts(here, beyond)) == GRAZES:
-                break
-            if first is None:
-                first = beyond
-            distance = abs(beyond.place - end)
-            if distance - last > 4.0 * h:
-                break
-            if distance - last > 0.1 * h:
-                chosen.append(beyond)
-                last = distance
-                if len(chosen) == 2:
-                    break
-            here = beyond
-        return chosen, first
 
 
 _RETURNS = "a multiplier may pass +1 and come back"
@@ -389,11 +281,6 @@ _BESIDE = "the branch turns back beside a branch point, too close to tell where"
 def _open(p: Sample, q: Sample) -> bool:
     """Whether a multiplier lies within its error of the unit circle at either of two samples."""
     return not (p.floquet.decided and q.floquet.decided)
-
-
-def _unsettled(p: Sample, q: Sample, reason: str) -> Unsettled:
-    a, b = p.point, q.point
-    return Unsettled(p.curve.name, a.parameter, b.parameter, (a.arclength, b.arclength), reason)
 
 
 def _separating(samples: list[Sample]) -> list[Sample]:

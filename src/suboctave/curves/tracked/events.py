@@ -17,7 +17,7 @@ from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.bifurcation.gaps import GrazingContact, levels
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
-from suboctave.continuation.point import CurvePoint, between, make_point, point_between
+from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
@@ -66,23 +66,25 @@ class LocatedEvent:
 
 
 def events_between(
-    a: Sample, b: Sample, tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
+    samples: list[Sample], tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
 ) -> list[LocatedEvent]:
-    """Every event between two neighbours, in the order met.
+    """Every event in a step, between its samples in order (both ends included, no test changing twice in between).
 
     The first one's tests count in the discretisation it was found in, as on the step before: what changes sign there
-    is not lost, nor found twice, if that of the second one's moves it across.
+    is not lost, nor found twice, if that of the others moves it across.
     """
     events: list[LocatedEvent] = []
     for test in tests:
-        try:
-            both = [located(test, low, high, newton) for low, high in brackets(test, a, b, newton)]
-            events += [item for item in both if item is not None]
-        except ConvergenceError as failure:
-            warnings.append(f"{test.kind} near {b.where}: {failure}")
-    if b.curve.augmentation.turning:
-        events = _without_consequences(events, b.curve, SAME * (b.point.arclength - a.point.arclength))
-    return sorted(events, key=lambda item: item.sample.point.arclength)
+        own: list[LocatedEvent] = []
+        for a, b in itertools.pairwise(samples):
+            try:
+                item = located(test, a, b, newton) if test.changed(a, b) else None
+                own += [] if item is None else [item]
+            except ConvergenceError as failure:
+                warnings.append(f"{test.kind} near {b.where}: {failure}")
+        events += own
+    near = SAME * (samples[-1].place - samples[0].place)
+    return sorted(_genuine(events, samples[-1].curve, near), key=lambda item: item.sample.place)
 
 
 def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -> LocatedEvent | None:
@@ -109,69 +111,25 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     return LocatedEvent(own, sample, extreme_of(own, before, sample), stretch if finer else None, slope)
 
 
-def _without_consequences(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
-    """Events along a curve of extrema without those that others bring about.
+def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
+    """Events without those that others bring about.
 
-    Where the third parameter turns the extreme one does so too: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M.
-    At a cusp a symmetry may have both turn, which makes no extremum of either.
+    Slopes jump at a corner, and may seem to turn to and fro in it. Along a curve of extrema the extreme parameter turns
+    where the third one does: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M. At a cusp a symmetry may have both
+    turn, which makes no extremum of either.
     """
-    extreme, last = curve.augmentation.turning, curve.names[-1]
 
     def beside(item: LocatedEvent, others: list[LocatedEvent]) -> bool:
-        return any(abs(item.sample.point.arclength - o.sample.point.arclength) <= near for o in others)
+        return any(o is not item and abs(item.sample.place - o.sample.place) <= near for o in others)
 
     turns = {name: [i for i in events if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
-    cusps = [item for item in events if isinstance(item.test, Cusp)]
-    both = [item for item in turns[extreme] if beside(item, turns[last])]
-    dropped = both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
+    dropped = [item for own in turns.values() for item in own if beside(item, own)]
+    extreme, last = curve.augmentation.turning, curve.names[-1]
+    if extreme:
+        cusps = [item for item in events if isinstance(item.test, Cusp)]
+        both = [item for item in turns[extreme] if beside(item, turns[last])]
+        dropped += both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
     return [item for item in events if not any(item is d for d in dropped)]
-
-
-def brackets(test: CurveTest, a: Sample, b: Sample, newton: NewtonOptions) -> list[tuple[Sample, Sample]]:
-    """Stretches of a step in which a test changes sign; two where it does so twice within one step."""
-    changed = test.changed(a, b)
-    share = None if changed or not isinstance(test, Extremum) else _turn_inside(test.name, a, b)
-    if not changed and share is None:
-        return []
-    if isinstance(test, Extremum) and test.level(a, b):
-        return []
-    if share is None:
-        return [(a, b)]
-    middle = Sample(point_between(a.point, b.point, share, newton))
-    return [(a, middle), (middle, b)] if test.changed(a, middle) else []
-
-
-def _turn_inside(name: str, a: Sample, b: Sample) -> float | None:
-    """Where between two neighbours a parameter runs the other way, by its cubic interpolation; None if nowhere."""
-    share, slope = slowest_between(name, a, b)
-    start = abs(a.slopes[name])
-    # where it nearly vanishes the interpolation cannot tell
-    return share if 0.0 < share < 1.0 and slope < 0.05 * start else None
-
-
-def slowest_between(name: str, a: Sample, b: Sample) -> tuple[float, float]:
-    """Where between two neighbours (0 and 1: at one of them) a parameter runs slowest by its cubic interpolation, and
-    its slope there in the direction of the first.
-    """
-    start, curve, half = _slope_between(name, a, b)
-    sign = math.copysign(1.0, start)
-    share = -half / curve if curve != 0.0 else 0.0
-    if 0.0 < share < 1.0:
-        return share, sign * (start + share * half)
-    last = sign * b.slopes[name]
-    return (0.0, sign * start) if sign * start < last else (1.0, last)
-
-
-def _slope_between(name: str, a: Sample, b: Sample) -> tuple[float, float, float]:
-    """The derivative of a parameter by arclength, `start + 2 half s + curve s^2` at the share s of the way between two
-    neighbours, by its cubic interpolation; nothing of it without a way.
-    """
-    i, j, way = a.curve.index(name), b.curve.index(name), b.point.arclength - a.point.arclength
-    if not way > 0.0:
-        return 0.0, 0.0, 0.0
-    chord = float(b.point.u[j] - a.point.u[i]) / way
-    start, stop = a.slopes[name], b.slopes[name]
-    return start, 3.0 * (start + stop - 2.0 * chord), 3.0 * chord - 2.0 * start - stop
 
 
 class _Stretch:
@@ -262,7 +220,11 @@ class _Stretch:
         """The share at which a parameter turns by its cubic interpolation; 0 if nowhere, and for other tests."""
         if not isinstance(self.test, Extremum):
             return 0.0
-        start, curve, half = _slope_between(self.test.name, self.a, self.b)
+        a, b, name = self.a, self.b, self.test.name
+        chord = float(b.point.u[b.curve.index(name)] - a.point.u[a.curve.index(name)]) / self.way
+        start, stop = a.slopes[name], b.slopes[name]
+        # its derivative at the share s is start + 2 half s + curve s^2
+        half, curve = 3.0 * chord - 2.0 * start - stop, 3.0 * (start + stop - 2.0 * chord)
         inside = half * half - start * curve
         if inside >= 0.0 and start != 0.0:
             # the root on the side of the end whose sign is the other one
@@ -432,10 +394,8 @@ __all__ = [
     "SAME",
     "LocatedEvent",
     "as_event",
-    "brackets",
     "events_between",
     "extreme_of",
     "located",
     "refined",
-    "slowest_between",
 ]

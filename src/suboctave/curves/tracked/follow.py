@@ -23,9 +23,9 @@ from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.corners import beyond_corner
 from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
 from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, extreme_of, refined
-from suboctave.curves.tracked.hidden import HiddenPairs, PairWatch
 from suboctave.curves.tracked.start import Box
-from suboctave.curves.tracked.tests import CurveTest, Extremum, PairCrossing, tests_of
+from suboctave.curves.tracked.steps import StepWatch
+from suboctave.curves.tracked.tests import Extremum, tests_of
 from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
@@ -55,11 +55,8 @@ class _Tracker(Driver):
         self.lopsided = is_lopsided(Sample(start))
         heading = math.copysign(1.0, start.tangent[start.curve.parameter])
         self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
-        tests = tests_of(start.curve)
-        self.tests: tuple[CurveTest, ...] = tuple(t for t in tests if not isinstance(t, PairCrossing))
-        self.hidden = HiddenPairs(self.tests, settings.newton)
-        pairs = next((t for t in tests if isinstance(t, PairCrossing)), None)
-        self.pairs = PairWatch(pairs, settings.newton)
+        self.tests = tests_of(start.curve)
+        self.watch = StepWatch(self.tests, settings.newton)
         self.corners = 0
         #: how many points have known multipliers, and where none of these is the critical one
         self.compared = 0
@@ -82,7 +79,6 @@ class _Tracker(Driver):
             self.march = March(beyond, heading, self.box.second, settings.newton, stepping, self._clear, home=self.home)
         trace.closed = self.march.closed
         self._say_doubts()
-        self._take(self.hidden.rest(trace.warnings) + self.pairs.rest(trace.warnings))
 
     def _finish(self) -> None:
         self.trace.bifurcations.sort(key=lambda event: event.arclength)
@@ -158,9 +154,7 @@ class _Tracker(Driver):
                 return Ending(EndReason.NO_MEANING, where, detail)
         if self.previous is None or point is self.march.start:
             # beyond a corner nothing leads on from what lies behind
-            for watch in (self.hidden, self.pairs):
-                self._take(watch.rest(self.trace.warnings))
-                watch.passed(new, self.trace.warnings)
+            self.watch.forget()
             self._add(new)
             self.previous = new
             return None
@@ -176,9 +170,7 @@ class _Tracker(Driver):
         except ConvergenceError:
             return Ending(EndReason.LEFT_RANGE, a.where)
         new = self._smooth(a, left or new)
-        warnings = self.trace.warnings
-        events = self.hidden.passed(new, warnings) + self.pairs.passed(new, warnings)
-        self._take(events + events_between(a, new, self.tests, settings.newton, warnings))
+        self._take(self.watch.passed(a, new, self.trace.warnings))
         self._add(new)
         self.previous = new
         self._report(point)
@@ -232,7 +224,7 @@ class _Tracker(Driver):
     def _take_end(self, a: Sample, end: End) -> None:
         settings = self.settings
         for b in points_before(end, a, settings.newton):
-            self._take(events_between(a, b, self.tests, settings.newton, self.trace.warnings))
+            self._take(events_between([a, b], self.tests, settings.newton, self.trace.warnings))
             self._add(b)
             a = b
         arclength = a.point.arclength + end.way(a)

@@ -34,7 +34,7 @@ from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
 
-#: component of the tangent in scaled arclength that may be rounding at both ends of a step
+#: component of the tangent in scaled arclength up to which it may be rounding
 _LEVEL = 1e-9
 #: distance of the other multiplier from +1 or -1 at a point where det J_0 or det J_half vanishes
 _CRITICAL = 0.1
@@ -107,16 +107,18 @@ class Extremum(CurveTest):
         rising = before * at.bend if self._beside_cusps(at) else before
         return "maximum" if rising > 0.0 else "minimum"
 
-    def smooth(self, sample: Sample) -> tuple[float, float]:
-        """See `CurveTest.smooth`: at a cusp it vanishes as well."""
-        slope = sample.slopes[self.name]
-        return (1.0 if slope > 0.0 else -1.0), _logarithm(slope)
+    def changed(self, a: Sample, b: Sample) -> bool:
+        return not (self._level(a) and self._level(b)) and super().changed(a, b)
 
-    def level(self, *samples: Sample) -> bool:
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        """See `CurveTest.smooth`: at a cusp it vanishes as well; the same all along a parameter that stays as it is."""
+        slope = sample.slopes[self.name]
+        return (1.0, _logarithm(_LEVEL)) if self._level(sample) else (math.copysign(1.0, slope), _logarithm(slope))
+
+    def _level(self, sample: Sample) -> bool:
         """Whether the parameter stays as it is but for rounding."""
-        return all(
-            abs(s.slopes[self.name] * float(s.point.weights[s.curve.index(self.name)])) < _LEVEL for s in samples
-        )
+        weight = float(sample.point.weights[sample.curve.index(self.name)])
+        return abs(sample.slopes[self.name] * weight) < _LEVEL
 
 
 @dataclass(frozen=True)
@@ -210,15 +212,21 @@ class RealCrossing(CurveTest):
     def within(self, a: Sample, b: Sample) -> CurveTest:
         return replace(self, borders=null_vectors(b.state, self.operator))
 
+    @property
+    def _target(self) -> float:
+        return 1.0 if self.operator is Kind.INTEGER else -1.0
+
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        return sample.determinant(self.operator)
+        """See `CurveTest.smooth`: without the factor of the pair that an NS curve follows, which may pass there."""
+        sign, size = sample.determinant(self.operator)
+        critical = sample.evaluation.critical
+        return sign, size if critical is None else size - 2.0 * _logarithm(abs(critical - self._target))
 
     def genuine(self, sample: Sample) -> bool:
         """See `CurveTest.genuine`: close to R1 and R2 the pair that an NS curve follows is critical itself."""
         if self.kind == "LPPD":
             return True
-        target = 1.0 if self.operator is Kind.INTEGER else -1.0
-        critical = sample.evaluation.critical
+        target, critical = self._target, sample.evaluation.critical
         apart = critical is None or abs(critical - target) > _RESONANT
         error = float(sample.evaluation.floquet.errors.max(initial=0.0))
         return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL + error))
