@@ -26,13 +26,15 @@ from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
 
+Numbers = Sequence[float] | NDArray[np.float64]
+
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
 #: fractions of an interval at which it is looked at, beside the extrema of the cubic
 _GRID = np.array([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98])
 
 
-def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float | None:
+def doubtful(places: Numbers, values: Numbers, at: int) -> float | None:
     """Where between `places[at]` and `places[at + 1]` a zero may hide, as a fraction of the interval; None if nowhere.
 
     Parameters
@@ -42,12 +44,12 @@ def doubtful(places: Sequence[float], values: Sequence[float], at: int) -> float
     values
         The function there. A zero counts as positive: the side of an exact zero is the caller's business.
     """
-    share = _doubtful(np.array(places), np.array(values), at)
+    share = _doubtful(np.asarray(places), np.ascontiguousarray(values), at)
     # not too close to the ends, so that both parts shrink
     return None if share < 0.0 else min(0.6, max(0.4, share))
 
 
-def first_doubtful(places: Sequence[float], tests: Sequence[NDArray[np.float64]], at: int) -> tuple[int, float] | None:
+def first_doubtful(places: Numbers, tests: Sequence[NDArray[np.float64]], at: int) -> tuple[int, float] | None:
     """The first of several functions of which `doubtful` is not sure, and where; None if none is in doubt.
 
     Parameters
@@ -55,8 +57,17 @@ def first_doubtful(places: Sequence[float], tests: Sequence[NDArray[np.float64]]
     tests
         At every place the functions' signs and logarithms of moduli, shape (2, m).
     """
-    which, share = _first_doubtful(np.array(places), np.array(tests), at)
-    return None if which < 0 else (which, min(0.6, max(0.4, share)))
+    x, (signs, sizes) = np.array(places), np.array(tests).transpose(1, 2, 0)
+    # in units of the largest: products of many factors leave the range of numbers
+    with np.errstate(invalid="ignore"):
+        values = signs * np.exp(sizes - sizes.max(axis=1)[:, None])
+    for k, function in enumerate(values):
+        # one that is nothing all along says nothing
+        if not math.isnan(function[0]):
+            share = doubtful(x, function, at)
+            if share is not None:
+                return k, share
+    return None
 
 
 @kernel()
@@ -164,26 +175,6 @@ def _doubtful(places, values, at):
     if margin < 0.0 or (same and margin == 0.0):
         return where
     return -1.0
-
-
-@kernel()
-def _first_doubtful(places, tests, at):
-    count, _, functions = tests.shape
-    values = np.empty(count)
-    for k in range(functions):
-        top = -np.inf
-        for i in range(count):
-            top = max(top, tests[i, 1, k])
-        if top == -np.inf:
-            # it says nothing all along
-            continue
-        for i in range(count):
-            # in units of the largest: products of many factors leave the range of numbers
-            values[i] = tests[i, 0, k] * math.exp(tests[i, 1, k] - top)
-        share = _doubtful(places, values, at)
-        if share >= 0.0:
-            return k, share
-    return -1, 0.0
 
 
 __all__ = ["SAFETY", "doubtful", "first_doubtful"]

@@ -7,9 +7,9 @@ it is: an interval is too long if an excursion across a gap shrinks to less than
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
-from suboctave.compiled import kernel
+from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.curves.sample import Sample
 from suboctave.harmonic.trigonometric import passages
 
@@ -32,51 +32,26 @@ def contacts_between(p: Sample, q: Sample) -> int:
     """
     near = NOTHING
     for a, b in zip(p.gaps, q.gaps, strict=True):
-        here = _between(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
-        if here == GRAZES:
+        _, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        if count > 0 or crossed != other:
             return GRAZES
-        near = near or here
+        near = near or (FIRST if _shrinks(a, b) else LAST if _shrinks(b, a) else NOTHING)
     return near
 
 
-@kernel()
-def _between(tau, value, curve, level, other_tau, other_value, other_curve, other_level):
-    """`contacts_between` for one gap."""
-    _, count, crossed, other_crossed = passages(
-        tau, value, curve, level, other_tau, other_value, other_curve, other_level
-    )
-    if count > 0 or crossed != other_crossed:
-        return 3
-    for end in range(2):
-        # whether an excursion of one motion is a small part of the same excursion of the other
-        size = 0.0
-        for i in range(value.shape[0]):
-            size = max(size, abs(value[i]))
-        for i in range(value.shape[0]):
-            # a maximum above the gap, or a minimum below it
-            sign = -1.0 if curve[i] > 0.0 else 1.0
-            here = sign * (value[i] - level)
-            if not 0.0 < here < YOUNG * size:
-                continue
-            best, there = -2.0, 0.0
-            for j in range(other_value.shape[0]):
-                if (other_curve[j] > 0.0) == (curve[i] > 0.0):
-                    near = math.cos(other_tau[j] - tau[i])
-                    if near > best:
-                        best, there = near, sign * (other_value[j] - other_level)
-            if here < SHRINKS * there:
-                return 1 + end
-        tau, value, curve, level, other_tau, other_value, other_curve, other_level = (
-            other_tau,
-            other_value,
-            other_curve,
-            other_level,
-            tau,
-            value,
-            curve,
-            level,
-        )
-    return 0
+def _shrinks(one: GapExtrema, other: GapExtrema) -> bool:
+    """Whether an excursion of one motion is a small part of the same excursion of another."""
+    size = YOUNG * np.abs(one.value).max(initial=0.0)
+    # a maximum above the gap, or a minimum below it
+    signs, others = np.where(one.curve > 0.0, -1.0, 1.0), np.where(other.curve > 0.0, -1.0, 1.0)
+    beyond = signs * (one.value - one.level)
+    for i in np.flatnonzero((beyond > 0.0) & (beyond < size)):
+        same = np.flatnonzero(others == signs[i])
+        if same.size:
+            j = same[np.cos(other.tau[same] - one.tau[i]).argmax()]
+            if beyond[i] < SHRINKS * others[j] * (other.value[j] - other.level):
+                return True
+    return False
 
 
 __all__ = ["CUT", "FIRST", "GRAZES", "LAST", "NOTHING", "contacts_between"]
