@@ -19,10 +19,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
-from suboctave.compiled import kernel
 from suboctave.continuation.linear import Factor
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -39,9 +39,35 @@ def measured(tangent: Array, weights: Array, parameter: int, mu: ComplexArray) -
 
     `torus` is constant for motions without damping, whose pairs never leave the circle.
     """
-    out = np.empty((2, 4))
-    _measure(tangent, weights, parameter, mu, out)
-    return out
+    scaled = weights * tangent
+    turn = float(scaled[parameter]) / math.sqrt(scaled.dot(scaled))
+    first, second = _pairs(len(mu))
+    with np.errstate(all="ignore"):
+        damped = abs(float(np.log(np.abs(mu)).sum())) >= UNDAMPED
+        products = (
+            (1.0 if turn > 0.0 else -1.0, math.log(abs(turn)) if turn != 0.0 else -math.inf),
+            _product(1.0 - mu, mu),
+            _product(1.0 + mu, mu),
+            _product(1.0 - mu[first] * mu[second], mu[first] * mu[second]) if damped else (1.0, 0.0),
+        )
+    return np.array(products).T
+
+
+@lru_cache(maxsize=16)
+def _pairs(count: int) -> tuple[np.ndarray, ...]:
+    """All pairs of so many multipliers, as their first and second members."""
+    return np.triu_indices(count, 1)
+
+
+def _product(factors: ComplexArray, of: ComplexArray) -> tuple[float, float]:
+    """Sign and logarithm of the product of `factors / sqrt(1 + |of|^2)`.
+
+    Complex factors come in conjugate pairs: the sign is that of the real ones.
+    """
+    size = np.abs(of)
+    negative = (np.abs(of.imag) <= 1e-12 * size) & (factors.real < 0.0)
+    log = np.log(np.abs(factors)) - 0.5 * np.log1p(size * size)
+    return (-1.0 if np.count_nonzero(negative) % 2 else 1.0), float(log.sum())
 
 
 def torus(mu: ComplexArray) -> Array:
@@ -96,40 +122,3 @@ def half_sign(state: BalanceState) -> float:
     """Sign of det J_half."""
     # the transpose has the same determinant, and lies in memory as LAPACK wants it
     return Factor.of(state.half_jacobian.T).sign
-
-
-@kernel()
-def _measure(tangent, weights, parameter, mu, out):
-    """Complex factors come in conjugate pairs: the sign is that of the real ones."""
-    n = mu.shape[0]
-    sign, log = out[0], out[1]
-    size = 0.0
-    for i in range(tangent.shape[0]):
-        size += (weights[i] * tangent[i]) ** 2
-    turn = weights[parameter] * tangent[parameter] / math.sqrt(size)
-    sign[0] = 1.0 if turn > 0.0 else -1.0
-    log[0] = math.log(abs(turn)) if turn != 0.0 else -np.inf
-    for k in range(1, 4):
-        sign[k] = 1.0
-        log[k] = 0.0
-    total = 0.0
-    for i in range(n):
-        size = abs(mu[i])
-        total += math.log(size) if size > 0.0 else -np.inf
-        half = 0.5 * math.log1p(size * size)
-        real = abs(mu[i].imag) <= 1e-12 * size
-        for k in range(1, 3):
-            factor = 1.0 - mu[i] if k == 1 else 1.0 + mu[i]
-            if real and factor.real < 0.0:
-                sign[k] = -sign[k]
-            log[k] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - half
-    if abs(total) < UNDAMPED:
-        return
-    for i in range(n):
-        for j in range(i + 1, n):
-            product = mu[i] * mu[j]
-            factor = 1.0 - product
-            size = abs(product)
-            if abs(product.imag) <= 1e-12 * size and factor.real < 0.0:
-                sign[3] = -sign[3]
-            log[3] += (math.log(abs(factor)) if abs(factor) > 0.0 else -np.inf) - 0.5 * math.log1p(size * size)

@@ -20,6 +20,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.floquet.time_mesh import ADJOINT, INTEGRATION, LOWER, ORDER, WEIGHTS
+from suboctave.harmonic.basis import Array
 
 #: sums may be reordered; infinities keep their meaning
 _FAST = {"reassoc", "contract", "nsz"}
@@ -248,33 +249,23 @@ def parts_needed(spans, law, base, active, stiffness, damping, shares, longest):
     return parts, total
 
 
-@kernel()
-def response(start, nodes, active, path, largest):
+def response(start: Array, nodes: Array, active: np.ndarray, path: Array, largest: float) -> tuple[Array, float]:
     """q_g, q_g' at the nodes along all channels, (C, 2, N), of the response that begins with the state `start`, and the
     share of it that is left: none is larger than `largest` times the displacement.
 
     nodes: see `propagate`; path (C, 2, N): the motion along all channels; active (G,): those that act.
     """
-    panels, rows, columns = nodes.shape
-    m = ORDER
+    moved = (nodes[:, :, :-1] @ start + nodes[:, :, -1]).reshape(-1, 2, len(active), ORDER)
     out = np.zeros(path.shape)
-    for p in range(panels):
-        for row in range(rows):
-            a = nodes[p, row, columns - 1]
-            for i in range(columns - 1):
-                a += nodes[p, row, i] * start[i]
-            part, g = row // (m * active.shape[0]), row // m % active.shape[0]
-            out[active[g], part, p * (m - 1) + row % m] = a
-    share = 1.0
-    for g in range(path.shape[0]):
-        size, limit = np.abs(out[g, 0]).max(), largest * np.abs(path[g, 0]).max()
-        if not size <= limit:
-            share = min(share, limit / size if size < np.inf else 0.0)
-    if share == 0.0:
-        out[:] = 0.0
-    elif share < 1.0:
-        out *= share
-    return out, share
+    # the last node of a panel is the first of the next
+    out[active, :, :-1] = moved[..., :-1].transpose(2, 1, 0, 3).reshape(len(active), 2, -1)
+    out[active, :, -1] = moved[-1, :, :, -1].T
+    size, limit = np.abs(out[:, 0]).max(axis=1), largest * np.abs(path[:, 0]).max(axis=1)
+    if not np.isfinite(size).all():
+        return np.zeros(path.shape), 0.0
+    over = size > limit
+    share = float((limit[over] / size[over]).min(initial=1.0))
+    return out * share, share
 
 
 @kernel()

@@ -44,7 +44,7 @@ from numba import njit
 
 from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control, follow
 from suboctave.timedomain.lane_functions import arccos, arcsin, arctan, arctan_log, call_back, cos, cosh, exp
-from suboctave.timedomain.lane_functions import heaviside, log, sin, sine_cosine, sinh, sqrt, tan, tanh
+from suboctave.timedomain.lane_functions import log, sin, sine_cosine, sinh, sqrt, tan, tanh
 
 absolute, maximum, sign = abs, max, np.sign
 '''

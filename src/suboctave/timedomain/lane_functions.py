@@ -157,8 +157,3 @@ def sine_cosine(x):
     sine = c if odd else s
     cosine = s if odd else c
     return (-sine if turn >= 2 else sine), (-cosine if ((turn + 1) & 2) == 2 else cosine)
-
-
-@njit(inline="always")
-def heaviside(a, b):
-    return 1.0 if a > 0.0 else 0.0

@@ -168,16 +168,16 @@ def expanded_size(expression: Any) -> float:
 
 _PLAIN = {"Ramp": "max({}, 0)", "Step": "heaviside({})", "Modulus": "abs({})", "Sign": "sign({})"}
 _CODE = {
-    "Ramp": "maximum({}, 0.0)", "Step": "heaviside({}, 0.0)", "Modulus": "absolute({})", "Abs": "absolute({})",
+    "Ramp": "maximum({}, 0.0)", "Step": "(1.0 * ({} > 0.0))", "Modulus": "absolute({})", "Abs": "absolute({})",
     "Sign": "sign({})", "sign": "sign({})", "PositiveRamp": "maximum({}, 1e-60)", "DiracDelta": "0.0",
 }  # fmt: skip
 _NUMPY = (
     "sqrt", "exp", "log", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "absolute", "sign",
-    "maximum", "heaviside",
+    "maximum",
 )  # fmt: skip
 _SCALAR = {
     **FUNCTIONS, "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan, "absolute": math.fabs,
-    "sign": CORNERS["sign"], "maximum": max, "heaviside": lambda x, there: CORNERS["heaviside"](x),
+    "sign": CORNERS["sign"], "maximum": max,
 }  # fmt: skip
 #: powers up to this one are products
 _PRODUCTS = 4
