@@ -183,7 +183,8 @@ class BalanceState:
         balance, packed, motions = self.balance, self.packed, self.motions
         table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
         at = places(self.basis.harmonics, balance.top, packed.polynomial.shape[1] - 1)
-        add_spectra(motions, packed.known, *at, table)
+        if balance.groups:
+            add_spectra(motions, packed.known, *at, table)
         if not packed.closed_form:
             for g, (along, laws) in enumerate(self._along):
                 for law in laws:
