@@ -182,7 +182,7 @@ def _factorised(state: BalanceState, kind: Kind, kappa: float, borders: NullVect
     row = np.zeros(n + 1, dtype=matrix.dtype)
     row[:n] = size * borders.right.conj()
     left = (size * borders.left).astype(matrix.dtype)
-    return bordered_factor(matrix, scale, scale, left[:, None], row)
+    return bordered_factor(matrix * scale[:, None], scale, left[:, None], row)
 
 
 def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:

@@ -61,24 +61,30 @@ def cosine(a: Array, b: Array, weights: Array) -> float:
 
 @dataclass(eq=False, slots=True)
 class Factor:
-    """LU factors of a square real or complex matrix (`lapack.?getrf`)."""
+    """LU factors of a square real or complex matrix (`lapack.?getrf`), or of its transpose: of a real one that lies in
+    memory row by row, which LAPACK takes for that.
+    """
 
     lu: NDArray[Any]
     pivots: NDArray[Any]
     singular: bool
+    transposed: bool = False
 
     @classmethod
     def of(cls, matrix: NDArray[Any], overwrite: bool = False) -> Factor:
         """Factorise; an exactly singular matrix is marked, not refused."""
-        getrf = lapack.zgetrf if matrix.dtype.kind == "c" else lapack.dgetrf
-        lu, pivots, info = getrf(matrix, overwrite_a=overwrite)
-        return cls(lu, pivots, info > 0)
+        if matrix.dtype.kind == "c":
+            lu, pivots, info = lapack.zgetrf(matrix, overwrite_a=overwrite)
+            return cls(lu, pivots, info > 0)
+        by_rows = matrix.flags.c_contiguous
+        lu, pivots, info = lapack.dgetrf(matrix.T if by_rows else matrix, overwrite_a=overwrite)
+        return cls(lu, pivots, info > 0, by_rows)
 
     def solve(self, rhs: NDArray[Any], adjoint: bool = False) -> NDArray[Any]:
         """Solve with the matrix, or with its conjugate transpose."""
         if self.lu.dtype.kind == "c":
             return lapack.zgetrs(self.lu, self.pivots, rhs, trans=2 if adjoint else 0)[0]
-        return lapack.dgetrs(self.lu, self.pivots, rhs, trans=1 if adjoint else 0)[0]
+        return lapack.dgetrs(self.lu, self.pivots, rhs, trans=1 if adjoint != self.transposed else 0)[0]
 
     @property
     def sign(self) -> float:
@@ -129,14 +135,13 @@ class LeadingBlock:
         return whole[: self.size] - self.columns[: self.size] @ self.corner.solve(whole[self.size :])
 
 
-def bordered(matrix: NDArray[Any], scale: Array, columns: Array, border: NDArray[Any], row: NDArray[Any]) -> Factor:
-    """LU factors of `[S A C, border; row]`, S and C the diagonal matrices of `scale` and `columns`; the border has as
-    many columns (m, k) as the matrix lacks.
+def bordered(matrix: NDArray[Any], columns: Array, border: NDArray[Any], row: NDArray[Any]) -> Factor:
+    """LU factors of `[A C, border; row]`, C the diagonal matrix of `columns`; the border has as many columns (m, k) as
+    the matrix lacks.
     """
     m, n = matrix.shape
-    # as LAPACK wants it in memory, so that no copy is made
-    out = np.empty((m + 1, n + border.shape[1]), dtype=matrix.dtype, order="F")
-    np.multiply(matrix, np.multiply.outer(scale, columns), out=out[:m, :n])
+    out = np.empty((m + 1, n + border.shape[1]), dtype=matrix.dtype)
+    np.multiply(matrix, columns, out=out[:m, :n])
     out[:m, n:] = border
     out[m] = row
     return Factor.of(out, overwrite=True)

@@ -94,8 +94,7 @@ def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Fac
     jacobian = evaluation.jacobian
     if row is None:
         return Factor.of(jacobian / weights)
-    rows = len(jacobian)
-    return bordered(jacobian, np.ones(rows), 1.0 / weights, np.empty((rows, 0)), row)
+    return bordered(jacobian, 1.0 / weights, np.empty((len(jacobian), 0)), row)
 
 
 def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from bisect import insort
 from collections.abc import Callable
 
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.measures import fold
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import locate_zero
@@ -160,7 +160,8 @@ class _Follower(Driver):
         place = a.place + located.fraction * (b.place - a.place)
         if not turns_at(located, a, b):
             return Crossing(place, located, None)
-        return Crossing(place, located, fold(self.settings.stability.along(located.solution.state).multipliers))
+        sign, log = self.settings.stability.along(located.solution.state).symmetric[:, 0].tolist()
+        return Crossing(place, located, sign * math.exp(log))
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)

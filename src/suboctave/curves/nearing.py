@@ -41,15 +41,11 @@ def contacts_between(p: Sample, q: Sample) -> int:
 
 def _shrinks(one: GapExtrema, other: GapExtrema) -> bool:
     """Whether an excursion of one motion is a small part of the same excursion of another."""
-    size = YOUNG * np.abs(one.value).max(initial=0.0)
-    # a maximum above the gap, or a minimum below it
-    signs, others = np.where(one.curve > 0.0, -1.0, 1.0), np.where(other.curve > 0.0, -1.0, 1.0)
-    beyond = signs * (one.value - one.level)
-    for i in np.flatnonzero((beyond > 0.0) & (beyond < size)):
-        same = np.flatnonzero(others == signs[i])
+    for i in one.small(YOUNG):
+        same = np.flatnonzero(other.sides == one.sides[i])
         if same.size:
             j = same[np.cos(other.tau[same] - one.tau[i]).argmax()]
-            if beyond[i] < SHRINKS * others[j] * (other.value[j] - other.level):
+            if one.beyond[i] < SHRINKS * other.beyond[j]:
                 return True
     return False
 

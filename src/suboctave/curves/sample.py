@@ -124,7 +124,7 @@ class Sample:
     def measures(self) -> Array:
         """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
         point = self.point
-        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet.multipliers)
+        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet)
 
     # ---------------------------------------------------------------------------------- along curves of bifurcations
     @property

@@ -26,6 +26,7 @@ from suboctave.harmonic.basis import Array
 _FAST = {"reassoc", "contract", "nsz"}
 #: relative errors of the entries of a monodromy matrix by rounding
 _ROUNDING = 1e-15
+_ONE, _TINY = np.ones(1), float(np.finfo(float).tiny)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -255,17 +256,18 @@ def response(start: Array, nodes: Array, active: np.ndarray, path: Array, larges
 
     nodes: see `propagate`; path (C, 2, N): the motion along all channels; active (G,): those that act.
     """
-    moved = (nodes[:, :, :-1] @ start + nodes[:, :, -1]).reshape(-1, 2, len(active), ORDER)
+    panels, groups = len(nodes), len(active)
+    moved = nodes.reshape(-1, nodes.shape[2]) @ np.concatenate((start, _ONE))
+    moved = moved.reshape(panels, 2, groups, ORDER)
     out = np.zeros(path.shape)
     # the last node of a panel is the first of the next
-    out[active, :, :-1] = moved[..., :-1].transpose(2, 1, 0, 3).reshape(len(active), 2, -1)
+    out[active, :, :-1] = moved[..., :-1].transpose(2, 1, 0, 3).reshape(groups, 2, -1)
     out[active, :, -1] = moved[-1, :, :, -1].T
     size, limit = np.abs(out[:, 0]).max(axis=1), largest * np.abs(path[:, 0]).max(axis=1)
-    if not np.isfinite(size).all():
+    worst = float((size / np.maximum(limit, _TINY)).max())
+    if not worst < math.inf:
         return np.zeros(path.shape), 0.0
-    over = size > limit
-    share = float((limit[over] / size[over]).min(initial=1.0))
-    return out * share, share
+    return (out, 1.0) if worst <= 1.0 else (out / worst, 1.0 / worst)
 
 
 @kernel()

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
-
-#: logarithm of the product of all multipliers below which a motion counts as undamped
-_UNDAMPED = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,10 +84,15 @@ class FloquetResult:
         """True if no multiplier is closer to the unit circle than its error estimate."""
         return self._verdict[1]
 
+    @lazy
+    def symmetric(self) -> Array:
+        """Symmetric functions of the multipliers, (2, 3): see `floquet.symmetric`."""
+        return symmetric_functions(self.multipliers)
+
     @property
     def undamped(self) -> bool:
         """True if the product of all multipliers is one to rounding: pairs then stay on the unit circle."""
-        return abs(float(np.log(np.maximum(np.abs(self.multipliers), 1e-300)).sum())) < _UNDAMPED
+        return abs(float(np.log(np.maximum(np.abs(self.multipliers), 1e-300)).sum())) < UNDAMPED
 
     @property
     def unstable(self) -> int:

@@ -211,8 +211,8 @@ def split(panels: Array, start: np.ndarray, parts: np.ndarray) -> tuple[Array, n
 def longest_panel(c: ComplexArray, degree: int) -> float:
     """Longest panel in tau for a tangent that is a polynomial of this degree in the motion c (G, H + 1)."""
     size = np.abs(c)
-    relevant = (size > _RELEVANT * size.max(axis=1, keepdims=True)).any(axis=0)
-    top = int(np.flatnonzero(relevant).max(initial=1))
+    relevant = np.flatnonzero((size > _RELEVANT * size.max(axis=1, keepdims=True)).any(axis=0))
+    top = int(relevant[-1]) if len(relevant) else 1
     # quarters of a period at most: the least that a polynomial of degree six follows
     return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
 

@@ -21,7 +21,7 @@ from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.sampled import settled_samples
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import add_operator, apply_blocks, balance_residual, block_diagonal, sparse, toeplitz
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, by_rows, spectrum_to_real
 from suboctave.harmonic.equations import Equations, Laws
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.lazy import lazy
@@ -136,8 +136,8 @@ class BalanceState:
     @lazy
     def motions(self) -> ComplexArray:
         """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
-        motions: ComplexArray = self.balance.acting[: len(self.balance.groups)] @ to_complex(self.x).T
-        return motions
+        balance = self.balance
+        return by_rows(balance.acting[: len(balance.groups)] @ self.x.T)
 
     @lazy
     def _along(self) -> list[tuple[Along, list[LawAlong]]]:
@@ -163,8 +163,7 @@ class BalanceState:
         """The channels of elements with several inputs, corners, or time."""
         channels = []
         for group in self.balance.own:
-            motions = np.ascontiguousarray((to_complex(self.x) @ group.inputs.T).T)
-            along = Along(motions, self.rate, self.basis.nu, group.moving, self.balance.top)
+            along = Along(by_rows(group.inputs @ self.x.T), self.rate, self.basis.nu, group.moving, self.balance.top)
             members = tuple([self.laws.members[i] for i in group.members])
             channels.append(Channel(group, along, [GeneralLaw(along, members)]))
         return channels
@@ -353,6 +352,8 @@ class BalanceState:
         high = self.basis.harmonics
         total: Array | None = None
         if name == "omega":
+            if self.balance.steady:
+                return None
             for channel in self.channels:
                 for i, d in enumerate(channel.ins if channel.moving else ()):
                     slope = toeplitz(channel.damping(i), high) @ self.basis.derivative(self.x @ d)

@@ -18,13 +18,13 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.events.locate import Guess, Singular, locate_branch_point
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
+from suboctave.floquet.symmetric import UNDAMPED
 from suboctave.harmonic.perturbation import Kind
 
 #: transversality of a limit point, at least. Newton's method leaves one located on a branch point by mistake within
@@ -143,7 +143,7 @@ class NeimarkSacker(BifurcationKind):
         out, partner = min(((m, p) for m in candidates for p in partners), key=lambda pair: abs(pair[0] - pair[1]))
         with np.errstate(divide="ignore"):
             products = [float(np.log(np.abs(sample.floquet.multipliers)).sum()) for sample in (a, b)]
-        if max(map(abs, products)) < measures.UNDAMPED:
+        if max(map(abs, products)) < UNDAMPED:
             # pairs stay on the circle and rounding alone carries them across; one point alone may lie where a pair does
             return None
         return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))

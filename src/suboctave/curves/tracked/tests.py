@@ -24,12 +24,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
+from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
@@ -299,7 +299,7 @@ class PairCrossing(CurveTest):
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
-        sign, size = measures.torus(sample.others).tolist()
+        sign, size = symmetric_functions(sample.others)[:, 2].tolist()
         return sign, size
 
 
@@ -328,7 +328,7 @@ def _passing(first: ComplexArray, last: ComplexArray) -> tuple[complex, complex]
         return None
     outside, inside = (first, last) if a[0] > b[0] else (last, first)
     with np.errstate(divide="ignore"):
-        if abs(float(np.log(np.abs(outside)).sum())) < measures.UNDAMPED:
+        if abs(float(np.log(np.abs(outside)).sum())) < UNDAMPED:
             # pairs stay on the circle and rounding alone carries them across
             return None
     leaving = outside[(outside.imag > 0.0) & (np.abs(outside) > 1.0)]
