@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import distance
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Curve
@@ -81,7 +81,5 @@ class Bounds:
             solved = correct(b.curve, guess, index, b.weights, newton)
         except ConvergenceError:
             return None
-        u = solved.u
-        u[index] = bound
-        arclength = a.arclength + length(b.weights * (u - b.curve.transfer(a.u, a.curve)))
+        arclength = a.arclength + distance(solved.u, b.curve.transfer(a.u, a.curve), b.weights)
         return make_point(solved, b.curve, b.tangent, arclength)

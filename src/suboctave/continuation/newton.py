@@ -130,7 +130,8 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    row = np.eye(1, len(guess), row)[0] if isinstance(row, int) else row
+    held = row if isinstance(row, int) else None
+    row = row if held is None else np.eye(1, len(guess), held)[0]
     u, last = guess.copy(), None
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
     factor = known
@@ -160,6 +161,9 @@ def correct(
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         before = error
         step = factor.solve(_right_side(evaluation, row, weights * (u - guess)))
+        if held is not None:
+            # zero but for rounding of the factors
+            step[held] = 0.0
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
             nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
