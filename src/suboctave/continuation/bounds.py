@@ -12,8 +12,6 @@ from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Curve
 from suboctave.errors import ConvergenceError
 
-__all__ = ["Bounds"]
-
 #: how often a step is halved towards the bound that it passes; Newton's method does the rest
 _HALVED = 20
 #: way beyond a bound, as a share of the range, that a turn on it may lie by rounding

@@ -9,8 +9,6 @@ from enum import StrEnum
 
 from suboctave.interruption import Interruption
 
-__all__ = ["EndReason", "Ending", "interruption_of", "read_endings", "sentence"]
-
 
 class EndReason(StrEnum):
     """Why a curve ends at one of its two ends; files hold the values."""

@@ -130,8 +130,9 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    held = row if isinstance(row, int) else None
-    row = row if held is None else np.eye(1, len(guess), held)[0]
+    held = None
+    if isinstance(row, int):
+        held, row = row, np.eye(1, len(guess), row)[0]
     u, last = guess.copy(), None
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
     factor = known

@@ -8,8 +8,6 @@ from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array, Curve
 
-__all__ = ["Place"]
-
 
 class Place:
     """A point of a curve that a march may come back to."""

@@ -9,8 +9,6 @@ from suboctave.continuation.newton import NewtonOptions, Solved, closely, correc
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 
-__all__ = ["CurvePoint", "between", "make_point", "point_between", "solved_again"]
-
 
 @dataclass(eq=False, slots=True)
 class CurvePoint:

@@ -7,7 +7,7 @@ curves to it.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,3 @@ class Curve(Problem, Protocol):
 
     def unwrapped(self, u: Array, near: Array) -> Array:
         """The same u with periodic unknowns moved by whole periods next to those of `near`; where none is, u itself."""
-
-
-__all__ = ["Any", "Array", "Curve", "Evaluation", "Problem"]

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from suboctave.errors import InputError, check_numbers
 
-__all__ = ["SteppingOptions"]
-
 #: angle between successive tangents at which a step is refused, radians, unless the aim is large
 _SHARP = 0.75
 

@@ -114,6 +114,3 @@ class Audit:
         if self.complete:
             return text + "nothing unsettled"
         return text + "\n  ".join([f"{len(self.unsettled)} unsettled:", *map(str, self.unsettled)])
-
-
-__all__ = ["PLACE", "Audit", "Unsettled", "joined"]

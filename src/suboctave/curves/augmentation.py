@@ -106,6 +106,3 @@ class Augmentation(ABC):
     def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
         """Extra unknowns in a basis with other harmonics."""
         return extra
-
-
-__all__ = ["Augmentation", "Equations", "Gradient"]

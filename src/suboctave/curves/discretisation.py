@@ -15,8 +15,6 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.system import System
 
-__all__ = ["Harmonics", "check_unknowns", "harmonics_of", "make_curve", "own_linear_part", "rule_of"]
-
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
 

@@ -120,6 +120,3 @@ def _distance(pair: Pair, place: float) -> float:
     """How far outside a pair of samples a place lies; 0 inside."""
     a, b = (s.point.arclength for s in pair)
     return max(a - place, place - b, 0.0)
-
-
-__all__ = ["DoublingWatch", "leading"]

@@ -15,8 +15,6 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace
 from suboctave.interruption import Interruption
 
-__all__ = ["Driver", "same_event"]
-
 #: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
 _NOTHING = 1e-12
 

@@ -395,6 +395,3 @@ def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], sett
     ends = [t.points[-1].orbit for t in (forward, back)]
     misses = [abs((o.omega if name == "omega" else o.values[name]) - target) for o in ends]
     return back.reversed_before(forward) if misses[0] <= misses[1] else forward.reversed_before(back)
-
-
-__all__ = ["both_ways", "follow"]

@@ -97,6 +97,3 @@ def _wanted(doublings: list[tuple[Located, Sample, Sample]], options: AdaptiveHa
     states = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in doublings]
     bases = (choose_harmonics(state, options, options.event_tolerance) for state in states)
     return max(bases, key=lambda basis: basis.harmonics)
-
-
-__all__ = ["REASON", "HiddenDoublings", "Stretch", "pair_in"]

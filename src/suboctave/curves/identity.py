@@ -32,8 +32,6 @@ from suboctave.continuation.problem import Array
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 
-__all__ = ["Relation", "apart", "gap_to", "lies_on", "mirrored", "relation"]
-
 #: two motions are one if they differ by less, relative to their size: solved twice they differ by the harmonics
 #: neglected and by Newton's tolerance, both smaller
 TOLERANCE = 1e-4

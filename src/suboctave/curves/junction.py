@@ -31,19 +31,6 @@ from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 
-__all__ = [
-    "UNSEEN",
-    "Beside",
-    "Junction",
-    "Meeting",
-    "beside",
-    "curvature_of",
-    "doubled",
-    "emanating",
-    "meeting",
-    "period_name",
-]
-
 #: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 #: share of a motion by which the first or last motion of a branch may differ from that of the bifurcation beside it

@@ -374,6 +374,3 @@ def _turns(nu: int, harmonics: int) -> list[tuple[float, Array, Array]]:
     turns = [2.0 * np.pi * shift / nu for shift in range(nu)]
     angles = [turn * np.arange(1, harmonics + 1)[:, None] for turn in turns]
     return [(turn, np.cos(angle), np.sin(angle)) for turn, angle in zip(turns, angles, strict=True)]
-
-
-__all__ = ["CRITICAL_EVERY", "MotionEvaluation", "MotionProblem"]

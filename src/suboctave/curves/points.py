@@ -9,8 +9,6 @@ from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
 
-__all__ = ["BranchPoint", "TrackedPoint"]
-
 
 @dataclass(frozen=True, eq=False)
 class BranchPoint:

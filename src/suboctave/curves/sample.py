@@ -32,8 +32,6 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.lazy import lazy
 
-__all__ = ["Sample"]
-
 _MONODROMY = Monodromy()
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9

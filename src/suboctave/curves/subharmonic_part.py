@@ -63,6 +63,3 @@ def _rows_of_parts(nu: int, harmonics: int) -> list[np.ndarray]:
 def doubled_size(curve: MotionProblem, u: Array) -> float:
     """Size of the doubled part of a motion, nu even."""
     return float(np.linalg.norm(parts_of(curve, u)[0]))
-
-
-__all__ = ["NOTHING_LEFT", "doubled_size", "keeps_subharmonics", "parts_of", "repeats_earlier", "subharmonic_share"]

@@ -15,8 +15,6 @@ from suboctave.floquet.methods import StabilityMethod
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.progress import CurveProgress, Report
 
-__all__ = ["Doubt", "Settings", "Trace"]
-
 _REMEDY = "a smaller max_step or more harmonics may settle it, or shooting (so.verify)"
 
 

@@ -24,16 +24,6 @@ from suboctave.curves.kinds.singular import OPERATORS, SingularOperator
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.perturbation import Kind
 
-__all__ = [
-    "BORDERED",
-    "DOUBLING_TESTS",
-    "Alcorta2019",
-    "BorderedSystem",
-    "ExtendedSystem",
-    "Formulation",
-    "formulation_of",
-]
-
 #: the published test functions for period doublings
 DOUBLING_TESTS = ("multiplier", "determinant")
 

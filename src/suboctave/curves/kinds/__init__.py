@@ -11,8 +11,6 @@ from suboctave.kinds import KINDS
 if TYPE_CHECKING:
     from suboctave.curves.augmentation import Augmentation
 
-__all__ = ["equations_of"]
-
 
 @cache
 def equations_of(kind: str) -> type[Augmentation]:

@@ -125,6 +125,3 @@ class BranchPointEquations(Equations):
 
     def renewed(self) -> BranchPointUnfolded:
         return self.of.renewed(self.state, self.bordered.vectors)
-
-
-__all__ = ["BranchPointEquations", "BranchPointUnfolded"]

@@ -25,8 +25,6 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, operator_along
 from suboctave.lazy import lazy
 
-__all__ = ["ExtendedOperator", "PublishedDoubling"]
-
 #: changes of the unit null vector that count as one in arclength: it does not govern the steps
 _SPAN = 100.0
 

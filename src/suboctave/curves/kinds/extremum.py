@@ -35,8 +35,6 @@ from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
 
-__all__ = ["Extremal", "ExtremalEquations", "LimitPointExtremal", "isola_type"]
-
 #: determinant of the quadratic form over the square of its size below which its type is not certain
 _DEGENERATE = 1e-8
 

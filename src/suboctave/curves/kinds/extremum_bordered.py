@@ -16,8 +16,6 @@ from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
 
-__all__ = ["BorderedExtremal"]
-
 #: step of the differences that h is differentiated by, in units of the motion and of the parameters' ranges
 _STEP = 1e-5
 

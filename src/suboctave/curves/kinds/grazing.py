@@ -102,6 +102,3 @@ class GrazingEquations(Equations):
 
     def renewed(self) -> GrazingContactEquations:
         return GrazingContactEquations.of(self.state, self.of.element, self.of.index)
-
-
-__all__ = ["GrazingContactEquations", "GrazingEquations"]

@@ -35,6 +35,3 @@ class NoEquations(Equations):
 
     def renewed(self) -> Plain:
         return self.of
-
-
-__all__ = ["PLAIN", "NoEquations", "Plain"]

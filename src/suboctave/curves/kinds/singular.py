@@ -134,6 +134,3 @@ class SingularEquations(Equations):
 
     def renewed(self) -> SingularOperator:
         return SingularOperator(self.of.kind, self.bordered.vectors, self.state.omega**2)
-
-
-__all__ = ["OPERATORS", "SingularEquations", "SingularOperator"]

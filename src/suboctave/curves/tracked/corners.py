@@ -102,6 +102,3 @@ def _gradient(sample: Sample, gap: GapExtrema, at: int) -> Array:
     by_x = np.multiply.outer(value, read_direction(state, gap.element))
     rates = np.array([-level_rate(state, gap.element, gap.index, name) for name in curve.names])
     return curve.join(by_x, rates, np.zeros(curve.augmentation.extras))
-
-
-__all__ = ["beyond_corner"]

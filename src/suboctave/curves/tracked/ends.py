@@ -370,15 +370,3 @@ def _remaining(curve: MotionProblem, u: Array) -> float:
     extra, omega = curve.extra(u), curve.split(u)[1]
     share = float(extra[0]) * curve.balance.basis.nu / omega
     return share - 0.5 * round(2.0 * share)
-
-
-__all__ = [
-    "End",
-    "comes_close",
-    "end_ahead",
-    "end_between",
-    "is_lopsided",
-    "points_before",
-    "rebased",
-    "resonant_between",
-]

@@ -388,14 +388,3 @@ def _isola(event: LocatedEvent) -> str:
     extremal = LimitPointExtremal(base, beside, 1.0, event.test.name)
     equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
     return equations.isola
-
-
-__all__ = [
-    "SAME",
-    "LocatedEvent",
-    "as_event",
-    "events_between",
-    "extreme_of",
-    "located",
-    "refined",
-]

@@ -295,6 +295,3 @@ def _other_bounds(curve: MotionProblem, box: Box) -> list[Bounds]:
 
     ranges = box.ranges(curve.names)
     return [Bounds(index_of(name), *ranges[name]) for name in curve.names[:-1] if name in ranges]
-
-
-__all__ = ["follow_tracked"]

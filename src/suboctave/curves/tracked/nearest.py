@@ -169,6 +169,3 @@ def _beside(point: CurvePoint, way: float, newton: NewtonOptions) -> Sample | No
     if evaluation.error > newton.tolerance:
         return None
     return Sample(replace(point, u=u, evaluation=evaluation, arclength=point.arclength + way))
-
-
-__all__ = ["BEGINNING", "nearest_point", "null_row", "same_discretisation", "zero_along"]

@@ -168,14 +168,3 @@ def solved_start(
         else:
             words = f"the {item.kind} at {where} was not found again: {failure}"
         raise ConvergenceError(words) from None
-
-
-__all__ = [
-    "Box",
-    "curve_through",
-    "discretisation",
-    "is_extremum",
-    "solved_start",
-    "spans_of",
-    "with_extremum",
-]
