@@ -130,12 +130,9 @@ def correct(
     ConvergenceError
         If the iterations do not contract or run out.
     """
-    held = None
-    if isinstance(row, int):
-        held, row = row, np.eye(1, len(guess), row)[0]
-    u, last = guess.copy(), None
+    plane = np.eye(1, len(guess), row)[0] if isinstance(row, int) else row
+    u, last, factor = guess.copy(), None, known
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
-    factor = known
     nearest: Solved | None = None
     for iteration in range(options.iterations + 1):
         check_time()
@@ -148,7 +145,7 @@ def correct(
         settled = min(previous, left) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
-                factor = factorised(evaluation, row, weights)
+                factor = factorised(evaluation, plane, weights)
             return Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
         if iteration == options.iterations:
             break
@@ -156,28 +153,25 @@ def correct(
         # ones are those of the point as well
         stale = previous > SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
         if factor is None or (iteration > 0 and stale):
-            factor = factorised(evaluation, row, weights)
+            factor = factorised(evaluation, plane, weights)
             last, way = evaluation, 0.0
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
-        before = error
-        step = factor.solve(_right_side(evaluation, row, weights * (u - guess)))
-        if held is not None:
-            # zero but for rounding of the factors
-            step[held] = 0.0
+        step = factor.solve(_right_side(evaluation, plane, weights * (u - guess)))
+        if isinstance(row, int):
+            step[row] = 0.0  # but for rounding of the factors it is
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
             nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
         share = _decrease(curve, u, step / weights, error) if options.damped else options.share(step)
         u, size = u - share * step / weights, length(step)
-        way += share * size
+        way, before = way + share * size, error
         if iteration == 0:
             first = size
         else:
             rate, contraction = contraction, size / previous if previous > 0.0 else 0.0
             lost = (contraction > 2.0 and size > first) or min(rate, contraction) > STALLED
-            if row is None:
-                lost = _leads_away(iteration, size, contraction, previous)
+            lost = lost if plane is not None else _leads_away(iteration, size, contraction, previous)
             if lost and not options.damped and nearest is None:
                 break
         previous = size if share == 1.0 else math.inf
