@@ -64,9 +64,12 @@ class CurveTest(ABC):
         """The test function; 0 where it says nothing."""
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """Whether it changes sign between two neighbours."""
+        """Whether it changes sign between two neighbours. A zero has the sign of its sign bit: walked either way from
+        a point at which it vanishes, a curve has the event once.
+        """
         first, last = self.value(a), self.value(b)
-        return first * last < 0.0 or (last == 0.0 and first != 0.0)
+        product = first * last
+        return product < 0.0 or (product == 0.0 and math.copysign(1.0, first) != math.copysign(1.0, last))
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
         """The test with a function that is smooth between two neighbours."""
