@@ -25,7 +25,7 @@ from suboctave.harmonic.loads import LoadSpectrum
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import BaseElement
-from suboctave.model.elements.coupled import CoupledElement, as_coupled
+from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, Sampling
 from suboctave.model.system import System
 
@@ -105,7 +105,7 @@ class Equations:
     def _own_channel(self, i: int, element: BaseElement) -> Group:
         n = self.system.n
         out = np.asarray(self.linear.retain(element.direction(n)), dtype=float)
-        inputs = np.array([self.linear.retain(d) for d in as_coupled(element).inputs(n)], dtype=float)
+        inputs = np.array([self.linear.retain(d) for d in element.inputs(n)], dtype=float)
         return Group(out, inputs, (i,), element.depends_on_velocity)
 
     @lazy

@@ -141,7 +141,7 @@ class Field:
         columns = 0
         for element, c in self.smooth:
             law = as_coupled(element)
-            inputs = law.inputs(n)
+            inputs = element.inputs(n)
             zero = np.zeros_like(inputs)
             read.append(np.hstack([inputs * self.lengths, zero]))
             if element.depends_on_velocity:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.errors import InputError, located
 from suboctave.model.description import Recorded
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
-from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling
+from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling, WholeLaw
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
 Array: TypeAlias = NDArray[np.float64]
@@ -243,6 +243,28 @@ class Element(BaseElement):
         slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
         by_v = central_difference(lambda h: np.array(self.curvature(u, v + h, c)), step_of(v, slow))
         return f_uuu, by_v[0], by_v[1], by_v[2]
+
+
+class DeclaredElement(Element):
+    """An element without velocity whose smoothness class is all of its law (`whole`): that evaluates it."""
+
+    @abstractmethod
+    def law_at(self, c: Array) -> WholeLaw:
+        """The law at these coefficients."""
+
+    def sampling(self, c: Array) -> Sampling:
+        return self.law_at(c)
+
+    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
+        return *self.law_at(c).tangent(u, c), None
+
+    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
+        """`f_uu`; at corners its regular part."""
+        return self.law_at(c).curvature(u, c), None, None
+
+    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
+        """`f_uuu`; at corners its regular part."""
+        return self.law_at(c).third(u, c), None, None, None
 
 
 def required(owner: str, **given: Any) -> None:

@@ -165,42 +165,6 @@ class PiecesForm(BatchForm):
         return [], f"{sign}({names.q[0]} - {names.number(2 * i + 1)})", f"{sign}{names.r[0]}"
 
 
-class QuadraticForm(BatchForm):
-    """`c v |v|`."""
-
-    count = corners = 1
-
-    def tangent(self, names: Names) -> Tangent:
-        c, v = names.number(0), names.r[0]
-        return Tangent([], f"{c} * {v} * abs({v})", [""], [f"2.0 * {c} * abs({v})"])
-
-    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
-        c, v, sign = names.number(0), names.r[0], f"(2.0 * {names.on(0)} - 1.0)"
-        return Tangent([], f"{sign} * {c} * {v} * {v}", [""], [f"{sign} * 2.0 * {c} * {v}"])
-
-    def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
-        return [], names.r[0], names.a[0]
-
-
-class TanhForm(BatchForm):
-    """`force tanh(v / velocity)`."""
-
-    count = 2
-
-    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
-        return [float(c[0]), 1.0 / float(c[1])]
-
-    def tangent(self, names: Names) -> Tangent:
-        t = f"{names.prefix}t"
-        force, sharp = names.number(0), names.number(1)
-        return Tangent(
-            [f"{t} = tanh({names.r[0]} * {sharp})"],
-            f"{force} * {t}",
-            [""],
-            [f"{force} * {sharp} * (1.0 - {t} * {t})"],
-        )
-
-
 class WrittenForm(BatchForm):
     """A force given as text, from its SymPy expression."""
 

@@ -4,8 +4,6 @@ A coupled element acts along its own direction d_out with the force `f`, on the 
 motion. It reads the displacements `u_i = d_i . x` along its inputs d_1 .. d_m and, if it depends on velocity, their
 rates v_i: together `q = (u_1, .., u_m, v_1, .., v_m)`. Time enters as the phase of the load, `theta = omega t`, and
 periodically: `f(q, theta + 2 pi) = f(q, theta)`. That is parametric excitation: stiffness that varies in time.
-
-Forces written as text: `Expression(0, "alpha*x**3 + beta*x**2*x'")`.
 """
 
 from __future__ import annotations
@@ -22,6 +20,7 @@ from suboctave.errors import InputError
 from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Place, required
 from suboctave.model.elements.batch_form import BatchForm, WrittenForm
 from suboctave.model.elements.smoothness import Sampling
+from suboctave.model.elements.written import WrittenElement
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
 
@@ -96,9 +95,6 @@ class _OneInput:
         self.count = 1
         self._moving = element.depends_on_velocity
 
-    def inputs(self, n: int) -> Array:
-        return self.element.direction(n)[None]
-
     def _state(self, q: Array) -> tuple[Array, Array]:
         return q[0], q[1] if self._moving else np.zeros_like(q[0])
 
@@ -129,10 +125,12 @@ def reads(element: BaseElement, n: int) -> Array:
     return np.asarray(element.inputs(n)[0])
 
 
-def as_coupled(element: BaseElement) -> CoupledElement | _OneInput:
-    """Any element in the form of a coupled one."""
+def as_coupled(element: BaseElement) -> CoupledElement | Law | _OneInput:
+    """The law of any element in the form of a coupled one, `f(q, theta; c)`."""
     if isinstance(element, CoupledElement):
         return element
+    if isinstance(element, WrittenElement):
+        return element.law
     assert isinstance(element, Element)
     return _OneInput(element)
 
@@ -190,9 +188,6 @@ class Expression(CoupledElement):
         from suboctave.model.expressions.law import law_of
 
         return law_of(self.expression, self.states, self._short, f"Expression({self.expression!r:.60})")
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "_law"}
 
     @property
     def label(self) -> str:

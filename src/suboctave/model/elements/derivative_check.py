@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, check_numbers, shortened
 from suboctave.model.elements.base import STEP, Array, BaseElement, Element, central_difference, shifted, step_of
-from suboctave.model.elements.coupled import CoupledElement, as_coupled
+from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import (
     CornerSampling,
     PiecewiseLinear,
     PolynomialSampling,
     SharpSampling,
     SharpVelocitySampling,
+    WholeLaw,
     levels,
 )
 
@@ -79,7 +80,7 @@ def check_derivatives(
         raise InputError(f"parameters must be a mapping {{name: number}}, not {shortened(parameters)}")
     check_numbers(**{str(name): value for name, value in (parameters or {}).items()})
     c = element.coefficient_values(parameters or {})
-    at = _one_input(element, c, u, v) if isinstance(element, Element) else _coupled(element, c, u, v)
+    at = _places(element, c, u, v)
     messages = _wrong_shapes(element, at, c)
     errors = {} if messages else {**_derivative_errors(element, at, c), **_smoothness_errors(element, at, c)}
     return DerivativeReport(repr(element), rtol, errors, tuple(messages))
@@ -95,67 +96,47 @@ class _Places:
     q: Array
     theta: Array
     steps: list[float]
-    coefficient_steps: list[float]
+    coefficient_steps: Array
 
 
-def _one_input(element: Element, c: Array, u: ArrayLike | None, v: ArrayLike | None) -> _Places:
-    """Around the gaps or sharp points, on both sides of each; those beside a corner are left out."""
-    kind = element.sampling(c)
-    points = list(levels(kind, c))
-    widths = list(kind.widths) if isinstance(kind, SharpSampling) else []
-    reach = max([abs(point) for point in points] + [0.0]) or max(widths, default=1.0)
+def _places(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | None) -> _Places:
+    """Around the gaps or sharp points of the first input, on both sides of each; those beside a corner are left out."""
+    kind, m = element.sampling(c), as_coupled(element).count
+    points, velocities = levels(kind, c), getattr(kind, "velocities", ())
+    widths = kind.widths if isinstance(kind, SharpSampling) else ()
+    slow = kind.widths if isinstance(kind, SharpVelocitySampling) else ()
+    reach = max(map(abs, points), default=0.0) or max(widths, default=1.0)
+    fast = max(map(abs, velocities), default=0.0) or reach
     if u is None:
         near = [width * np.geomspace(0.1, 30.0, 9) for width in widths]
         beside = [side for point, d in zip(points, near, strict=False) for side in (point - d, point + d)]
-        u = np.concatenate([np.linspace(-2.1, 2.3, 23) * reach, *beside])
-    x = np.asarray(u, dtype=float).ravel()
-    rate = reach * np.cos(1.0 + 2.7 * np.arange(len(x))) if v is None else np.asarray(v, dtype=float).ravel()
-    if len(rate) != len(x) or not len(x) or not (np.all(np.isfinite(x)) and np.all(np.isfinite(rate))):
-        raise InputError(f"u and v must be finite and of equal length, not {len(x)} and {len(rate)} entries")
-    length = min([*widths, float(np.max(np.abs(x))) or 1.0])
-    q: Array = np.array([x, rate])
-    if isinstance(kind, CornerSampling):
-        speeds = list(kind.velocities)
-        q = _away_from(q, 1, speeds, _BESIDE * STEP * max(map(abs, [*speeds, *rate])))
-    if isinstance(kind, PiecewiseLinear | CornerSampling):
-        margin = _BESIDE_ROUGH if isinstance(kind, CornerSampling) and kind.rough else _BESIDE
-        q = _away_from(q, 0, points, margin * STEP * max(length, reach))
-    slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
-    steps = []
-    for value in c:
-        own = abs(float(value)) or reach
-        # a gap moves the whole law: its step follows the width of the law, not its own size
-        steps.append(STEP * (min(length, own) if value in points else own))
-    return _Places(q, np.zeros(q.shape[1]), [STEP * length, step_of(q[1], slow)], steps)
-
-
-def _coupled(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | None) -> _Places:
-    """Around the first input's corners; u, v (m, N), one row per input."""
-    assert isinstance(element, CoupledElement)
-    m, count = len(element.input_places), np.arange(1, 24)
-    kind = element.sampling(c)
-    corners = kind if isinstance(kind, CornerSampling) else CornerSampling()
-    reach, fast = (max([abs(p) for p in some] + [0.0]) or 1.0 for some in (corners.points, corners.velocities))
-    rows = [2.1 * reach * np.sin((1.3 + 0.7 * i) * count + i) for i in range(m)] if u is None else [*np.atleast_2d(u)]
-    if element.depends_on_velocity:
+        first = np.concatenate([np.linspace(-2.1, 2.3, 23) * reach, *beside])
+        count = np.arange(1, len(first) + 1)
+        rows = [first, *(2.1 * reach * np.sin((1.3 + 0.7 * i) * count + i) for i in range(1, m))]
+    else:
+        rows = list(np.atleast_2d(np.asarray(u, dtype=float)))
+        count = np.arange(1, len(rows[0]) + 1)
+    if element.depends_on_velocity or isinstance(element, Element):
         own = [1.7 * fast * np.cos((1.7 + 0.6 * i) * count) for i in range(m)]
-        rows += own if v is None else [*np.atleast_2d(v)]
-    if len({len(row) for row in rows}) != 1 or not np.all(np.isfinite(np.concatenate(rows))):
-        raise InputError("u and v must be finite, with one row of equal length per input")
-    q: Array = np.array(rows, dtype=float)
-    for row, places in ((0, corners.points), (m, corners.velocities)):
-        if places:
-            margin = (_BESIDE_ROUGH if corners.rough else _BESIDE) * STEP * float(np.max(np.abs(q[row])))
-            q = _away_from(q, row, list(places), margin)
-    steps = [STEP * (abs(float(value)) or 1.0) for value in c]
-    return _Places(q, 0.37 + 0.9 * np.arange(q.shape[1], dtype=float), [step_of(row) for row in q], steps)
-
-
-def _away_from(q: Array, row: int, places: list[float], margin: float) -> Array:
-    far = np.all([np.abs(q[row] - place) > margin for place in places], axis=0) if places else np.full(q.shape[1], True)
-    if not np.any(far):
-        raise InputError("every place given lies on a corner of the law; give some away from it")
-    return q[:, far].copy()
+        rows += own if v is None else list(np.atleast_2d(np.asarray(v, dtype=float)))
+    expected = m * (1 + (element.depends_on_velocity or isinstance(element, Element)))
+    lengths = {len(row) for row in rows}
+    if len(rows) != expected or len(lengths) > 1 or not len(count) or not np.all(np.isfinite(np.concatenate(rows))):
+        raise InputError(f"u and v must be finite, with one row of equal length per input, not of {sorted(lengths)}")
+    q: Array = np.array(rows)
+    if isinstance(kind, PiecewiseLinear | CornerSampling):
+        margin = STEP * (_BESIDE_ROUGH if isinstance(kind, CornerSampling) and kind.rough else _BESIDE)
+        for row, size, corners in ((0, reach, points), (m, fast, velocities)):
+            for corner in corners:
+                size = max(size, float(np.max(np.abs(q[row]), initial=0.0)))
+                q = q[:, np.abs(q[row] - corner) > margin * size]
+        if not q.size:
+            raise InputError("every place given lies on a corner of the law; give some away from it")
+    steps = [step_of(row, min({0: widths, m: slow}.get(i, ()), default=np.inf)) for i, row in enumerate(q)]
+    by_c = STEP * np.array([abs(float(value)) or reach for value in c])
+    # a gap moves the whole law: its step follows the width of the law, not its own size
+    by_c = np.where(np.isin(c, points), np.minimum(by_c, steps[0]), by_c)
+    return _Places(q, 0.37 + 0.9 * np.arange(q.shape[1], dtype=float), steps, by_c)
 
 
 def _wrong_shapes(element: BaseElement, at: _Places, c: Array) -> list[str]:
@@ -253,22 +234,8 @@ def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
 def _smoothness_errors(element: BaseElement, at: _Places, c: Array) -> dict[str, float]:
     """Errors of the force that the smoothness class declares, where that is the whole law."""
     kind = element.sampling(c)
-    if not isinstance(element, Element):
+    if not (isinstance(element, Element) and isinstance(kind, WholeLaw) and kind.whole):
         return {}
-    u = at.q[0]
-    if isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
-        name, declared = "polynomial", np.polynomial.polynomial.polyval(u, kind.coefficients)
-    elif isinstance(kind, SharpSampling) and kind.steps is not None:
-        name, declared = "arctan steps", kind.constant + kind.slope * u
-        for point, width, step in zip(kind.points, kind.widths, kind.steps, strict=True):
-            y = u - point
-            declared += step / np.pi * (y * np.arctan(y / width) - 0.5 * width * np.log1p((y / width) ** 2))
-    elif isinstance(kind, PiecewiseLinear):
-        name, declared = "pieces", np.zeros_like(u)
-        for piece in kind.pieces:
-            distance = u - c[piece.gap]
-            declared += c[piece.stiffness] * distance * (piece.side * distance > 0.0)
-    else:
-        return {}
-    f = element.tangent(at.q[0], at.q[1], c)[0]
+    name = {PolynomialSampling: "polynomial", SharpSampling: "arctan steps", PiecewiseLinear: "pieces"}[type(kind)]
+    declared, f = kind.tangent(at.q[0], c)[0], element.tangent(at.q[0], at.q[1], c)[0]
     return {name: float(np.max(np.abs(declared - f))) / (float(np.max(np.abs(f))) or 1.0)}

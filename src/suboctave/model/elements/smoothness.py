@@ -1,7 +1,12 @@
-"""Smoothness classes of element laws. The class decides the quadrature rule."""
+"""Smoothness classes of element laws. The class decides the quadrature rule.
+
+Those of one displacement that may be all of a law (`whole`) evaluate it: `tangent` (f and f_u), `curvature` and `third`
+take u (N,) and the element's coefficients.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -9,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError
+
+Array: TypeAlias = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,32 @@ class PolynomialSampling:
             raise InputError(
                 f"a polynomial of degree {self.degree} has {self.degree + 1} coefficients, not {len(self.coefficients)}"
             )
+
+    @property
+    def whole(self) -> bool:
+        """Whether its coefficients are given."""
+        return self.coefficients is not None
+
+    def _derivative(self, order: int, u: Array) -> Array:
+        *lower, top = [math.perm(p, order) * factor for p, factor in enumerate(self.coefficients or ())][order:] or [
+            0.0
+        ]
+        value = np.full_like(u, top)
+        for factor in reversed(lower):
+            value = value * u + factor if factor else value * u
+        return value
+
+    def tangent(self, u: Array, c: Array) -> tuple[Array, Array]:
+        """`f, f_u`."""
+        return self._derivative(0, u), self._derivative(1, u)
+
+    def curvature(self, u: Array, c: Array) -> Array:
+        """`f_uu`."""
+        return self._derivative(2, u)
+
+    def third(self, u: Array, c: Array) -> Array:
+        """`f_uuu`."""
+        return self._derivative(3, u)
 
 
 @dataclass(frozen=True)
@@ -53,6 +86,34 @@ class SharpSampling:
         if len(self.points) != len(self.widths) or len(self.steps or self.points) != len(self.points):
             raise InputError("a sharp law has as many widths (and steps, if it tells them) as points")
 
+    @property
+    def whole(self) -> bool:
+        """Whether its steps are given."""
+        return self.steps is not None
+
+    def tangent(self, u: Array, c: Array) -> tuple[Array, Array]:
+        """`f, f_u`."""
+        force, stiffness = self.constant + self.slope * u, np.full_like(u, self.slope)
+        for ratio, width, step in self._steps(u):
+            angle = step / math.pi * np.arctan(ratio)
+            force += width * (ratio * angle - 0.5 * step / math.pi * np.log1p(ratio * ratio))
+            stiffness += angle
+        return force, stiffness
+
+    def curvature(self, u: Array, c: Array) -> Array:
+        """`f_uu`."""
+        return sum((step / (math.pi * w * (1.0 + r * r)) for r, w, step in self._steps(u)), np.zeros_like(u))
+
+    def third(self, u: Array, c: Array) -> Array:
+        """`f_uuu`."""
+        steps = self._steps(u)
+        return sum((-2.0 * step * r / (math.pi * (w * (1.0 + r * r)) ** 2) for r, w, step in steps), np.zeros_like(u))
+
+    def _steps(self, u: Array) -> list[tuple[Array, float, float]]:
+        """y_i / w_i (N,), w_i and step of each."""
+        numbers = zip(self.points, self.widths, self.steps or (), strict=True)
+        return [((u - point) / width, width, step) for point, width, step in numbers]
+
 
 @dataclass(frozen=True)
 class Piece:
@@ -68,9 +129,29 @@ class Piece:
 
 @dataclass(frozen=True)
 class PiecewiseLinear:
-    """The law is the sum of its pieces and nothing else, so that it can be integrated in closed form."""
+    """The law is the sum of its pieces and nothing else, so that it can be integrated in closed form.
+
+    Derivatives are their regular parts.
+    """
 
     pieces: tuple[Piece, ...]
+    whole = True
+
+    def tangent(self, u: Array, c: Array) -> tuple[Array, Array]:
+        """`f, f_u`."""
+        force, stiffness = np.zeros_like(u), np.zeros_like(u)
+        for piece in self.pieces:
+            beyond = u - c[piece.gap]
+            slope = c[piece.stiffness] * (piece.side * beyond > 0.0)
+            force += slope * beyond
+            stiffness += slope
+        return force, stiffness
+
+    def curvature(self, u: Array, c: Array) -> Array:
+        """`f_uu`."""
+        return np.zeros_like(u)
+
+    third = curvature
 
 
 @dataclass(frozen=True)
@@ -107,12 +188,12 @@ class SharpVelocitySampling:
             raise InputError("a sharp law has as many widths as velocities")
 
 
-Sampling: TypeAlias = (
-    PolynomialSampling | SharpSampling | PiecewiseLinear | AdaptiveSampling | CornerSampling | SharpVelocitySampling
-)
+#: classes that may be all of a law of one displacement
+WholeLaw: TypeAlias = PolynomialSampling | SharpSampling | PiecewiseLinear
+Sampling: TypeAlias = WholeLaw | AdaptiveSampling | CornerSampling | SharpVelocitySampling
 
 
-def switches(sampling: Sampling, c: NDArray[np.float64]) -> list[tuple[float, int, float | None]]:
+def switches(sampling: Sampling, c: Array) -> list[tuple[float, int, float | None]]:
     """Displacements at which a law changes or is sharp: (place, side, stiffness of the piece beyond it).
 
     A piece acts while `side (u - place) > 0`; without a stiffness the law is smooth but for the place itself.
@@ -124,6 +205,6 @@ def switches(sampling: Sampling, c: NDArray[np.float64]) -> list[tuple[float, in
     return []
 
 
-def levels(kind: Sampling, coefficients: NDArray[np.float64]) -> tuple[float, ...]:
+def levels(kind: Sampling, coefficients: Array) -> tuple[float, ...]:
     """Displacements at which a law has a corner, or is sharp, at these coefficients."""
     return tuple(place for place, _, _ in switches(kind, coefficients))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, is_number
-from suboctave.model.elements.base import Array, Dof, Element, required
+from suboctave.model.elements.base import Array, DeclaredElement, Dof, required
 from suboctave.model.elements.smoothness import PolynomialSampling
 from suboctave.model.expressions.coefficients import Coefficient
 
@@ -20,7 +19,7 @@ Number = float | str | Coefficient
 LARGEST_POWER = 1000
 
 
-class PolynomialSpring(Element):
+class PolynomialSpring(DeclaredElement):
     """`f = sum_p c_p u^p`, from `{power: coefficient}` or from the list `[c_1, c_2, ...]` of the factors of u, u^2, ...
 
     Powers are positive integers. Unit of `c_p`: force / length^p.
@@ -41,34 +40,16 @@ class PolynomialSpring(Element):
             self.coefficient_names = tuple(f"c{power}" for power in powers)
         super().__init__(dof, factors, direction=direction)
 
-    def sampling(self, c: Array) -> PolynomialSampling:
+    def law_at(self, c: Array) -> PolynomialSampling:
         """A polynomial in u alone."""
         factors = [0.0] * (max(self.powers) + 1)
         for power, factor in zip(self.powers, c, strict=True):
             factors[power] = float(factor)
         return PolynomialSampling(max(self.powers), tuple(factors))
 
-    def _derivative(self, order: int, u: Array, c: Array) -> Array:
-        """The derivative of this order by u."""
-        out = np.zeros_like(u)
-        for power, factor in zip(self.powers, c, strict=True):
-            if power >= order:
-                out += factor * math.perm(power, order) * _power(u, power - order)
-        return out
-
-    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        return self._derivative(0, u, c), self._derivative(1, u, c), None
-
-    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
-        return self._derivative(2, u, c), None, None
-
-    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
-        return self._derivative(3, u, c), None, None, None
-
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        f_c = np.array([_power(u, power) for power in self.powers])
-        f_uc = np.array([power * _power(u, power - 1) for power in self.powers])
-        return f_c, f_uc, None
+        powers = np.array(self.powers)[:, None]
+        return u**powers, powers * u ** (powers - 1), None
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """Zero: the force is linear in its coefficients."""
@@ -86,14 +67,9 @@ class CubicSpring(PolynomialSpring):
         super().__init__(dof, {3: coefficient}, direction=direction)
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
+        """See `Element.tangent`; the shortest form, for integrations in time."""
         stiffness = c[0] * u * u
         return stiffness * u, 3.0 * stiffness, None
-
-
-def _power(u: Array, power: int) -> Array:
-    if power < 4:  # NumPy takes the slow general power from the third one on
-        return (np.ones_like(u), u, u * u, u * u * u)[power]
-    return u**power
 
 
 def _read(kind: str, coefficients: Any) -> tuple[tuple[int, ...], list[Number | None]]:

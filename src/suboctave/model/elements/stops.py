@@ -20,13 +20,13 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, suggest
-from suboctave.model.elements.base import Array, Dof, Element, required
+from suboctave.model.elements.base import Array, DeclaredElement, Dof, required
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear, SharpSampling
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
@@ -37,152 +37,94 @@ _SHARPEST = 1e100
 
 
 # ------------------------------------------------------------------------------------------------------ laws of a stop
-@dataclass(frozen=True)
-class _Exact:
-    """The exact law of one stop, `k (u - b)` while it touches; derivatives are their regular parts."""
+class _Phi(NamedTuple):
+    """phi and its derivatives by y and by s."""
 
-    side: int
-    k: float
-    b: float
+    value: Any
+    y: Any
+    yy: Any
+    s: Any
+    ys: Any
+    ss: Any
 
-    def _contact(self, u: Array) -> Array:
-        return (self.side * (u - self.b) > 0.0).astype(float)
 
-    def tangent(self, u: Array) -> tuple[Array, Array]:
-        """`f, f_u`."""
-        slope = self.k * self._contact(u)
-        return slope * (u - self.b), slope
-
-    def curvature(self, u: Array) -> Array:
-        """`f_uu`."""
-        return np.zeros_like(u)
-
-    third = curvature
-
-    def rates(self, u: Array) -> tuple[Array, Array]:
-        """`f_c, f_uc` by stiffness and gap, (2, N)."""
-        contact = self._contact(u)
-        return np.array([contact * (u - self.b), -self.k * contact]), np.array([contact, np.zeros_like(u)])
-
-    def bends(self, u: Array) -> Array:
-        """`f_cc`, (2, 2, N)."""
-        zero, mixed = np.zeros_like(u), -self._contact(u)
-        return np.array([[zero, mixed], [mixed, zero]])
+def _phi(y: Any, s: float) -> _Phi:
+    angle, bell, log = np.arctan(s * y) / np.pi, 1.0 / (np.pi * (1.0 + (s * y) ** 2)), np.log1p((s * y) ** 2) / np.pi
+    phi_y = 0.5 + angle
+    return _Phi(
+        y * phi_y - log / (2.0 * s), phi_y, s * bell, log / (2.0 * s**2), y * bell, y**2 * bell / s - log / s**3
+    )
 
 
 @dataclass(frozen=True)
 class _Rounded:
-    """The regularised law of one stop, with the derivatives of `_Exact`; those of coefficients by the sharpness too."""
+    """The regularised law of one stop, per unit of stiffness, and its derivatives by gap and sharpness."""
 
     side: int
-    k: float
     b: float
     s: float
 
-    def tangent(self, u: Array) -> tuple[Array, Array]:
-        force, slope = self._unit(u)
-        return self.k * force, self.k * slope
-
-    def _unit(self, u: Array) -> tuple[Array, Array]:
-        """Force and slope per unit of stiffness."""
-        y = u - self.b
-        phi_y = _phi_y(y, self.s)
-        phi = _phi(y, self.s, phi_y)
-        if self.side > 0:
-            return phi + self.rest, phi_y
-        return u - phi + self.rest, 1.0 - phi_y
-
-    def curvature(self, u: Array) -> Array:
-        return self.side * self.k * _phi_yy(u - self.b, self.s)
-
-    def third(self, u: Array) -> Array:
-        y, s = u - self.b, self.s
-        return -self.side * self.k * 2.0 * s**3 * y / (np.pi * (1.0 + (s * y) ** 2) ** 2)
-
-    def rates(self, u: Array) -> tuple[Array, Array]:
-        y, s, size = u - self.b, self.s, self.side * self.k
-        f_k, f_uk = self._unit(u)
-        f_b = self.k * (self.rest_by_gap - self.side * _phi_y(y, s))
-        f_s = self.k * (self.rest_by_sharpness + self.side * _phi_s(y, s))
-        return np.array([f_k, f_b, f_s]), np.array([f_uk, -size * _phi_yy(y, s), size * _phi_ys(y, s)])
-
-    def bends(self, u: Array) -> Array:
-        y, b, s, size = u - self.b, self.b, self.s, self.side * self.k
-        f_kb = self.rest_by_gap - self.side * _phi_y(y, s)
-        f_ks = self.rest_by_sharpness + self.side * _phi_s(y, s)
-        f_bb = size * (_phi_yy(y, s) - _phi_yy(-b, s))
-        f_bs = size * (_phi_ys(-b, s) - _phi_ys(y, s))
-        f_ss = size * (_phi_ss(y, s) - _phi_ss(-b, s))
-        return np.array([[np.zeros_like(u), f_kb, f_ks], [f_kb, f_bb, f_bs], [f_ks, f_bs, f_ss]])
+    @cached_property
+    def _at_rest(self) -> _Phi:
+        return _phi(-self.b, self.s)
 
     @cached_property
-    def rest(self) -> float:
-        """r: what makes the force at `u = 0` that of the exact law."""
-        at_zero = _phi(-self.b, self.s, _phi_y(-self.b, self.s))
-        return float(self.side * max(-self.side * self.b, 0.0) - self.side * at_zero)
+    def _preload(self) -> float:
+        """`-side b` where that is positive, its derivative by the gap."""
+        return -1.0 if self.side * self.b < 0.0 else 0.0
 
     @property
-    def rest_by_gap(self) -> float:
-        """Its derivative by the gap; at `b = 0` from the side where the stop is open at rest."""
-        preloaded = 1.0 if self.side * self.b < 0.0 else 0.0
-        return float(self.side * _phi_y(-self.b, self.s) - preloaded)
+    def constant(self) -> float:
+        """Constant in `SharpSampling`."""
+        return float(self._preload * self.b - self.side * (self._at_rest.value + 0.5 * self.b))
 
-    @property
-    def rest_by_sharpness(self) -> float:
-        """Its derivative by the sharpness."""
-        return float(-self.side * _phi_s(self.b, self.s))
+    def constant_change(self, b: float, s: float) -> float:
+        """Its change with these changes of the gap and the sharpness."""
+        by_gap = self.side * (self._at_rest.y - 0.5) + self._preload
+        return float(by_gap * b - self.side * self._at_rest.s * s)
 
-    def constant(self, k: float, b: float, s: float) -> float:
-        """Change of the constant in `SharpSampling` with these changes of the coefficients."""
-        side = self.side
-        whole = k * (self.rest - 0.5 * side * self.b) + self.k * b * (self.rest_by_gap - 0.5 * side)
-        return whole + self.k * s * self.rest_by_sharpness
+    def rates(self, u: Array) -> tuple[Array, Array]:
+        """`f_c, f_uc`, (2, N)."""
+        at, rest, side = _phi(u - self.b, self.s), self._at_rest, self.side
+        f_c = np.array([self._preload - side * (at.y - rest.y), side * (at.s - rest.s)])
+        return f_c, side * np.array([-at.yy, at.ys])
 
-
-def _phi(y: Any, s: float, phi_y: Any) -> Any:
-    """phi, from its derivative."""
-    return y * phi_y - np.log1p((s * y) ** 2) / (2.0 * np.pi * s)
-
-
-def _phi_y(y: Any, s: float) -> Any:
-    return 0.5 + np.arctan(s * y) / np.pi
+    def bends(self, u: Array) -> Array:
+        """`f_cc`, (2, 2, N)."""
+        at, rest = _phi(u - self.b, self.s), self._at_rest
+        mixed = rest.ys - at.ys
+        return self.side * np.array([[at.yy - rest.yy, mixed], [mixed, at.ss - rest.ss]])
 
 
-def _phi_yy(y: Any, s: float) -> Any:
-    return s / (np.pi * (1.0 + (s * y) ** 2))
+@dataclass(frozen=True)
+class _Exact:
+    """The exact law of one stop, per unit of stiffness, and the regular parts of its derivatives by the gap."""
 
+    side: int
+    b: float
 
-def _phi_s(y: Any, s: float) -> Any:
-    return np.log1p((s * y) ** 2) / (2.0 * np.pi * s**2)
+    def rates(self, u: Array) -> tuple[Array, Array]:
+        """`f_c, f_uc`, (1, N)."""
+        return -(self.side * (u[None] - self.b) > 0.0).astype(float), np.zeros((1, len(u)))
 
-
-def _phi_ys(y: Any, s: float) -> Any:
-    return y / (np.pi * (1.0 + (s * y) ** 2))
-
-
-def _phi_ss(y: Any, s: float) -> Any:
-    return y**2 / (np.pi * s * (1.0 + (s * y) ** 2)) - np.log1p((s * y) ** 2) / (np.pi * s**3)
+    def bends(self, u: Array) -> Array:
+        """`f_cc`, (1, 1, N)."""
+        return np.zeros((1, 1, len(u)))
 
 
 @lru_cache(maxsize=256)
-def _laws_of(
-    sides: tuple[int, ...], regularised: bool, c: tuple[float, ...]
-) -> tuple[tuple[list[int], _Exact | _Rounded], ...]:
-    """Of stops with the coefficients c, the stiffness first: which of these are the own of each, and its law."""
-    last, kind = ([len(c) - 1], _Rounded) if regularised else ([], _Exact)
-    own = [([0, gap, *last], side) for gap, side in enumerate(sides, start=1)]
-    return tuple((index, kind(side, *(c[i] for i in index))) for index, side in own)
-
-
-def _sharp(rows: list[tuple[int, float, float, float, float]]) -> SharpSampling:
-    """Arctan steps of the side, the stiffness, the place, the width and the constant of each."""
-    sides, stiffness, places, widths, constants = zip(*rows, strict=True)
-    steps = tuple(side * k for side, k in zip(sides, stiffness, strict=True))
-    return SharpSampling(places, widths, sum(constants), sum(0.5 * k for k in stiffness), steps)
+def _rounded(sides: tuple[int, ...], c: tuple[float, ...]) -> tuple[SharpSampling, tuple[_Rounded, ...]]:
+    """All stops with the coefficients c: stiffness, gaps, sharpness."""
+    k, *gaps, s = c
+    laws = tuple(_Rounded(side, gap, s) for side, gap in zip(sides, gaps, strict=True))
+    steps = tuple(k * side for side in sides)
+    constant = sum(k * law.constant for law in laws)
+    whole = SharpSampling(tuple(gaps), (1.0 / s,) * len(gaps), constant, 0.5 * k * len(gaps), steps)
+    return whole, laws
 
 
 # ---------------------------------------------------------------------------------------------------------- elements
-class _Stops(Element):
+class _Stops(DeclaredElement):
     """Stops of one stiffness: its coefficients are that, a gap for every stop and, of a regularised law, the sharpness.
 
     `sides` (1 right, -1 left) are those of the stops.
@@ -229,49 +171,46 @@ class _Stops(Element):
                 "1e100): leave it out for the exact law, or choose units in which the gap is nearer to 1"
             )
 
-    def _laws(self, c: Array) -> tuple[tuple[list[int], _Exact | _Rounded], ...]:
-        """Of every stop: which of the coefficients are its own, and its law."""
-        return _laws_of(self.sides, self.regularised, tuple(c.tolist()))
-
-    def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
+    def law_at(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gaps with width 1/s."""
-        if not self.regularised:
-            return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
-        laws = [law for _, law in self._laws(c) if isinstance(law, _Rounded)]
-        return _sharp([(law.side, law.k, law.b, 1.0 / law.s, law.constant(law.k, 0.0, 0.0)) for law in laws])
+        if self.regularised:
+            return _rounded(self.sides, tuple(c.tolist()))[0]
+        return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
 
     def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
         if not self.regularised:
             return None
-        moved = [(law, *rates[index].tolist()) for index, law in self._laws(c) if isinstance(law, _Rounded)]
-        return _sharp([(law.side, k, b, -s / law.s**2, law.constant(k, b, s)) for law, k, b, s in moved])
+        (k, *gaps, s), (by_k, *by_gaps, by_s) = c.tolist(), rates.tolist()
+        laws = _rounded(self.sides, (k, *gaps, s))[1]
+        moved = zip(laws, by_gaps, strict=True)
+        constant = sum(by_k * law.constant + k * law.constant_change(by_gap, by_s) for law, by_gap in moved)
+        widths, steps = (-by_s / s**2,) * len(gaps), tuple(by_k * side for side in self.sides)
+        return SharpSampling(tuple(by_gaps), widths, constant, 0.5 * by_k * len(gaps), steps)
 
-    def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        forces, slopes = zip(*(law.tangent(u) for _, law in self._laws(c)), strict=True)
-        return sum(forces[1:], forces[0]), sum(slopes[1:], slopes[0]), None
-
-    def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
-        """`f_uu`; for the exact law its regular part, which is zero."""
-        return np.sum([law.curvature(u) for _, law in self._laws(c)], axis=0), None, None
-
-    def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
-        """`f_uuu`; for the exact law its regular part, which is zero."""
-        return np.sum([law.third(u) for _, law in self._laws(c)], axis=0), None, None, None
+    def _laws(self, c: Array) -> list[tuple[list[int], _Rounded | _Exact]]:
+        """Of every stop: which of the coefficients besides the stiffness are its own, and its law."""
+        if self.regularised:
+            return [([i, len(c) - 1], law) for i, law in enumerate(_rounded(self.sides, tuple(c.tolist()))[1], start=1)]
+        return [([i], _Exact(side, c[i])) for i, side in enumerate(self.sides, start=1)]
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`; for the exact law the regular parts."""
         f_c, f_uc = np.zeros((2, len(c), len(u)))
-        for index, law in self._laws(c):
+        f_c[0], f_uc[0], _ = self.tangent(u, v, np.array([1.0, *c[1:]]))
+        for own, law in self._laws(c):
             force, slope = law.rates(u)
-            f_c[index] += force
-            f_uc[index] += slope
+            f_c[own] += c[0] * force
+            f_uc[own] += c[0] * slope
         return f_c, f_uc, None
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
         f_cc = np.zeros((len(c), len(c), len(u)))
-        for index, law in self._laws(c):
-            f_cc[np.ix_(index, index)] += law.bends(u)
+        for own, law in self._laws(c):
+            by_own, _ = law.rates(u)
+            f_cc[0, own] += by_own
+            f_cc[own, 0] += by_own
+            f_cc[np.ix_(own, own)] += c[0] * law.bends(u)
         return f_cc
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import sympy
+from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array
@@ -43,10 +44,7 @@ _OPERATIONS = 5000
 @functools.lru_cache(maxsize=512)
 def law_of(text: str, states: tuple[str, ...], short: bool, where: str) -> Law:
     """The law of a text in the displacements `states` and their rates (with a prime); `short`: v is that of x."""
-    expression = force_expression(text, where)
-    if short:
-        expression = expression.subs(symbol("v"), symbol("x" + PRIME))
-    return Law(expression, states, where)
+    return Law(text, states, short, where)
 
 
 class Law:
@@ -64,7 +62,11 @@ class Law:
         Whether a velocity occurs; the highest multiple of the load's frequency, 0 without time.
     """
 
-    def __init__(self, expression: Any, states: tuple[str, ...], where: str) -> None:
+    def __init__(self, text: str, states: tuple[str, ...], short: bool, where: str) -> None:
+        self._source = text, states, short, where
+        expression = force_expression(text, where)
+        if short:
+            expression = expression.subs(symbol("v"), symbol("x" + PRIME))
         self.where, self.phase = where, symbol(_THETA)
         self._compiled: dict[str, Callable[..., Array]] = {}
         rates = [name + PRIME for name in states]
@@ -84,6 +86,9 @@ class Law:
         self._degree, self._corner_places = self._smoothness()
         powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
         self.rough = any(power.base.has(Ramp, Modulus, Step) for power in powers)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # compiled again on the other side
+        return law_of, self._source
 
     # ------------------------------------------------------------------------------------------------ smoothness
     def _smoothness(self) -> tuple[int | None, list[tuple[int, Any]] | None]:
@@ -213,11 +218,7 @@ class Law:
         size = len(by)
         index = list(itertools.combinations_with_replacement(range(size), order))
         values = self._code(what, lambda: [self.expression.diff(*(by[i] for i in one)) for one in index])(q, theta, c)
-        out = np.empty((size,) * order + (len(theta),))
-        for one, value in zip(index, values, strict=True):
-            for permuted in set(itertools.permutations(one)):
-                out[permuted] = value
-        return out
+        return values[_numbers_in_tensor(size, order)]
 
     def curvature(self, q: Array, theta: Array, c: Array) -> Array:
         """`f_qq`, (Q, Q, N)."""
@@ -238,6 +239,14 @@ class Law:
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""
         return self._symmetric("by c twice", self.c, 2, q, theta, c)
+
+
+@functools.cache
+def _numbers_in_tensor(size: int, order: int) -> NDArray[np.int64]:
+    """Of every entry of a symmetric tensor: its number among `combinations_with_replacement`."""
+    numbers = {one: i for i, one in enumerate(itertools.combinations_with_replacement(range(size), order))}
+    entries = [numbers[tuple(sorted(one))] for one in itertools.product(range(size), repeat=order)]
+    return np.array(entries, dtype=np.int64).reshape((size,) * order)
 
 
 def _off_corners(expression: Any) -> Any:
