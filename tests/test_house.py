@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import textwrap
@@ -13,6 +14,7 @@ import pytest
 
 import suboctave
 
+ROOT = Path(__file__).parents[1]
 SOURCE = Path(suboctave.__file__).parent
 
 # Data flows one way: a room imports from rooms before it in this list, and from itself.
@@ -221,3 +223,15 @@ def test_no_function_outgrows_a_page():
                 if node.end_lineno - node.lineno + 1 > 80 or len(arguments) > 15:
                     large.append(f"{path.relative_to(SOURCE)}:{node.lineno} {node.name}")
     assert not large
+
+
+def test_the_guide_names_modules_that_are_there():
+    """Paths in CONTRIBUTING.md, from the root or from src/suboctave; the function named beside a path is in it."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w./]+/[\w.]+\.py)`", text))
+    assert len(named) > 20
+    assert not [path for path in named if not any((base / path).exists() for base in (ROOT, SOURCE, SOURCE / "model"))]
+    functions = re.findall(r"`([\w/]+\.py)` `(\w+)", text)
+    assert len(functions) > 10
+    for path, name in functions:
+        assert re.search(rf"(def|class) {name}\b", (SOURCE / path).read_text(encoding="utf-8")), (path, name)
