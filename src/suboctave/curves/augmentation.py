@@ -48,6 +48,20 @@ class Equations(ABC):
     def renewed(self) -> Augmentation:
         """The augmentation with bordering vectors of this motion."""
 
+    def jacobian(self, names: tuple[str, ...]) -> Array:
+        """Derivatives of R, with what is added to it, and of the values, like `rows`; names: the free parameters."""
+        n, along, rows = self.state.balance.dimension, self.state.extended_jacobian(names[0]), self.rows
+        if not rows.size:
+            return along
+        out, first = np.empty((n + len(rows), rows.shape[1])), rows.shape[1] - len(names)
+        out[:n, :n], out[:n, n:first], out[:n, first] = along[:, :n], 0.0, along[:, n]
+        if self.column is not None:
+            out[:n, n] = self.column
+        for i, name in enumerate(names[1:], first + 1):
+            out[:n, i] = self.state.residual_by(name)
+        out[n:] = rows
+        return out
+
     def takes_over(self, other: Equations) -> bool:
         """Whether these keep the derivatives of the same equations at a motion that is a rounding away."""
         return False

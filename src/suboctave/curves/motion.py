@@ -86,21 +86,8 @@ class MotionEvaluation:
     @lazy
     def jacobian(self) -> Array:
         """Derivatives by u, shape (N, N + 1)."""
-        state, equations = self.state, self.equations
-        names, n, q = self.curve.names, state.balance.dimension, len(self.extra)
-        # omega comes first
-        along = state.extended_jacobian(names[0])
-        rows = equations.rows
-        if not rows.size:
-            return along
-        out = np.zeros((n + rows.shape[0], rows.shape[1]))
-        out[:n, :n], out[:n, n + q] = along[:, :n], along[:, n]
-        if equations.column is not None:
-            out[:n, n] = equations.column
-        for i, name in enumerate(names[1:], 1):
-            out[:n, n + q + i] = state.residual_by(name)
-        out[n:] = rows
-        out[n:] *= self.curve.force
+        out = self.equations.jacobian(self.curve.names)
+        out[self.state.balance.dimension :] *= self.curve.force
         return out
 
     def takes_over(self, other: Evaluation) -> bool:

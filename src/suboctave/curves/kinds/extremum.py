@@ -3,11 +3,10 @@
 With `Y(U, q) = 0`, `U = (X, extra, p)`, the equations of a curve of bifurcations, q has an extremum where
 `M = Y_U` is singular (Alcorta et al., Nonlinear Dynamics 98, 2019, Eq. 32). Minimally augmented:
 
-    [Y; h] = 0,    [M b; c^T 0] [v; h] = [0; 1].
+    [Y; h] = 0,    [M b; c^T 0] [v; h] = [0; 1],    [M b; c^T 0]^T [w; h] = [0; 1].
 
-h is taken where a step of Newton's method for Y leads to. Its gradient then lies in the directions that Y leaves free:
-the tangent of the curve, or with a third parameter r the two directions of the surface Y(U, q, r) = 0, for which
-[Y; h] = 0 is a curve. Central differences along these give it, and Newton's method stays quadratic.
+By q, by a third parameter r, for which [Y; h] = 0 is a curve, and by U, h changes by `-w . d(Y_(U, q, r))[v]`: the
+change of the Jacobian along v, a central difference of two of them.
 
 Limit points have an extremum of q where `psi . R_p = 0` (psi the left null vector of R_X): p is then a direction along
 which the branches do not leave, and a cusp, at which M is singular as well, is none. There all derivatives are

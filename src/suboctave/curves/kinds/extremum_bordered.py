@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from suboctave.continuation.linear import Factor, length
 from suboctave.curves.augmentation import Augmentation
@@ -55,12 +54,9 @@ class BorderedExtremal(Extremal):
 
         `sizes` are those of all free parameters by name, `extra_sizes` those of the extra unknowns.
         """
-        weight = state.balance.per_unknown(state.balance.scales()[0])
-        size = length(weight * state.x.ravel()) or 1.0
-        blank = np.zeros(state.balance.dimension + base.extras + 1)
-        own = cls(base, beside, blank, blank, state.balanced.scale or 1.0, size, dict(sizes), extra_sizes, turning)
-        matrix = own.at(state, extra, tuple(sizes)).matrix
-        u, _, vt = np.linalg.svd(matrix)
+        blank = np.zeros(0)
+        own = cls(base, beside, blank, blank, *_units(state), dict(sizes), extra_sizes, turning)
+        u, _, vt = np.linalg.svd(own.at(state, extra, tuple(sizes)).matrix)
         return replace(own, right=vt[-1], left=u[:, -1])
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> BorderedExtremalEquations:
@@ -71,6 +67,12 @@ class BorderedExtremal(Extremal):
         vectors = (_with_harmonics(v, basis.size * size, rest) for v in (self.right, self.left))
         right, left = (v / length(v) for v in vectors)
         return replace(self, base=self.base.resized(basis, size), right=right, left=left)
+
+
+def _units(state: BalanceState) -> tuple[float, float]:
+    """Sizes of the forces and of the motion, those of rest taken for one."""
+    weight = state.balance.per_unknown(state.balance.scales()[0])
+    return state.balanced.scale or 1.0, length(weight * state.x.ravel()) or 1.0
 
 
 def _with_harmonics(vector: Array, count: int, rest: int) -> Array:
@@ -87,26 +89,11 @@ class BorderedExtremalEquations(ExtremalEquations):
     @lazy
     def _whole(self) -> Array:
         """Derivatives of Y by all unknowns in the units of `BorderedExtremal`, (m, m + number of names - 1)."""
-        state, base = self.state, self.base
-        n, q = state.balance.dimension, len(self.extra)
-        out = np.zeros((n + q + 1, n + q + len(self.names)))
-        out[:n, :n] = state.jacobian
-        if base.column is not None:
-            out[:n, n] = base.column
-        for i, name in enumerate(self.names):
-            out[:n, n + q + i] = state.residual_by(name)
-        out[n:] = base.rows
-        out[:n] *= self._row_weights[:, None]
-        out *= self._sizes
-        return out
-
-    @lazy
-    def _row_weights(self) -> Array:
-        state = self.state
+        state, out = self.state, self.base.jacobian(self.names)
         masses = state.balance.per_unknown(state.balance.scales()[1])
         waves = np.repeat(state.basis.multiples[(np.arange(state.basis.size) + 1) // 2], state.balance.size)
-        result: Array = masses / (self.of.force * (1.0 + waves**2))
-        return result
+        out[: len(masses)] *= (masses / (self.of.force * (1.0 + waves**2)))[:, None]
+        return out * self._sizes
 
     @lazy
     def _sizes(self) -> Array:
@@ -115,12 +102,16 @@ class BorderedExtremalEquations(ExtremalEquations):
         weight = state.balance.per_unknown(state.balance.scales()[0])
         return np.concatenate((of.size / weight, of.extra_sizes, [of.sizes[name] for name in self.names]))
 
+    @lazy
+    def _kept(self) -> Array:
+        """The columns of M among those of all unknowns."""
+        free = len(self._sizes) - len(self.names)
+        return np.append(np.arange(free), free + self.names.index(self.of.beside))
+
     @property
     def matrix(self) -> Array:
         """M, square."""
-        columns = len(self.extra) + self.state.balance.dimension
-        kept = [*range(columns), columns + self.names.index(self.of.beside)]
-        result: Array = self._whole[:, kept]
+        result: Array = self._whole[:, self._kept]
         return result
 
     @lazy
@@ -140,61 +131,40 @@ class BorderedExtremalEquations(ExtremalEquations):
 
     @lazy
     def values(self) -> Array:
-        q, r = self._directions
-        m = len(r)
-        top = self.state.residual if self.addition is None else self.state.residual + self.addition
-        left = np.concatenate((top * self._row_weights, self.base.values))
-        step = q[:, :m] @ solve_triangular(r, left, trans="T")
-        return np.append(self.base.values, self._moved(-step)._solved[1])
+        return np.append(self.base.values, self._solved[1])
 
     @lazy
-    def _directions(self) -> tuple[Array, Array]:
-        """Q and R of the derivatives of Y, transposed: the last columns of Q are the directions that Y leaves free."""
-        q, r = np.linalg.qr(self._whole.T, mode="complete")
-        return q, r[: len(self._whole)]
+    def _slope(self) -> Array:
+        """Derivatives of h in the units of `BorderedExtremal`."""
+        v, _, w = self._solved
+        ahead, behind = (self._moved(s * _STEP * v)._whole for s in (1.0, -1.0))
+        result: Array = w @ (behind - ahead) / (2.0 * _STEP)
+        return result
 
     @lazy
     def rows(self) -> Array:
-        """See `Equations.rows`; that of h within the directions that Y leaves free."""
-        q, r = self._directions
-        row = np.zeros(len(q))
-        for direction in q[:, len(r) :].T:
-            ahead, behind = (self._moved(s * _STEP * direction)._solved[1] for s in (1.0, -1.0))
-            row += (ahead - behind) / (2.0 * _STEP) * direction
-        return np.vstack((self.base.rows, row / self._sizes))
+        return np.vstack((self.base.rows, self._slope / self._sizes))
 
     def _moved(self, by: Array) -> BorderedExtremalEquations:
-        """The equations for M and h beside, for unknowns changed in the units of `BorderedExtremal`."""
-        state, step = self.state, by * self._sizes
-        n, q = state.balance.dimension, len(self.extra)
-        x = state.x + state.balance.shaped(step[:n])
-        change = dict(zip(self.names, step[n + q :].tolist(), strict=True))
-        omega = state.omega + change.pop("omega", 0.0)
-        values = {**state.values, **{name: state.values[name] + d for name, d in change.items()}}
-        # M has a column of that parameter alone
-        return self.of.at(state.balance.at(x, omega, values), self.extra + step[n : n + q], (self.of.beside,))
+        """The equations beside, for the unknowns of M changed in the units of `BorderedExtremal`."""
+        state, name, step = self.state, self.of.beside, by * self._sizes[self._kept]
+        n = state.balance.dimension
+        omega, values = state.omega, dict(state.values)
+        if name == "omega":
+            omega += step[-1]
+        else:
+            values[name] += step[-1]
+        moved = state.balance.at(state.x + state.balance.shaped(step[:n]), omega, values)
+        return self.of.at(moved, self.extra + step[n:-1], self.names)
 
     @property
     def curvature(self) -> float:
         v, _, w = self._solved
-        n = len(v) - 1
-        names = n + np.arange(len(self.names))
-        inside = np.zeros(n + len(self.names))
-        inside[:n], inside[names[self.names.index(self.of.beside)]] = v[:n], v[n]
-        along = float((self.rows[-1] * self._sizes) @ inside)
-        return along * float(w @ self._whole[:, names[self.names.index(self.of.turning)]])
+        at = len(self._sizes) - len(self.names) + self.names.index(self.of.turning)
+        return float(self._slope[self._kept] @ v) * float(w @ self._whole[:, at])
 
     def renewed(self) -> BorderedExtremal:
         v, _, w = self._solved
-        state = self.state
-        weight = state.balance.per_unknown(state.balance.scales()[0])
-        size = length(weight * state.x.ravel()) or 1.0
-        force = state.balanced.scale or 1.0
-        return replace(
-            self.of,
-            base=self.base.renewed(),
-            right=v / length(v),
-            left=w / length(w),
-            force=force,
-            size=size,
-        )
+        force, size = _units(self.state)
+        right, left = v / length(v), w / length(w)
+        return replace(self.of, base=self.base.renewed(), right=right, left=left, force=force, size=size)
