@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
-from suboctave.continuation.events import locate_zero
+from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import between, make_point, point_between
@@ -246,6 +246,11 @@ def test_points_between_neighbours():
     assert errors[0] / errors[1] > 12
 
 
+def located(a, b, values, function):
+    bracket = Bracket(a, b, values, function, NEWTON)
+    return bracket.points[bracket.zero()]
+
+
 def test_a_zero_along_the_curve():
     _, points, _ = march(cubic(), 1.2, 1.2 - 1.2**3, 1.0, (-2.0, 2.0))
 
@@ -254,12 +259,12 @@ def test_a_zero_along_the_curve():
 
     at = next(i for i in range(len(points)) if height(points[i + 1]) < 0)
     a, b = points[at : at + 2]
-    zero = locate_zero(a, b, height(a), height(b), height, NEWTON)
+    zero = located(a, b, (height(a), height(b)), height)
     assert zero.u[0] == pytest.approx(0.123, abs=1e-11)
     assert zero.u[1] == pytest.approx(0.123 - 0.123**3, abs=1e-10)
     assert a.arclength < zero.arclength < b.arclength
-    assert locate_zero(a, b, 0.0, 1.0, height, NEWTON) is a
-    assert locate_zero(a, b, 1.0, 0.0, height, NEWTON) is b
+    assert located(a, b, (0.0, 1.0), height) is a
+    assert located(a, b, (1.0, 0.0), height) is b
 
 
 @pytest.mark.parametrize("power", [1, 3, 9])
@@ -271,7 +276,7 @@ def test_a_flat_or_steep_function_has_its_zero_too(power):
     def function(point):
         return (point.u[0] - 0.1) ** power
 
-    zero = locate_zero(a, b, function(a), function(b), function, NEWTON)
+    zero = located(a, b, (function(a), function(b)), function)
     assert zero.u[0] == pytest.approx(0.1, abs=2e-2 if power > 3 else 1e-4 if power > 1 else 1e-11)
 
 

@@ -1,16 +1,22 @@
-"""Zeros of functions along a curve: the user's own events, and the bracketing that located bifurcations start from."""
+"""Zeros of functions along a curve between two of its points: the user's own events, and tests of tracked curves."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import scipy
 
-from suboctave.continuation.newton import NewtonOptions
-from suboctave.continuation.point import CurvePoint, point_between
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.errors import ConvergenceError, InputError
+
+#: ratio of a function's values at two ends beyond which it does not change evenly
+_LARGE = 30.0
 
 
 @dataclass(frozen=True)
@@ -33,34 +39,85 @@ class Event:
             raise InputError(f"Event {self.name!r}: function must be callable, got {self.function!r}")
 
 
-def locate_zero(
-    a: CurvePoint,
-    b: CurvePoint,
-    value_a: float,
-    value_b: float,
-    function: Callable[[CurvePoint], float],
-    newton: NewtonOptions,
-    tolerance: float = 1e-12,
-) -> CurvePoint:
-    """The point between two neighbours at which a function that changes sign vanishes (Brent's method).
-
-    Raises
-    ------
-    ConvergenceError
-        If a point in between cannot be solved for.
+class Bracket:
+    """A function along a curve between two neighbours at which it has different signs, by the share of the way from one
+    to the other; `values`: those at the two.
     """
-    points = {0.0: a, 1.0: b}
-    little = 1e-14 * (abs(value_a) + abs(value_b))
-    values = {0.0: value_a, 1.0: value_b}
 
-    def value(share: float) -> float:
-        if share not in points:
-            points[share] = point_between(a, b, share, newton)
-            values[share] = function(points[share])
-        return 0.0 if abs(values[share]) < little else values[share]
+    def __init__(
+        self,
+        a: CurvePoint,
+        b: CurvePoint,
+        values: tuple[float, float],
+        function: Callable[[CurvePoint], float],
+        newton: NewtonOptions,
+    ) -> None:
+        self.function, self.newton = function, newton
+        self.points, self.values = {0.0: a, 1.0: b}, {0.0: values[0], 1.0: values[1]}
+        #: in the discretisation of b: the chord as a row of unit length, and a and b as places along it
+        scaled, origin = b.weights * b.u, b.weights * b.curve.transfer(a.u, a.curve)
+        size = length(scaled - origin)
+        if size == 0.0:
+            raise ConvergenceError(f"two points fall together at {b.curve.where(b.u)}")
+        self._row = (scaled - origin) / size
+        self._places = float(self._row @ origin), float(self._row @ scaled)
 
-    share, result = scipy.optimize.brentq(value, 0.0, 1.0, xtol=tolerance, full_output=True, disp=False)
-    if not result.converged:
-        raise ConvergenceError(f"the zero between {a.curve.where(a.u)} and {b.curve.where(b.u)} could not be located")
-    value(share)
-    return points[share]
+    @property
+    def way(self) -> float:
+        """Its length in scaled arclength."""
+        return self.points[1.0].arclength - self.points[0.0].arclength
+
+    def value(self, share: float) -> float:
+        """The function at a share of the way; may raise ConvergenceError."""
+        if share not in self.values:
+            self.points[share] = self._point(share)
+            self.values[share] = self.function(self.points[share])
+        return self.values[share]
+
+    def _point(self, share: float) -> CurvePoint:
+        """The point on the plane across the chord at a share of it, started from the nearest points known."""
+        a, b, (start, end) = self.points[0.0], self.points[1.0], self._places
+        curve, weights, place = b.curve, b.weights, start + share * (end - start)
+        shares = max(s for s in self.points if s < share), min(s for s in self.points if s > share)
+        low, high = (self.points[s] for s in shares)
+        part = (share - shares[0]) / (shares[1] - shares[0])
+        arclength = a.arclength + share * (b.arclength - a.arclength)
+        ahead, patient = self._row / weights, replace(self.newton, iterations=30, damped=True)
+        interpolated = between(low, high, part), ahead
+        # along a corner of the equations, near a grazing, neighbours may lie on both sides of it
+        beside = [(curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve)) for p in (low, high)]
+        starts = [interpolated, *(beside if part <= 0.5 else beside[::-1]), interpolated]
+        failure = ConvergenceError()
+        for (u, along), options in zip(starts, (*[self.newton] * 3, patient), strict=True):
+            missing = place - float(self._row @ (weights * u))
+            guess = u + missing / float(self._row @ (weights * along)) * along
+            try:
+                return make_point(correct(curve, guess, self._row, weights, options), curve, ahead, arclength)
+            except ConvergenceError as error:
+                failure = error
+        raise failure
+
+    def zero(self, resolved: float = 1e-12) -> float:
+        """The share at which the function vanishes, to so much of it, by Brent's method; its point is in `points` then.
+
+        Where the function is large at one end it is taken about as its logarithm, lest secants stay at the other.
+
+        Raises
+        ------
+        ConvergenceError
+            If a point in between cannot be solved for, or the function does not change sign.
+        """
+        little = 1e-14 * (abs(self.values[0.0]) + abs(self.values[1.0]))
+        for low, high in pairwise(sorted(self.values)):
+            if self.values[low] * self.values[high] <= 0.0:
+                least, most = sorted((abs(self.values[low]), abs(self.values[high])))
+                uneven = 0.0 < _LARGE * least < most
+
+                def scaled(share: float, unit: float = least if uneven else 0.0) -> float:
+                    value = self.value(share)
+                    value = 0.0 if abs(value) < little else value
+                    return math.asinh(value / unit) if unit else value
+
+                return float(scipy.optimize.brentq(scaled, low, high, xtol=resolved, rtol=8.9e-16, maxiter=200))
+        a, b = self.points[0.0], self.points[1.0]
+        raise ConvergenceError(f"no change of sign between {a.curve.where(a.u)} and {b.curve.where(b.u)}")

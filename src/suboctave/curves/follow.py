@@ -11,7 +11,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending, EndReason
-from suboctave.continuation.events import locate_zero
+from suboctave.continuation.events import Bracket
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.point import point_between, solved_again
 from suboctave.curves.count import CountCheck
@@ -348,31 +348,17 @@ class _Follower(Driver):
         value_a, value_b = (self._event_value(event, sample) for sample in (a, b))
         if not (value_a == 0.0 and a.point.arclength == 0.0) and not value_a * value_b < 0.0 and value_b != 0.0:
             return None
+        values, newton = (value_a, value_b), self.settings.newton
         try:
-            point = locate_zero(
-                a.point,
-                b.point,
-                value_a,
-                value_b,
-                lambda p: self._event_value(event, self._sample(p)),
-                self.settings.newton,
-            )
+            bracket = Bracket(a.point, b.point, values, lambda p: self._event_value(event, self._sample(p)), newton)
+            point = bracket.points[bracket.zero()]
         except ConvergenceError as failure:
             self.trace.warnings.append(f"event {event.name!r}: {failure}")
             return None
         sample = self._sample(point)
-        orbit = sample.orbit
-        curve = point.curve
-        assert isinstance(curve, MotionProblem)
-        return Bifurcation(
-            event.name,
-            orbit,
-            sample.floquet,
-            orbit.residual,
-            orbit.amplitude(self.settings.observe),
-            curve.name,
-            arclength=point.arclength,
-        )
+        orbit, size = sample.orbit, sample.orbit.amplitude(self.settings.observe)
+        known = orbit.residual, size, sample.curve.name
+        return Bifurcation(event.name, orbit, sample.floquet, *known, arclength=point.arclength)
 
 
 def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:

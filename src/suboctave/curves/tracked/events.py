@@ -7,18 +7,12 @@ extremum of either: there the tangent's components divided by the cusp's functio
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-
-import scipy
 
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.bifurcation.gaps import GrazingContact, levels
-from suboctave.continuation.linear import length
-from suboctave.continuation.newton import NewtonOptions, correct
-from suboctave.continuation.point import CurvePoint, between, make_point
-from suboctave.continuation.problem import Array
+from suboctave.continuation.events import Bracket
+from suboctave.continuation.newton import NewtonOptions
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularOperator
@@ -37,12 +31,8 @@ _BESIDE = 0.05
 SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
-#: share of a test's values at the ends of a step with which a zero is near enough for secants
-_LITTLE = 0.05
-#: the same share above which a test that has been resolved jumps there instead of vanishing
+#: share of a test's values at the ends of a step above which one that has been resolved jumps instead of vanishing
 _JUMP = 0.5
-#: ratio of a test's values at two ends beyond which it does not change evenly
-_LARGE = 30.0
 
 
 @dataclass(frozen=True)
@@ -60,7 +50,7 @@ class LocatedEvent:
     test: CurveTest
     sample: Sample
     extreme: str = ""
-    rough: _Stretch | None = None
+    rough: Bracket | None = None
     slope: float = 0.0
     off: float = 0.0
 
@@ -89,26 +79,37 @@ def events_between(
 
 def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -> LocatedEvent | None:
     """The event between two points with a sign change, None if it is none; raises ConvergenceError."""
-    own = test.within(low, high)
     same = same_discretisation(low, high, newton)
-    stretch = _Stretch(same, high, own if same is low else own.within(same, high), newton)
-    own = stretch.test
-    if same is not low and stretch.values[0.0] * stretch.values[1.0] > 0.0:
+    own = test.within(low, high)
+    own = own if same is low else own.within(same, high)
+    first, last = own.value(same), own.value(high)
+    way = high.place - low.place
+    if same is not low and first * last > 0.0:
         # in this discretisation it lies before the first
-        way = high.point.arclength - low.point.arclength
-        slope = (stretch.values[1.0] - stretch.values[0.0]) / way
+        slope = (last - first) / way
         sample = zero_along(same.point, own.value, newton, way, slope)
         return LocatedEvent(own, sample, extreme_of(own, -slope, sample), None, slope) if own.genuine(sample) else None
-    # on a curve of extrema those that others bring about are told by their distance; multipliers tell only close by
-    close = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine
-    sample, slope = stretch.about(_ROUGH if close else 0.0)
-    if not own.genuine(sample) or (not close and stretch.jumps_at(sample)):
+    bracket = Bracket(same.point, high.point, (first, last), lambda point: own.value(Sample(point)), newton)
+    share, little = bracket.zero(_ROUGH), _JUMP * min(abs(first), abs(last))
+    # on a curve of extrema those that others bring about are known by their distance; multipliers tell only close by
+    apart = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine or isinstance(own, Extremum)
+    if not apart and abs(bracket.values[share]) > little:
+        share = bracket.zero(_RESOLVED)
+        if abs(bracket.values[share]) > little:
+            # it changes sign without vanishing, as c3 does in a corner
+            return None
+    sample, value = Sample(bracket.points[share]), bracket.values[share]
+    if not own.genuine(sample):
         return None
-    before = stretch.values[0.0] if stretch.values[0.0] != 0.0 else -slope
+    slope = last - first
+    if 0.0 < share < 1.0:
+        # of the parabola through all three
+        slope = (value - first) / share + (last - value) / (1.0 - share) - slope
+    slope /= way
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
-    sample = sample if finer else stretch.zero_from(sample, slope)
-    return LocatedEvent(own, sample, extreme_of(own, before, sample), stretch if finer else None, slope)
+    sample = sample if finer else Sample(bracket.points[bracket.zero(_RESOLVED)])
+    return LocatedEvent(own, sample, extreme_of(own, first or -slope, sample), bracket if finer else None, slope)
 
 
 def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
@@ -130,161 +131,6 @@ def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> l
         both = [item for item in turns[extreme] if beside(item, turns[last])]
         dropped += both + [item for item in turns[last] if beside(item, cusps) and beside(item, both)]
     return [item for item in events if not any(item is d for d in dropped)]
-
-
-class _Stretch:
-    """A test between two neighbours, by the share of the way along the chord."""
-
-    def __init__(self, a: Sample, b: Sample, test: CurveTest, newton: NewtonOptions) -> None:
-        self.a, self.b = a, b
-        self.test = test
-        self.newton = newton
-        self.samples = {0.0: a, 1.0: b}
-        self.values = {0.0: test.value(a), 1.0: test.value(b)}
-        #: as in `newton.correct`: points that only lead to the zero may have the derivatives of one beside
-        self.spare = 0.0
-
-    @property
-    def way(self) -> float:
-        """Its length in scaled arclength."""
-        return self.b.point.arclength - self.a.point.arclength
-
-    def value(self, share: float) -> float:
-        """The test's function."""
-        if share not in self.values:
-            sample = self.samples[share] = Sample(self._point(share))
-            self.values[share] = self.test.value(sample)
-        return self.values[share]
-
-    def _point(self, share: float) -> CurvePoint:
-        """As `point_between`, started from the nearest points known."""
-        a, b = self.a.point, self.b.point
-        low = max(s for s in self.samples if s < share)
-        high = min(s for s in self.samples if s > share)
-        curve, weights, origin = b.curve, b.weights, b.curve.transfer(a.u, a.curve)
-        chord = b.u - origin
-        row = weights * chord
-        row = row / length(row)
-        # a fixed plane for every share, whatever the start
-        place = share * float(row @ (weights * chord)) + float(row @ (weights * origin))
-
-        def start(u: Array, along: Array) -> Array:
-            scaled = weights * along
-            return u + (place - float(row @ (weights * u))) / float(row @ scaled) * along
-
-        first, last = self.samples[low].point, self.samples[high].point
-        ends = [(curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve)) for p in (first, last)]
-        between_them = start(between(first, last, (share - low) / (high - low)), row / weights)
-        if share - low > high - share:
-            ends.reverse()
-        # along a corner of the equations, near a grazing, neighbours may lie on both sides of it
-        for guess in (between_them, *(start(*end) for end in ends)):
-            try:
-                solved = correct(curve, guess, row, weights, self.newton, spare=self.spare)
-                break
-            except ConvergenceError:
-                continue
-        else:
-            solved = correct(curve, between_them, row, weights, replace(self.newton, iterations=30, damped=True))
-        return make_point(solved, curve, chord, a.arclength + share * (b.arclength - a.arclength))
-
-    def about(self, resolved: float) -> tuple[Sample, float]:
-        """A point beside the zero, closer than a share of the way or (0) where little is left of the test's values at
-        the ends, and about the test's derivative by arclength there.
-        """
-        first, last = self.values[0.0], self.values[1.0]
-        self.spare = BEGINNING
-        # components of a tangent change evenly; others may be large at one end
-        if first * last > 0.0:
-            raise ConvergenceError("the test does not change sign between the points about it")
-        even = isinstance(self.test, Extremum)
-        scaled = _even(first, last)
-        start, stop = scaled(first), scaled(last)
-        self.value(self._turn() if even or start == stop else start / (start - stop))
-        size = max if even else min
-        little = 0.0 if resolved else _LITTLE * size(abs(first), abs(last))
-        share = self._root(resolved or _RESOLVED, little)
-        value, way = self.value(share), self.b.point.arclength - self.a.point.arclength
-        slope = last - first
-        if 0.0 < share < 1.0:
-            # of the parabola through all three
-            slope = (value - first) / share + (last - value) / (1.0 - share) - slope
-        return self.samples[share], slope / way if way > 0.0 else 0.0
-
-    def jumps_at(self, sample: Sample) -> bool:
-        """Whether the test changes sign without vanishing, as c3 does in a corner; a parameter may turn in one."""
-        ends = abs(self.values[0.0]), abs(self.values[1.0])
-        return not isinstance(self.test, Extremum) and abs(self.test.value(sample)) > _JUMP * min(ends)
-
-    def _turn(self) -> float:
-        """The share at which a parameter turns by its cubic interpolation; 0 if nowhere, and for other tests."""
-        if not isinstance(self.test, Extremum):
-            return 0.0
-        a, b, name = self.a, self.b, self.test.name
-        chord = float(b.point.u[b.curve.index(name)] - a.point.u[a.curve.index(name)]) / self.way
-        start, stop = a.slopes[name], b.slopes[name]
-        # its derivative at the share s is start + 2 half s + curve s^2
-        half, curve = 3.0 * chord - 2.0 * start - stop, 3.0 * (start + stop - 2.0 * chord)
-        inside = half * half - start * curve
-        if inside >= 0.0 and start != 0.0:
-            # the root on the side of the end whose sign is the other one
-            share = -start / (half - math.copysign(math.sqrt(inside), start))
-            return share if 0.0 < share < 1.0 else 0.0
-        return 0.0
-
-    def zero_from(self, sample: Sample, slope: float) -> Sample:
-        """Where the test vanishes, from a point beside, by secants; by Brent's method where these leave the way."""
-        low, high = self.a.point.arclength, self.b.point.arclength
-        try:
-            zero = zero_along(sample.point, self.test.value, self.newton, high - low, slope)
-        except ConvergenceError:
-            zero = None
-        # tangents at the ends may be those of points a rounding away
-        slack = _ROUGH * (high - low)
-        if zero is not None and low - slack <= zero.point.arclength <= high + slack:
-            return zero
-        return self.zero(_RESOLVED)
-
-    def zero(self, resolved: float) -> Sample:
-        """Where the test vanishes, to a share of the way."""
-        self.spare = 0.0
-        for known in (self.samples, self.values):
-            for share in [share for share in known if 0.0 < share < 1.0]:
-                del known[share]
-        return self.samples_at(self._root(resolved))
-
-    def _root(self, resolved: float, little: float = 0.0) -> float:
-        """The share at which the test vanishes, or its modulus is below `little`, by Brent's method.
-
-        Secants are those of `_even`.
-        """
-        for low, high in itertools.pairwise(sorted(self.values)):
-            first, last = self.values[low], self.values[high]
-            if first * last > 0.0:
-                continue
-            scaled = _even(first, last)
-
-            def value(share: float, scaled: Callable[[float], float] = scaled) -> float:
-                here = self.value(share)
-                return 0.0 if abs(here) <= little else scaled(here)
-
-            return float(scipy.optimize.brentq(value, low, high, xtol=resolved, rtol=8.9e-16))
-        raise ConvergenceError("the test does not change sign")
-
-    def samples_at(self, share: float) -> Sample:
-        """The point at a share."""
-        self.value(share)
-        return self.samples[share]
-
-
-def _even(first: float, last: float) -> Callable[[float], float]:
-    """What a test's values are taken as between two ends: as they are, or, where those at one end are large, about as
-    their logarithm, lest secants stay at the other.
-    """
-    least, most = sorted((abs(first), abs(last)))
-    if not 0.0 < _LARGE * least < most:
-        return float
-    return lambda value: math.asinh(value / least)
 
 
 def _finer(sample: Sample) -> HarmonicBasis | None:
@@ -330,7 +176,7 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
             )
             if sample is event.sample and event.rough is not None:
                 try:
-                    sample = event.rough.zero_from(sample, event.slope)
+                    sample = Sample(event.rough.points[event.rough.zero(_RESOLVED)])
                 except ConvergenceError as again:
                     words += f", nor more closely without these ({again})"
                     event = replace(event, off=_ROUGH * event.rough.way)
