@@ -41,7 +41,20 @@ class Bounds:
             return self.high if here > self.high else self.low
         return None
 
-    def turned_beyond(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
+    def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
+        """The point on a bound at which a curve leaves the range between two neighbours, None if it stays inside.
+
+        Raises
+        ------
+        ConvergenceError
+            If it leaves, and no solution is found exactly on the bound.
+        """
+        bound = self.passed(a, b)
+        if bound is None:
+            return self._turned_beyond(a, b, newton)
+        return b if self.value(b) == bound else self._land(a, b, bound, newton)
+
+    def _turned_beyond(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
         """The point on a bound that the curve passes between two neighbours and comes back through, by its cubic
         interpolation; None if it does not.
         """
@@ -57,17 +70,16 @@ class Bounds:
         slack = _ON_IT * (self.high - self.low)
         if self.low - slack <= top <= self.high + slack or not 0.0 < share < 1.0:
             return None
-        landed = self.land(a, b, self.high if top > self.high else self.low, newton, share)
-        return landed if landed is not None and landed.arclength <= b.arclength else None
+        try:
+            landed = self._land(a, b, self.high if top > self.high else self.low, newton, share)
+        except ConvergenceError:
+            return None
+        return landed if landed.arclength <= b.arclength else None
 
-    def land(
-        self, a: CurvePoint, b: CurvePoint, bound: float, newton: NewtonOptions, share: float = 1.0
-    ) -> CurvePoint | None:
-        """The point on a bound between two neighbours; share: where on the way it has been passed. None where Newton's
-        method finds none.
-        """
+    def _land(self, a: CurvePoint, b: CurvePoint, bound: float, newton: NewtonOptions, high: float = 1.0) -> CurvePoint:
+        """The point on a bound between two neighbours; high: where on the way it has been passed."""
         index = self.index(b.curve)
-        low, high = 0.0, share
+        low = 0.0
         side = between(a, b, high)[index] - bound
         for _ in range(_HALVED):
             middle = 0.5 * (low + high)
@@ -75,9 +87,6 @@ class Bounds:
             low, high = (low, middle) if beyond else (middle, high)
         guess = between(a, b, high)
         guess[index] = bound
-        try:
-            solved = correct(b.curve, guess, index, b.weights, newton)
-        except ConvergenceError:
-            return None
+        solved = correct(b.curve, guess, index, b.weights, newton)
         arclength = a.arclength + distance(solved.u, b.curve.transfer(a.u, a.curve), b.weights)
         return make_point(solved, b.curve, b.tangent, arclength)

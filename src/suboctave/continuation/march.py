@@ -9,7 +9,7 @@ engine hands out the points one by one; what is looked for along the curve is th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -68,6 +68,8 @@ class March:
         Called with two neighbours; where the curve meets another one between them and ends there, it says so.
     home
         A point already passed, in the direction of its tangent, at which the curve is closed; default: the start.
+    others
+        Ranges of other unknowns, on which the curve ends as well.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class March:
         inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None,
         arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None,
         home: CurvePoint | None = None,
+        others: Sequence[Bounds] = (),
     ) -> None:
         self.start = start
         self.bounds = bounds
@@ -91,7 +94,7 @@ class March:
         self.closed = False
         self.ending = Ending(EndReason.NOT_STARTED)
         self._direction = direction
-        self._range = Bounds(lambda curve: curve.parameter, *bounds)
+        self._ranges = (Bounds(lambda curve: curve.parameter, *bounds), *others)
         self._close = closely(newton)
 
     @property
@@ -131,10 +134,6 @@ class March:
                     yield arrival.point
                 return
             largest = max(largest, new.curve.size(new.u))
-            end, landed = self._range.passed(point, new), None
-            if end is None:
-                landed = self._range.turned_beyond(point, new, self.newton)
-                end = None if landed is None else landed.parameter
             back = None if count < 3 else home.passed(point, new)
             if back is not None:
                 self.closed, self.ending = True, Ending(EndReason.CLOSED)
@@ -143,14 +142,14 @@ class March:
             if mark is not None and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
-            if end is not None:
-                if landed is None:
-                    landed = new if new.parameter == end else self._range.land(point, new, end, self.newton)
-                if landed is not None:
-                    self.ending = Ending(EndReason.RANGE_END, landed.curve.where(landed.u))
-                    yield landed
-                else:
-                    self.ending = Ending(EndReason.LEFT_RANGE, point.curve.where(point.u))
+            try:
+                landed = self._landed(point, new)
+            except ConvergenceError:
+                self.ending = Ending(EndReason.LEFT_RANGE, point.curve.where(point.u))
+                return
+            if landed is not None:
+                self.ending = Ending(EndReason.RANGE_END, landed.curve.where(landed.u))
+                yield landed
                 return
             yield new
             count += 1
@@ -164,6 +163,13 @@ class March:
             # beyond a corner nothing leads on from what lies behind
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             curve, point = new.curve.adapted(new.u, new.evaluation), new
+
+    def _landed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """The point at which the curve leaves a range first between two neighbours, None if it stays in all of them."""
+        landed: CurvePoint | None = None
+        for ends in self._ranges:
+            landed = ends.left(point, landed or new, self.newton) or landed
+        return landed
 
     def _set_out(self) -> CurvePoint:
         """The start with its tangent pointing in the wanted direction."""

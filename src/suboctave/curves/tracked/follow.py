@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, length
 from suboctave.continuation.point import solved_again
-from suboctave.continuation.problem import Curve
 from suboctave.curves.driver import Driver
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
 from suboctave.curves.points import TrackedPoint
@@ -50,11 +49,17 @@ class _Tracker(Driver):
     def __init__(self, start: CurvePoint, box: Box, settings: Settings) -> None:
         assert isinstance(start.curve, MotionProblem)
         super().__init__(settings)
-        self.box = box
-        self.others = _other_bounds(start.curve, box)
         self.lopsided = is_lopsided(Sample(start))
-        heading = math.copysign(1.0, start.tangent[start.curve.parameter])
-        self.march = March(start, heading, box.second, settings.newton, settings.stepping, self._clear)
+        #: the first point, headed as the curve leaves it
+        self.home: CurvePoint | None = None
+        self.box = box
+        #: ranges of the parameters but the last
+        self.others = [
+            Bounds(partial(MotionProblem.index, name=name), *ends)
+            for name, ends in box.ranges(start.curve.names).items()
+            if name != start.curve.name
+        ]
+        self.march = self._marching(start)
         self.tests = tests_of(start.curve)
         self.watch = StepWatch(self.tests, settings.newton)
         self.corners = 0
@@ -63,20 +68,21 @@ class _Tracker(Driver):
         self.doubtful: list[str] = []
         #: how many of the last of these in succession, with others that are large
         self.untold = 0
-        #: the first point, headed as the curve leaves it
-        self.home: CurvePoint | None = None
+
+    def _marching(self, start: CurvePoint) -> March:
+        """Along the tangent of a point; closed where it comes back to the first one."""
+        options = (self.settings.newton, self.settings.stepping, self._clear)
+        return March(start, 0.0, self.box.second, *options, home=self.home, others=self.others)
 
     def _walk(self) -> None:
-        trace, settings = self.trace, self.settings
+        trace = self.trace
         while True:
             ending = self._march()
             trace.ends(ending)
             beyond = self._beyond_corner() if ending.reason is EndReason.STEP_TOO_SMALL else None
             if beyond is None:
                 break
-            heading = math.copysign(1.0, beyond.tangent[-1])
-            stepping = settings.stepping
-            self.march = March(beyond, heading, self.box.second, settings.newton, stepping, self._clear, home=self.home)
+            self.march = self._marching(beyond)
         trace.closed = self.march.closed
         self._say_doubts()
 
@@ -165,18 +171,12 @@ class _Tracker(Driver):
         if end is not None:
             self._take_end(a, end)
             return Ending(EndReason.MOTIONS_END, detail=end.reason)
-        try:
-            left = self._left(a, new)
-        except ConvergenceError:
-            return Ending(EndReason.LEFT_RANGE, a.where)
-        new = self._smooth(a, left or new)
+        new = self._smooth(a, new)
         self._take(self.watch.passed(a, new, self.trace.warnings))
         self._add(new)
         self.previous = new
         self._report(point)
-        if left is not None:
-            return Ending(EndReason.RANGE_END, new.where)
-        ahead = None if self.march.closed else end_ahead(a, new, settings.newton)
+        ahead = None if self.march.ending.reason is not EndReason.NOT_STARTED else end_ahead(a, new, settings.newton)
         if ahead is None:
             return None
         self._take_end(new, ahead)
@@ -261,37 +261,3 @@ class _Tracker(Driver):
     def _inside(self, sample: Sample) -> bool:
         """Whether a point lies in the ranges of the parameters but the last."""
         return all(bounds.low <= bounds.value(sample.point) <= bounds.high for bounds in self.others)
-
-    def _left(self, a: Sample, b: Sample) -> Sample | None:
-        """The first point between two neighbours at which the curve leaves the range of a parameter but the last, None
-        if it stays in them; raises ConvergenceError where it leaves one but no solution is found on its bound.
-        """
-        newton, leaving = self.settings.newton, None
-        for bounds in self.others:
-            end = b if leaving is None else leaving
-            bound = bounds.passed(a.point, end.point)
-            if bound is None:
-                landed = bounds.turned_beyond(a.point, end.point, newton)
-            elif bounds.value(end.point) == bound:
-                landed = end.point
-            else:
-                landed = bounds.land(a.point, end.point, bound, newton)
-                if landed is None:
-                    raise ConvergenceError(f"left the range after {a.where}; no solution was found exactly on its end")
-            if landed is not None:
-                leaving = end if landed is end.point else Sample(landed)
-        return leaving
-
-
-def _other_bounds(curve: MotionProblem, box: Box) -> list[Bounds]:
-    """The ranges of the parameters but the last."""
-
-    def index_of(name: str) -> Callable[[Curve], int]:
-        def index(curve: Curve) -> int:
-            assert isinstance(curve, MotionProblem)
-            return curve.index(name)
-
-        return index
-
-    ranges = box.ranges(curve.names)
-    return [Bounds(index_of(name), *ranges[name]) for name in curve.names[:-1] if name in ranges]
