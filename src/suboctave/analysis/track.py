@@ -12,9 +12,9 @@ so that the equations of an NS, `Re g = 0` and `Im g / k = 0`, are smooth in k^2
 multipliers with product one, which bifurcate nowhere: no k is theirs, and the side need not be chosen.
 
 At a GPD the motions of twice the period change sides. On one side of it the doubled branch turns back close to its
-birth, and these limit points are a curve that ends at the GPD, tangent to the curve of period doublings. It is entered
-beside its end: at a value of the second parameter near that of the GPD the period doubling is located, the doubled
-branch followed, and its first limit point taken.
+birth, and these limit points are a curve that ends at the GPD, tangent to the curve of period doublings. Along it the
+parameters and the even part of the motion change with the square of the doubled part, which leaves along the null
+vector of J_half: the curve is entered where that part has a given small size.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.branches import switch_branch
 from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH, Bifurcation, TrackedEvent, kind_of
 from suboctave.bifurcation.bordered import null_vectors, transversality
@@ -36,21 +35,19 @@ from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
 from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
 from suboctave.curves.events.formulation import BorderedSystem
-from suboctave.curves.events.locate import Guess, Singular
-from suboctave.curves.events.monitors import PERIOD_DOUBLING
+from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.points import BranchPoint
-from suboctave.curves.refine import solved_bifurcation
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
 from suboctave.curves.tracked.start import Box, curve_through, discretisation, is_extremum, solved_start, spans_of
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import AdaptiveHarmonics
-from suboctave.interruption import pass_on
 from suboctave.kinds import KINDS, MOTION_KINDS, TRACKED_KINDS
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, timed
 from suboctave.options import with_options
@@ -332,14 +329,9 @@ _NEAR, _CRITICAL = 0.2, 0.02
 _FORCED = 1e-6
 #: way along a curve from a point of codimension two, in scaled arclength, from which it is met like any other
 _ASIDE = 2e-3
-#: distances from the GPD at which the curve is looked for, in units of the second parameter's range
-_GPD_SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)
-#: steps from the GPD to there
-_STEPS = 24
-#: way of a limit point from the birth of its branch, in scaled arclength, that is far enough from the GPD
-_CLEAR = 0.01
-#: range of the first parameter in which the doubled branch is followed, in units of its value
-_AROUND = 0.05
+#: sizes of the doubled part, in scaled arclength, at which limit points are looked for first beside a GPD, and that
+#: which is far enough from it
+_DOUBLED, _CLEAR = (3e-3, 1e-3, 3e-4), 0.05
 
 
 def motion_kind(onto: Any) -> tuple[str, dict[str, float]] | None:
@@ -420,8 +412,7 @@ def start_onto(
                 f"the limit points that leave this GPD are followed over {' and '.join(item.names)}, in which it was "
                 "found"
             )
-        low, high = box.second
-        return limit_point_beside(item, high - low)
+        return _beside_doubling(item, names, box, newton)
     if kind == "LP" and _symmetric(item, names):
         kind = "BP"
     if kind != "NS":
@@ -497,12 +488,8 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
         assert isinstance(evaluation, MotionEvaluation)
         if length(weights * (solved.u - u)) > _NEAR or evaluation.doubt > _CRITICAL:
             continue
-        state = evaluation.state
-        values = dict(state.values)
-        there = replace(orbit, balance=state.balance, coefficients=state.x.copy(), omega=state.omega, values=values)
-        start = replace(beside, orbit=there)
-        if box.around(names, {name: start.parameter(name) for name in names}):
-            return start
+        if box.around(names, curve.named(solved.u)):
+            return replace(beside, orbit=_moved(orbit, evaluation.state))
         outside = True
     at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in item.names)
     if outside:
@@ -512,75 +499,36 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
     raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {reason}")
 
 
-# ------------------------------------------------------------------------------------------ the limit points of a GPD
-def limit_point_beside(event: TrackedEvent, span: float) -> Bifurcation:
-    """A limit point of the doubled motions close to a GPD; ConvergenceError where there is none. `span`: width of the
-    second parameter's range.
-    """
-    best: tuple[float, Bifurcation] | None = None
-    for share in _GPD_SHARES:
-        for sign in (1.0, -1.0):
+def _beside_doubling(item: TrackedEvent, names: tuple[str, ...], box: Box, newton: NewtonOptions) -> Bifurcation:
+    """A limit point of the doubled motions close to a GPD."""
+    orbit = item.orbit
+    balance = HarmonicBalance(orbit.system, orbit.basis.doubled, linear=own_linear_part(orbit))
+    curve, u = curve_through(replace(item, curve="LP"), balance, None, names, spans_of(item, names, box))
+    weights, operator = curve.weights(u, 0.0), curve.augmentation
+    assert isinstance(operator, SingularOperator)
+    away = curve.join(operator.borders.right * curve.balance.row_weights(curve.balance.dimension), 0.0)
+    away /= length(weights * away)
+    for size in _DOUBLED:
+        # the rest of the motion and the parameters follow the square of the doubled part
+        beside, bend = None, np.zeros_like(u)
+        while size < _CLEAR:
             try:
-                candidate = _limit_point(event, sign * share * span)
+                solved = correct(curve, u + size * away + size**2 * bend, weights * away, weights, newton)
             except ConvergenceError:
-                continue
-            if candidate is not None and (best is None or candidate[0] > best[0]):
-                best = candidate
-        if best is not None and best[0] > _CLEAR:
-            break
-    if best is not None:
-        return best[1]
-    first, second = event.names
-    raise ConvergenceError(
-        f"no limit point of the doubled motions was found beside the GPD at {first} = {event.parameter(first):.6g}, "
-        f"{second} = {event.parameter(second):.6g}"
-    )
+                break
+            evaluation = solved.evaluation
+            assert isinstance(evaluation, MotionEvaluation)
+            if evaluation.doubt > _CRITICAL or not box.around(names, curve.named(solved.u)):
+                break
+            beside = replace(item, curve="LP", orbit=_moved(orbit, evaluation.state))
+            bend, size = (solved.u - u - size * away) / size**2, 2.0 * size
+        if beside is not None:
+            return beside
+    at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in names)
+    raise ConvergenceError(f"no limit point of the doubled motions was found beside the GPD at {at} in the ranges")
 
 
-def _doubling_at(event: TrackedEvent, way: float) -> Singular:
-    """The period doubling at a distance from the GPD, in steps along its curve."""
-    free, fixed = event.names
-    orbit = event.orbit
-    span = 2.0 * _AROUND * (abs(event.parameter(free)) or 1.0)
-    x, first = orbit.coefficients, event.parameter(free)
-    step_x, step = np.zeros_like(x), 0.0
-    vectors = event.null_vectors
-    for number in range(1, _STEPS + 1):
-        values = {**orbit.values, fixed: event.parameter(fixed) + way * number / _STEPS}
-        omega = orbit.omega
-        if free == "omega":
-            omega = first + step
-        else:
-            values[free] = first + step
-        guess = Guess(orbit.balance, x + step_x, omega, values, free, span, vectors=vectors)
-        doubling = PERIOD_DOUBLING.solve(guess)
-        state = doubling.state
-        value = state.omega if free == "omega" else state.values[free]
-        step_x, step = state.x - x, value - first
-        x, first, vectors = state.x, value, doubling.vectors
-    return doubling
-
-
-def _limit_point(event: TrackedEvent, way: float) -> tuple[float, Bifurcation] | None:
-    """The first limit point of the doubled branch at a distance from the GPD, and how far from its birth it lies."""
-    free, fixed = event.names
-    orbit = event.orbit
-    value = event.parameter(free)
-    start = _doubling_at(event, way)
-    system = orbit.system.with_parameters({fixed: event.parameter(fixed) + way})
-    linear = own_linear_part(orbit, system)
-    balance = HarmonicBalance(system, orbit.basis, linear=linear).settle(start.state.x, start.state.omega)
-    width = _AROUND * (abs(value) or 1.0)
-    curve = MotionProblem.response(balance, free, orbit.omega, 2.0 * width, orbit.adaptive)
-    observe = Inherited(event).observe or 0
-    own = replace(start, state=balance.at(start.state.x, start.state.omega, start.state.values))
-    doubling = solved_bifurcation(PERIOD_DOUBLING, own, curve, observe, [])
-    there = doubling.parameter(free)
-    context: dict[str, Any] = {**(event.context or {}), "bounds": {free: (there - width, there + width)}}
-    stepping = SteppingOptions(max_step=0.03, max_points=60)
-    branch = switch_branch(replace(doubling, context=context), stepping=stepping)
-    pass_on(branch.interruption)
-    limits = branch.bifurcations["LP"]
-    if not limits:
-        return None
-    return float(limits[0].arclength), limits[0]
+def _moved(orbit: PeriodicOrbit, state: BalanceState) -> PeriodicOrbit:
+    """Another motion in the place of one."""
+    values = dict(state.values)
+    return replace(orbit, balance=state.balance, coefficients=state.x.copy(), omega=state.omega, values=values)
