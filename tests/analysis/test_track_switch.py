@@ -42,9 +42,15 @@ def test_the_other_one_leads_to_the_other_limit_points(border):
     assert last == pytest.approx(2.94603063, abs=1e-5)
 
 
-def test_only_in_the_parameters_in_which_it_was_found(border):
-    with pytest.raises(InputError, match="followed over omega and j"):
-        so.track(border.bifurcations["GPD"][0], "Kc", (4, 5))
+def test_in_other_parameters_than_those_in_which_it_was_found(border):
+    """The limit points end where the period doublings have their GPD: at the stiffness held so far."""
+    event = border.bifurcations["GPD"][0]
+    limits, doublings = (so.track(event, "Kc", (4, 6), onto=kind) for kind in ("LP", "PD"))
+    assert limits.orbits[0].basis.nu == 2
+    for curve in (limits, doublings):
+        (there,) = curve.bifurcations["GPD"]
+        assert there.parameter("Kc") == pytest.approx(event.parameters["Kc"], rel=1e-8)
+        assert there.omega == pytest.approx(event.omega, rel=1e-8)
 
 
 def test_a_period_doubling_in_the_doubled_basis_is_no_limit_point_to_follow(border):

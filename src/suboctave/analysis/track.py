@@ -407,11 +407,6 @@ def start_onto(
     the curve lies outside the ranges, ConvergenceError where nothing of that kind is found.
     """
     if item.kind == "GPD" and kind == "LP":
-        if names != item.names:
-            raise InputError(
-                f"the limit points that leave this GPD are followed over {' and '.join(item.names)}, in which it was "
-                "found"
-            )
         return _beside_doubling(item, names, box, newton)
     if kind == "LP" and _symmetric(item, names):
         kind = "BP"
