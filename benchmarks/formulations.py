@@ -44,7 +44,7 @@ def start(regularization: float | None, harmonics: int, omega: float) -> Guess:
     """The motion some way above a period doubling."""
     system = so.library.reference_oscillator(p=0.55, regularization=regularization)
     orbit = so.frequency_response(system, (omega + 2.0 * AWAY, omega + AWAY), harmonics).orbits[-1]
-    return Guess(orbit.balance, orbit.coefficients, orbit.omega, orbit.values, "omega", 3.2)
+    return Guess(orbit.state(), "omega", 3.2)
 
 
 def timed(solve: Callable[[], Any]) -> tuple[Any, float]:
@@ -72,8 +72,8 @@ def singular_values(found: Singular) -> tuple[float, float]:
 
 def plain(guess: Guess, found: Singular, tolerance: float = 1e-8) -> str:
     """Steps of plain Newton iteration with Eq. 20 from the guess, or "never" and its smallest increment."""
-    balance, n = guess.balance, guess.balance.dimension
-    x, omega, (phi, q, b) = guess.x.ravel().copy(), guess.omega, published_vector(found.state)
+    balance, n = guess.state.balance, guess.state.balance.dimension
+    x, omega, (phi, q, b) = guess.state.unknowns.copy(), guess.state.omega, published_vector(found.state)
     least = np.inf
     for step in range(1, STEPS + 1):
         state = balance.at(x, omega)

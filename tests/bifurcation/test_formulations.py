@@ -33,7 +33,7 @@ PUBLISHED = {7: (2.2937369067, 3.9696952293), 15: (2.2937535514, 3.9697093215), 
 def above(system, harmonics, omega, away=5e-3, span=3.2):
     """The motion some way above omega, as a start."""
     orbit = so.frequency_response(system, (omega + 2.0 * away, omega + away), harmonics).orbits[-1]
-    return Guess(orbit.balance, orbit.coefficients, orbit.omega, orbit.values, "omega", span)
+    return Guess(orbit.state(), "omega", span)
 
 
 def oscillator(regularization=None):
@@ -71,10 +71,11 @@ def test_period_doublings_of_the_arctan_law(which):
 def test_newton_steps_of_the_system_as_printed_do_not_shrink():
     guess = above(oscillator(), 7, EXACT[0])
     phi, q, b = published_vector(locate_doubling(guess).state)
-    n = guess.balance.dimension
-    x, omega, increments = guess.x.ravel(), guess.omega, []
+    balance = guess.state.balance
+    n = balance.dimension
+    x, omega, increments = guess.state.unknowns, guess.state.omega, []
     for _ in range(12):
-        state = guess.balance.at(x, omega)
+        state = balance.at(x, omega)
         step = np.linalg.solve(jacobian(state, phi, q), equations(state, phi, q, b))
         x, omega, phi = x - step[:n], omega - step[-1], phi - step[n : 2 * n] - 1j * step[2 * n : -1]
         increments.append(np.linalg.norm(step))
@@ -240,8 +241,7 @@ def test_a_motion_of_two_periods_doubles_again():
     assert doubled.orbit.basis.nu == 2
     assert doubled.omega == pytest.approx(3.02970381, abs=1e-6)
     assert so.verify(doubled).agrees
-    guess = Guess(balance, doubled.orbit.coefficients, doubled.omega + 1e-4, doubled.parameters, "omega", 1.0)
-    other = locate_doubling(replace(guess, balance=doubled.orbit.balance))
+    other = locate_doubling(Guess(replace(doubled.orbit, omega=doubled.omega + 1e-4).state(), "omega", 1.0))
     assert other.state.omega == pytest.approx(doubled.omega, abs=1e-4)
 
 

@@ -120,7 +120,7 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     half = basis.even_part(x)
     try:
         balance = parent.balance.settle(half, omega, values)
-        doubling = locate_singular(Guess(balance, half, omega, values, curve.name, curve.span), Kind.HALF)
+        doubling = locate_singular(Guess(balance.at(half, omega, values), curve.name, curve.span), Kind.HALF)
     except ConvergenceError:
         return None
     state = doubling.state

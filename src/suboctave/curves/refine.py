@@ -155,7 +155,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         state = balance.at(x, state.omega, state.values)
         wide, kind, sample = curve.with_balance(balance), located.kind, located.sample
         try:
-            guess = Guess(balance, x, state.omega, state.values, curve.name, curve.span, kind.kappa(sample))
+            guess = Guess(state, curve.name, curve.span, kind.kappa(sample))
             solution = kind.solve(guess)
             if kind.genuine(solution, guess):
                 if _lies_between(solution, wide, a, b):
@@ -206,7 +206,7 @@ def _refined(
         x = wide.resized(completed, basis)
         # more harmonics need more samples of a law that tells nothing of itself
         balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-        guess = replace(_guess_from(solution, curve, size), balance=balance, x=x)
+        guess = replace(_guess_from(solution, curve, size), state=balance.at(x, state.omega, state.values))
         try:
             better = solve_or_behind(kind, guess)
             if neighbours is not None:
@@ -282,9 +282,7 @@ def as_orbit(state: BalanceState, residual: float, neglected: float, curve: Moti
 
 
 def _guess_from(solution: Singular, curve: MotionProblem, size: float = 0.0) -> Guess:
-    state = solution.state
-    at = (state.balance, state.x, state.omega, state.values)
-    return Guess(*at, curve.name, curve.span, solution.kappa, solution.vectors, size)
+    return Guess(solution.state, curve.name, curve.span, solution.kappa, solution.vectors, size)
 
 
 def _kappa(located: Located) -> float:

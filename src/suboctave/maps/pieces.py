@@ -217,7 +217,7 @@ class MonotonePiece:
         options = self.curve.options
         system = orbit.system.with_parameters({**orbit.values, self.along: value})
         balance = HarmonicBalance(system, orbit.basis, linear=own_linear_part(orbit, system)).settle(x, omega)
-        solution = LIMIT_POINT.solve(Guess(balance, x, omega, dict(balance.values), "omega", span))
+        solution = LIMIT_POINT.solve(Guess(balance.at(x, omega), "omega", span))
         curve = MotionProblem.response(solution.state.balance, "omega", omega, span, orbit.adaptive)
         point = solved_bifurcation(LIMIT_POINT, solution, curve, int(options["observe"]), [])
         if gap_to(point.orbit, self.nodes, self.along) is None:

@@ -49,7 +49,7 @@ def locate_doubling(guess: Guess) -> Singular:
     """
     solution = locate_singular(guess, Kind.HALF, PublishedDoubling)
     state = solution.state
-    beside = replace(guess, x=state.x, omega=state.omega, values=state.values, vectors=null_vectors(state, Kind.HALF))
+    beside = replace(guess, state=state, vectors=null_vectors(state, Kind.HALF))
     try:
         confirmed = locate_singular(beside, Kind.HALF)
     except ConvergenceError as failure:

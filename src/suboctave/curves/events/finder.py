@@ -70,7 +70,7 @@ def locate(
         nearer = at_low if share < 0.5 else at_high
         if depth % 3 == 0:
             # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
-            attempt = _try(kind, at_low, at_high, share, nearer)
+            attempt = solved_between(kind, at_low, at_high, share, nearer)
             # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
             # here
             if attempt is not None:
@@ -97,44 +97,35 @@ def locate(
     return Located(kind, 0.5 * (low + high), at_high, None, 0.5 * names, (at_low, at_high))
 
 
-def _try(
-    kind: BifurcationKind,
-    low: Sample,
-    high: Sample,
-    share: float,
-    nearer: Sample,
+def solved_between(
+    kind: BifurcationKind, low: Sample, high: Sample, share: float, nearer: Sample
 ) -> tuple[Singular, float] | None:
     """A solution between two samples and where, from a start at a share of the way; None if there is none."""
+    solved = _solved(kind, between(low.point, high.point, share), high.point, nearer)
+    fraction = None if solved is None else position(low.point, high.point, solved[1])
+    return None if solved is None or fraction is None or not -0.05 <= fraction <= 1.05 else (solved[0], fraction)
+
+
+def _solved(kind: BifurcationKind, u: Array, point: CurvePoint, sample: Sample) -> tuple[Singular, Array] | None:
+    """The bifurcation from u, in the discretisation of a point, and its place; None if there is none."""
     try:
-        guess = Guess.at(between(low.point, high.point, share), high.point, kind.kappa(nearer))
+        guess = Guess.at(u, point, kind.kappa(sample))
         solution = kind.solve(guess)
     except ConvergenceError:
         return None
-    if not kind.genuine(solution, guess):
-        return None
-    fraction = position(low.point, high.point, guess.vector(solution.state))
-    if fraction is None or not -0.05 <= fraction <= 1.05:
-        return None
-    return solution, fraction
+    return (solution, guess.vector(solution.state)) if kind.genuine(solution, guess) else None
 
 
-def locate_near(
-    kind: BifurcationKind,
-    sample: Sample,
-    reach: float,
-) -> Located | None:
+def locate_near(kind: BifurcationKind, sample: Sample, reach: float) -> Located | None:
     """A bifurcation within `reach` (scaled arclength) of a sample, on its curve: for tests that change in one place
     because the discretisation does.
     """
     point = sample.point
-    try:
-        guess = Guess.at(point.u, point, kind.kappa(sample))
-        solution = kind.solve(guess)
-    except ConvergenceError:
+    solved = _solved(kind, point.u, point, sample)
+    if solved is None:
         return None
-    if not kind.genuine(solution, guess):
-        return None
-    way = point.weights * (guess.vector(solution.state) - point.u)
+    solution, there = solved
+    way = point.weights * (there - point.u)
     along = point.weights * point.tangent
     ahead = float(way @ along) / length(along)
     aside = math.sqrt(max(0.0, float(way @ way) - ahead**2))

@@ -34,8 +34,8 @@ from suboctave.bifurcation.gaps import (
     read_direction,
 )
 from suboctave.continuation.newton import NewtonOptions
-from suboctave.continuation.point import between, point_between
-from suboctave.curves.events.finder import Located, position
+from suboctave.continuation.point import point_between
+from suboctave.curves.events.finder import Located, solved_between
 from suboctave.curves.events.locate import Guess, Singular, solve
 from suboctave.curves.events.monitors import BifurcationKind
 from suboctave.curves.kinds.grazing import GrazingContactEquations
@@ -109,18 +109,16 @@ class Touch(BifurcationKind):
             state.omega if name == "omega" else state.values[name],
         )
 
-    def solve(self, guess: Guess, start: BalanceState | None = None) -> Grazing:
-        """Newton's method for the grazing from the nearest extremum of the guess's motion; `start`: the equations
-        there, where they have been evaluated.
+    def solve(self, guess: Guess) -> Grazing:
+        """Newton's method for the grazing from the nearest extremum of the guess's motion.
 
         Raises
         ------
         ConvergenceError
             If it does not converge.
         """
-        start = guess.state() if start is None else start
-        augmentation = GrazingContactEquations.of(start, self.element, self.index)
-        evaluation, iterations = solve(guess, start, augmentation, np.array([self._nearest(start)]))
+        augmentation = GrazingContactEquations.of(guess.state, self.element, self.index)
+        evaluation, iterations = solve(guess, augmentation, np.array([self._nearest(guess.state)]))
         tau = float(evaluation.extra[0]) % (2.0 * math.pi)
         return Grazing(evaluation.state, None, 0.0, evaluation.error, iterations, tau)
 
@@ -162,11 +160,7 @@ def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:
     return passing, clear
 
 
-def locate_grazings(
-    a: Sample,
-    b: Sample,
-    options: NewtonOptions,
-) -> list[Located]:
+def locate_grazings(a: Sample, b: Sample, options: NewtonOptions) -> list[Located]:
     """All grazings between two neighbours, in the order met.
 
     What cannot be solved for from the ends of the step is separated by halving it, and bracketed at last.
@@ -176,18 +170,11 @@ def locate_grazings(
     return sorted(_search(a, b, 0.0, 1.0, 0, options), key=lambda item: item.fraction)
 
 
-def _search(
-    a: Sample,
-    b: Sample,
-    low: float,
-    high: float,
-    depth: int,
-    options: NewtonOptions,
-) -> list[Located]:
+def _search(a: Sample, b: Sample, low: float, high: float, depth: int, options: NewtonOptions) -> list[Located]:
     passing, clear = touches(a, b)
     if not passing and (clear or depth >= _UNCLEAR):
         return []
-    solved = [_solved(touch, a, b) for touch in passing]
+    solved = [solved_between(touch, a, b, touch.share, b) for touch in passing]
     grazings = [
         Located(touch, low + s[1] * (high - low), a if s[1] < 0.5 else b, s[0], 0.0)
         for touch, s in zip(passing, solved, strict=True)
@@ -209,17 +196,6 @@ def _search(
     half = 0.5 * (low + high)
     parts = ((a, middle, low, half), (middle, b, half, high))
     return [item for part in parts for item in _search(*part, depth + 1, options)]
-
-
-def _solved(touch: Touch, a: Sample, b: Sample) -> tuple[Grazing, float] | None:
-    """The grazing and where between the two neighbours it lies; None if it was not found there."""
-    try:
-        guess = Guess.at(between(a.point, b.point, touch.share), b.point, 0.0)
-        solution = touch.solve(guess)
-    except ConvergenceError:
-        return None
-    fraction = position(a.point, b.point, guess.vector(solution.state))
-    return None if fraction is None or not -0.05 <= fraction <= 1.05 else (solution, fraction)
 
 
 def _repeated(located: list[Located]) -> bool:

@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.bordered import at_values, bordered
+from suboctave.bifurcation.bordered import bordered
 from suboctave.bifurcation.gaps import GrazingContact, gap_extrema
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
@@ -60,7 +60,7 @@ def layer_of(kind: BifurcationKind, solution: Singular, guess: Guess) -> Grazing
     if solution.vectors is None:
         return None
     best: GrazingContact | None = None
-    for touch, grazing, distance in _grazings_near(solution.state, guess, young=True):
+    for touch, grazing, distance in _grazings_near(replace(guess, state=solution.state), young=True):
         if best is not None and distance >= best.distance:
             continue
         if _exponent(kind, solution, grazing, guess) < _SQUARE_ROOT:
@@ -111,18 +111,19 @@ def unresolved(
     harmonics tells it. A bifurcation that is not found with two thirds of them is known up to the thickness of the
     layer. `coarser`: a number of harmonics with which it was found before, and where.
     """
-    basis = guess.balance.basis
+    basis = guess.state.basis
     if coarser is not None and 0.5 * basis.harmonics <= coarser[0] <= 0.75 * basis.harmonics:
         fewer, value = coarser
     else:
         other = HarmonicBasis(2 * basis.harmonics // 3, basis.nu)
-        fewer, x = other.harmonics, basis.resized(guess.x, other)
-        balance = guess.balance.with_basis(other).settle(x, guess.omega, guess.values)
+        fewer, state = other.harmonics, guess.state
+        x = basis.resized(state.x, other)
+        balance = state.balance.with_basis(other).settle(x, state.omega, state.values)
         try:
-            state = solve_or_behind(kind, replace(guess, balance=balance, x=x)).state
+            there = solve_or_behind(kind, replace(guess, state=balance.at(x, state.omega, state.values)))
         except ConvergenceError:
             return abs(guess.parameter - contact.parameter)
-        value = float(guess.vector(state)[-1])
+        value = guess.value(there.state)
     return abs(value - guess.parameter) / (basis.harmonics / fewer - 1.0)
 
 
@@ -152,13 +153,13 @@ def behind_their_grazings(located: list[tuple[float, Bifurcation]]) -> list[Bifu
 
 def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
     """Grazings up to some way off, the nearest first."""
-    near = [item for item in _grazings_near(guess.state(), guess, young=False) if item[2] <= limit]
+    near = [item for item in _grazings_near(guess, young=False) if item[2] <= limit]
     return sorted(near, key=lambda item: item[2])
 
 
 def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     """Points along the curve's tangent at a grazing, on the side on which the contact is young."""
-    state = grazing.state
+    state, here = grazing.state, replace(guess, state=grazing.state)
     weights = _weights(state, guess)
     dimension = state.balance.dimension
     rows = state.balance.row_weights(state.balance.dimension) / max(state.balanced.scale, np.finfo(float).tiny)
@@ -176,13 +177,12 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     tangent = factor.solve(unit)
     tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
     for way in _STARTS:
-        u = guess.vector(state) + way * tangent / weights
-        omega, values = at_values(state.values, guess.name, float(u[-1]), state.omega)
-        yield replace(guess, balance=state.balance, x=state.balance.shaped(u[:-1]), omega=omega, values=values)
+        yield here.moved(guess.vector(state) + way * tangent / weights)
 
 
-def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
+def _grazings_near(guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
     """Grazings of exact contacts beside a motion, with the way there; `young`: only of contacts that are, and young."""
+    state = guess.state
     mass = state.linear.equation_of_motion()[0]
     for gap in gap_extrema(state):
         local = state.local(gap.element)
@@ -203,8 +203,7 @@ def _grazings_near(state: BalanceState, guess: Guess, young: bool) -> Iterator[t
                 continue
             touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
             try:
-                here = replace(guess, balance=state.balance, x=state.x, omega=state.omega, values=state.values)
-                grazing = touch.solve(here, state)
+                grazing = touch.solve(guess)
             except ConvergenceError:
                 continue
             yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, state, guess)))
@@ -230,12 +229,8 @@ def _exponent(kind: BifurcationKind, solution: Singular, grazing: Grazing, guess
         return 0.5
     weights = _weights(solution.state, guess)
     start = 0.75 * guess.vector(grazing.state) + 0.25 * guess.vector(solution.state)
-
-    state = solution.state
-    omega, values = at_values(state.values, guess.name, float(start[-1]), state.omega)
-    begin = replace(guess, balance=state.balance, x=state.balance.shaped(start[:-1]), omega=omega, values=values)
     try:
-        problem = begin.problem()
+        problem = replace(guess, state=solution.state).moved(start).problem()
         scale = problem.weights(start, 0.0)
         row = weights * chord / scale
         solved = correct(problem, start, row / float(np.linalg.norm(row)), scale, NEWTON).evaluation

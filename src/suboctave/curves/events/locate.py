@@ -6,12 +6,11 @@ the guess's neighbourhood. Unknowns are weighted as along curves, so that conver
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.bifurcation.bordered import NullVectors
+from suboctave.bifurcation.bordered import NullVectors, at_values
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint
 from suboctave.curves.augmentation import Augmentation
@@ -23,7 +22,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
 from suboctave.lazy import lazy
 
@@ -39,15 +38,12 @@ _TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True)
 class Guess:
-    """Where to start: equations, coefficients (2 H + 1, size), omega, values, name and range of the free parameter,
-    kappa; null vectors of the operator nearby, where they are known (with any number of harmonics); size of the motions
-    in the neighbourhood, where it may pass rest.
+    """Where to start: a motion with its equations, name and range of the free parameter, kappa; null vectors of the
+    operator nearby, where they are known (with any number of harmonics); size of the motions around, where the
+    curve may pass rest.
     """
 
-    balance: HarmonicBalance
-    x: Array
-    omega: float
-    values: Mapping[str, float]
+    state: BalanceState
     name: str
     span: float
     kappa: float = 0.0
@@ -59,34 +55,40 @@ class Guess:
         """From u, a vector in the discretisation of a point."""
         curve = point.curve
         assert isinstance(curve, MotionProblem)
-        x, omega, values = curve.split(u)
-        return cls(curve.balance, x, omega, values, curve.name, curve.span, kappa, size=curve.unit(point.weights))
-
-    def state(self) -> BalanceState:
-        """The equations at the guess."""
-        return self.balance.at(self.x, self.omega, self.values)
+        state = curve.balance.at(*curve.split(u))
+        return cls(state, curve.name, curve.span, kappa, size=curve.unit(point.weights))
 
     @property
     def parameter(self) -> float:
         """Value of the free parameter."""
-        return self.omega if self.name == "omega" else self.values[self.name]
+        return self.value(self.state)
+
+    def value(self, state: BalanceState) -> float:
+        """Value of the free parameter at a motion."""
+        return state.omega if self.name == "omega" else state.values[self.name]
 
     def vector(self, state: BalanceState) -> Array:
         """Coefficients and free parameter of a motion, (dimension + 1,)."""
-        return np.append(state.unknowns, state.omega if self.name == "omega" else state.values[self.name])
+        return np.append(state.unknowns, self.value(state))
+
+    def moved(self, vector: Array) -> Guess:
+        """The same at other coefficients and another value of the free parameter."""
+        x, value, state = vector[:-1], float(vector[-1]), self.state
+        omega, values = at_values(state.values, self.name, value, state.omega)
+        return replace(self, state=state.balance.at(state.balance.shaped(x), omega, values))
 
     def problem(self, augmentation: Augmentation = PLAIN, force: float = 0.0) -> MotionProblem:
         """The motions in the free parameter that an augmentation singles out; force: unit of its equations."""
-        own = self.balance.values
+        state, own = self.state, self.state.balance.values
         return MotionProblem(
-            self.balance,
+            state.balance,
             (self.name,),
             (self.span,),
-            self.omega,
+            state.omega,
             augmentation=augmentation,
             reference=self.size,
-            force=force or self.omega**2,
-            held={} if self.values is own else {n: v for n, v in self.values.items() if v != own[n]},
+            force=force or state.omega**2,
+            held={} if state.values is own else {n: v for n, v in state.values.items() if v != own[n]},
         )
 
 
@@ -113,8 +115,8 @@ class Singular:
         return floquet_multipliers(self.state)
 
 
-def solve(guess: Guess, begin: BalanceState, augmentation: Augmentation, extra: Array) -> tuple[MotionEvaluation, int]:
-    """Solve the equations of an augmentation in (X, extra, the guess's free parameter); begin: the equations there.
+def solve(guess: Guess, augmentation: Augmentation, extra: Array) -> tuple[MotionEvaluation, int]:
+    """Solve the equations of an augmentation in (X, extra, the guess's free parameter).
 
     Returns
     -------
@@ -125,8 +127,8 @@ def solve(guess: Guess, begin: BalanceState, augmentation: Augmentation, extra: 
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
-    problem = guess.problem(augmentation, begin.balanced.scale)
-    u = problem.join(guess.x, guess.parameter, extra)
+    problem = guess.problem(augmentation, guess.state.balanced.scale)
+    u = problem.join(guess.state.x, guess.parameter, extra)
     solved = correct(problem, u, None, problem.weights(u, 0.0), NEWTON)
     evaluation = solved.evaluation
     # of corrections beyond what was asked for, which move the last digits, the least residual is taken
@@ -153,11 +155,11 @@ def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] =
     ConvergenceError
         If Newton's method does not converge from the guess.
     """
-    begin, vectors = guess.state(), guess.vectors
+    state, vectors = guess.state, guess.vectors
     if vectors is not None:
-        vectors = vectors.resized(guess.balance.basis, guess.balance.size, kind)
-    own, extra = operator.started(begin, kind, guess.kappa, vectors, (guess.name,))
-    evaluation, iterations = solve(guess, begin, own, extra)
+        vectors = vectors.resized(state.basis, state.balance.size, kind)
+    own, extra = operator.started(state, kind, guess.kappa, vectors, (guess.name,))
+    evaluation, iterations = solve(guess, own, extra)
     equations = evaluation.equations
     assert isinstance(equations, SingularEquations)
     return Singular(evaluation.state, equations.bordered.vectors, equations.kappa, evaluation.error, iterations)
@@ -172,8 +174,7 @@ def locate_branch_point(guess: Guess) -> Singular:
         If Newton's method fails, or converges to a point whose unfolding is not zero: an imperfect (broken) branch
         point.
     """
-    begin = guess.state()
-    evaluation, iterations = solve(guess, begin, BranchPointUnfolded.of(begin, guess.name), np.zeros(1))
+    evaluation, iterations = solve(guess, BranchPointUnfolded.of(guess.state, guess.name), np.zeros(1))
     equations = evaluation.equations
     assert isinstance(equations, BranchPointEquations)
     if abs(equations.beta) > _UNFOLDING:
