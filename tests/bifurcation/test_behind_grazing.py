@@ -8,13 +8,12 @@ the stiffer the stop, the closer the fold lies to the grazing.
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.curves.events.layer import behind_grazing
 from suboctave.curves.events.locate import Guess, solve
 from suboctave.curves.events.monitors import LimitPoint
@@ -156,14 +155,20 @@ def test_newton_does_not_take_any_standstill_for_convergence():
     orbit = curve.orbits[0]
     low = np.abs(orbit.coefficients).max()
 
+    class Square(Equations):
+        values = rows = renewed = None
+
+        def __init__(self, state):
+            self.state = state
+            self.values = np.array([(state.x[1, 0] / low) ** 2 + 1.0])
+            self.rows = np.zeros((1, state.x.size + 1))
+            self.rows[0, 1] = 2.0 * state.x[1, 0] / low**2
+
     class OutOfReach(Augmentation):
         name = "out of reach"
 
         def at(self, state, extra, names):
-            values = np.array([(state.x[1, 0] / low) ** 2 + 1.0])
-            rows = np.zeros((1, state.x.size + 1))
-            rows[0, 1] = 2.0 * state.x[1, 0] / low**2
-            return SimpleNamespace(values=values, rows=rows, addition=None, column=None, takes_over=lambda _: False)
+            return Square(state)
 
     with pytest.raises(ConvergenceError):
         solve(guess_at(orbit), OutOfReach(), np.zeros(0))
