@@ -8,7 +8,7 @@ import pytest
 import suboctave as so
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.timedomain import integrate
-from suboctave.timedomain.flow import Flow, check_motions
+from suboctave.timedomain.flow import Flow
 
 LOADS = [
     so.HarmonicLoad(0, amplitude=["p", "0.3*omega"], harmonic=[1, 3], phase=[0.0, "shift"]),
@@ -229,7 +229,7 @@ def test_what_grows_without_bound_is_told(method):
     motions = Flow(system, method).over(x, 2.0, 10)
     assert motions.failed.tolist() == [False, True]
     with pytest.raises(ConvergenceError, match="1 of 2 trajectories"):
-        check_motions(motions)
+        motions.checked()
 
 
 def test_what_an_element_raises_reaches_the_user():

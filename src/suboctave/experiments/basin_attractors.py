@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.experiments.common import Integration
 from suboctave.experiments.poincare import Attractor, state_sizes
-from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
 from suboctave.timedomain.flow import Flow
@@ -170,16 +169,13 @@ class Catalogue:
 
     def _cycle(self, solution: PeriodicSolution) -> tuple[Array, Array]:
         flow = Flow(self.system, "accurate", tolerance=1e-12)
-        motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1)
-        pass_on(motions.interruption)
+        motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1).whole()
         points = np.vstack([solution.state[None], motions.states[0][:-1]])
         return points, self._extents(points)
 
     def _extents(self, points: Array) -> Array:
         flow = Flow(self.system, "accurate", tolerance=1e-10)
-        motions = flow.over(points[0], self.omega, len(points), self.values, measure=True, workers=1)
-        pass_on(motions.interruption)
-        assert motions.peaks is not None
+        motions = flow.over(points[0], self.omega, len(points), self.values, measure=True, workers=1).whole()
         return state_sizes(self.system, motions.peaks[0], self.omega, self.values)
 
     def _name(self, name: str | None, period: int) -> str:

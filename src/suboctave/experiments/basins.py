@@ -12,16 +12,16 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError, path_of, suggest
 from suboctave.experiments.basin_attractors import BasinAttractor, Catalogue, Given, enter_attractors, read_attractors
-from suboctave.experiments.common import BasinOptions, Layout, TimeResult, checked_integration
+from suboctave.experiments.common import BasinOptions, On, TimeResult, checked_integration
 from suboctave.experiments.poincare import attractor_of
-from suboctave.interruption import Interruption, pass_on
+from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, check_range, start_state, timed
 from suboctave.model.system import System, describe
@@ -29,7 +29,7 @@ from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.journal import Journal
 from suboctave.store.plain import from_json, padded, to_json
-from suboctave.timedomain.flow import Flow, Report, check_extent
+from suboctave.timedomain.flow import Flow, Motions, Report, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -66,19 +66,15 @@ class Basins(TimeResult):
         end where they were said to.
     """
 
-    layout = Layout(
-        "basins",
-        {"x": ("x",), "y": ("y",), "labels": ("y", "x"), "settling": ("y", "x"), "rest": ("state",)},
-        {"omega": float, "complete": bool, "followed": int, "contradicted": int, "observed": int},
-        {"labels": "label"},
-    )
-    x: Array
-    y: Array
-    labels: NDArray[np.int_]
-    settling: NDArray[np.int_]
+    contents = "basins"
+    picture = "plot_basins"
+    x: Annotated[Array, On("x")]
+    y: Annotated[Array, On("y")]
+    labels: Annotated[NDArray[np.int_], On("y", "x", name="label")]
+    settling: Annotated[NDArray[np.int_], On("y", "x")]
     attractors: list[BasinAttractor]
     plane: tuple[str, str]
-    rest: Array
+    rest: Annotated[Array, On("state")]
     omega: float
     parameters: Mapping[str, float]
     followed: int
@@ -86,7 +82,6 @@ class Basins(TimeResult):
     complete: bool
     observed: int
     system: System
-    seconds: float = 0.0
 
     @property
     def names(self) -> dict[int, str]:
@@ -174,10 +169,8 @@ class Basins(TimeResult):
 
         Options are those of `pictures.plot_basins`: `points`, `title`, `size`.
         """
-        from suboctave.pictures.in_time import plot_basins
-
         marks = [one.points[:, self._columns()] for one in self.attractors] if self.system.n == 1 else None
-        return plot_basins(self.to_xarray(), path, **{"points": marks, **options})
+        return super().plot(path, **{"points": marks, **options})
 
     def _columns(self) -> list[int]:
         names = coordinates(self.system)
@@ -468,13 +461,10 @@ class BasinRun:
         self._settle(self.states[cells], lambda share: None)
         self._keep_attractors(known)
 
-    def _over(self, states: Array, periods: int, last: int, measure: bool = False) -> Any:
+    def _over(self, states: Array, periods: int, last: int, measure: bool = False) -> Motions:
         c = self.catalogue
-        motions = self.flow.over(
-            states, c.omega, periods, c.values, skip=periods - last, measure=measure, workers=c.how.workers
-        )
-        pass_on(motions.interruption)
-        return motions
+        skip, workers = periods - last, c.how.workers
+        return self.flow.over(states, c.omega, periods, c.values, skip, measure, workers).whole()
 
     def _settle(self, states: Array, progress: Callable[[float], None]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
         """Labels of states (B, 2n), and the periods after which they were known."""

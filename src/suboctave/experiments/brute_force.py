@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,16 @@ from suboctave.errors import InputError, suggest
 from suboctave.experiments.common import (
     FEW,
     Integration,
-    Layout,
+    On,
     SectionOptions,
+    StatesOn,
     TimeResult,
     checked_integration,
     starting_states,
     varied_grid,
 )
 from suboctave.experiments.poincare import Attractor, attractor_of
-from suboctave.interruption import Interruption, pass_on
+from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
@@ -60,19 +61,18 @@ class BruteForceDiagram(TimeResult):
         (S, V, P, n): the largest |x_i| in the period before each point.
     complete
         False where an interruption (Ctrl-C) left values out.
+
+    `plot` draws the motions, one colour for each period, over branches if any are given as `curves`; options are those
+    of `pictures.plot_brute_force`: `curves`, `quantity` ("amplitude" or "section"), `starts`, `dof`, `title`, `size`.
     """
 
-    layout = Layout(
-        "brute force",
-        {"starts": ("start",), "values": ("value",), "largest": ("start", "value", "section", "dof")},
-        {"name": str, "transient": int, "tolerance": float, "method": str, "observed": int, "complete": bool},
-        {"starts": "start", "values": "value", "name": "varied"},
-    )
-    name: str
-    values: Array
-    starts: tuple[str, ...]
-    points: Array
-    largest: Array
+    contents = "brute force"
+    picture = "plot_brute_force"
+    name: Annotated[str, On(name="varied")]
+    values: Annotated[Array, On("value", name="value")]
+    starts: Annotated[tuple[str, ...], On("start", name="start")]
+    points: Annotated[Array, StatesOn("start", "value", "section")]
+    largest: Annotated[Array, On("start", "value", "section", "dof")]
     complete: bool
     omega: float | None
     transient: int
@@ -80,7 +80,6 @@ class BruteForceDiagram(TimeResult):
     method: str
     observed: int
     system: System
-    seconds: float = 0.0
 
     @cached_property
     def attractors(self) -> list[list[Attractor | None]]:
@@ -113,15 +112,9 @@ class BruteForceDiagram(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Points on (start, value, section, dof), periods and amplitudes on (start, value)."""
-        n, axes = self.system.n, ("start", "value", "section", "dof")
-        variables = {
-            "displacement": (axes, self.points[..., :n]),
-            "velocity": (axes, self.points[..., n:]),
-            "period": (axes[:2], self.period),
-            "amplitude": (axes[:2], self.amplitude),
-        }
-        attributes: dict[str, Any] = {} if self.omega is None else {"omega": self.omega}
-        return self._dataset(variables, attributes=attributes)
+        axes = ("start", "value")
+        variables = {"period": (axes, self.period), "amplitude": (axes, self.amplitude)}
+        return self._dataset(variables, attributes={} if self.omega is None else {"omega": self.omega})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per value and start: what was varied, start, period, amplitude, defect of the repetition."""
@@ -135,16 +128,6 @@ class BruteForceDiagram(TimeResult):
         ]
         own = ("start", "kind", "period", "amplitude", "defect")
         return pd.DataFrame(rows, columns=[parameter_column(self.name, own), *own])
-
-    def plot(self, path: Any = None, curves: Any = None, **options: Any) -> Any:
-        """Draw the motions found, one colour for each period, over branches if any are given; saved to a path.
-
-        Options are those of `pictures.plot_brute_force`: `quantity` ("amplitude" or "section"), `starts`, `dof`,
-        `title`, `size`.
-        """
-        from suboctave.pictures.in_time import plot_brute_force
-
-        return plot_brute_force(self.to_xarray(), path, curves=curves, **options)
 
     def __repr__(self) -> str:
         counts = []
@@ -246,9 +229,7 @@ class _Scan:
         rows = [d.starts.index(one) for one in which]
         for step in range(count):
             columns = [step if one == "up" else count - 1 - step for one in which]
-            motions = flow.over(states, *self._at(d.values[columns]), skip=d.transient, measure=True, workers=1)
-            pass_on(motions.interruption)
-            assert motions.peaks is not None
+            motions = flow.over(states, *self._at(d.values[columns]), d.transient, measure=True, workers=1).whole()
             for i, (row, column) in enumerate(zip(rows, columns, strict=True)):
                 d.points[row, column], d.largest[row, column] = motions.states[i], motions.peaks[i]
             # where a motion has left the range of numbers, the next value begins as the first one did
@@ -267,7 +248,6 @@ class _Scan:
             workers=self.how.workers,
             report=report,
         )
-        assert motions.peaks is not None
         for out, kept in ((d.points, motions.states), (d.largest, motions.peaks)):
             out[rows] = kept.reshape(k, len(d.values), *kept.shape[1:])
         return motions.interruption

@@ -6,15 +6,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError, is_number, shortened, suggest
-from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, numbers_of, observed_dof
@@ -172,9 +171,7 @@ def check_continuous(system: System, state: Array, omega: float, values: Mapping
     if not own:
         return
     flow = Flow(system, "newmark", _PER_PERIOD, _PER_PERIOD, lanes=8)
-    motions = flow.over(state, omega, _PERIODS, values)
-    pass_on(motions.interruption)
-    states = motions.states[0]
+    states = flow.over(state, omega, _PERIODS, values).whole().states[0]
     states = np.vstack([state[None], states[np.isfinite(states).all(axis=1)]])
     for placed in own:
         _check_jump(system, placed.element, states, {**system.parameters, **values})
@@ -210,23 +207,50 @@ def _check_jump(system: System, element: Any, states: Array, values: Mapping[str
         )
 
 
-@dataclass(frozen=True)
-class Layout:
-    """What of a result is written as it is: arrays with their axes, and attributes with their kinds.
-
-    An array on the one axis of its own name is the coordinate there. `names`: variables that are not called as here.
+# ----------------------------------------------------------------------------------------------------------- results
+class On:
+    """Where a field of a result lies in its dataset: `Annotated[Array, On("time", "dof")]` is a variable on these axes,
+    the coordinate if the one axis is called as it is; `name`: what it is called there, if not as the field.
     """
 
-    contents: str
-    arrays: Mapping[str, tuple[str, ...]]
-    attributes: Mapping[str, type]
-    names: Mapping[str, str] = field(default_factory=dict)
+    def __init__(self, *axes: str, name: str = "") -> None:
+        self.axes, self.name = axes, name
+
+
+class StatesOn(On):
+    """The axes of states (..., 2n), which are two variables of the dataset: displacement and velocity."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A field of a result, of this `kind`, in its dataset: on axes, or as an attribute."""
+
+    field: str
+    kind: Any
+    name: str
+    axes: tuple[str, ...] = ()
+    states: bool = False
+
+
+def entries_of(made: Any) -> list[Entry]:
+    """Where the fields of a class of results lie: arrays on their axes, numbers and texts as attributes."""
+    known = []
+    for name, hint in get_type_hints(made, include_extras=True).items():
+        kind, *places = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        if places or (kind in (int, float, bool, str) and name != "seconds"):
+            place = places[0] if places else On()
+            known.append(Entry(name, kind, place.name or name, place.axes, isinstance(place, StatesOn)))
+    return known
 
 
 class TimeResult(Stored, ABC):
-    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications."""
+    """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
-    layout: ClassVar[Layout]
+    `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it.
+    """
+
+    contents: ClassVar[str]
+    picture: ClassVar[str]
     system: System
 
     def to_xarray(self) -> xarray.Dataset:
@@ -243,11 +267,15 @@ class TimeResult(Stored, ABC):
 
     def to_table(self) -> Table:
         """The table with the result beside it (`.result`)."""
-        import numpy as np
-
         frame = self.to_dataframe()
         columns = {str(name): np.asarray(frame[name].tolist()) for name in frame.columns}
         return Table(columns, repr(self).splitlines()[0], self)
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Draw it; saved if a path is given. The class says what is drawn, and which options there are."""
+        from suboctave.pictures import in_time
+
+        return getattr(in_time, self.picture)(self.to_xarray(), path, **options)
 
     def _dataset(
         self,
@@ -255,22 +283,28 @@ class TimeResult(Stored, ABC):
         coordinates: Mapping[str, Any] | None = None,
         attributes: Mapping[str, Any] | None = None,
     ) -> xarray.Dataset:
-        """A dataset of everything in the layout, of what is given besides, and of what produced it."""
-        import numpy as np
+        """A dataset of all fields that have a place in one, of what is given besides, and of what produced it."""
         import xarray
 
-        layout, system = self.layout, self.system
-        values = getattr(self, "parameters", system.parameters)
-        arrays = {layout.names.get(one, one): (axes, getattr(self, one)) for one, axes in layout.arrays.items()}
+        n, values = self.system.n, getattr(self, "parameters", self.system.parameters)
+        arrays: dict[str, Any] = {}
+        own: dict[str, Any] = {}
+        for entry in entries_of(type(self)):
+            value = getattr(self, entry.field)
+            if entry.states:
+                parts = {"displacement": value[..., :n], "velocity": value[..., n:]}
+                arrays |= {name: ((*entry.axes, "dof"), part) for name, part in parts.items()}
+            elif entry.axes:
+                arrays[entry.name] = entry.axes, value
+            else:
+                own[entry.name] = int(value) if isinstance(value, bool) else value
         arrays |= {"parameters": (("parameter",), np.array(list(values.values()), dtype=float)), **(variables or {})}
-        own = {layout.names.get(one, one): getattr(self, one) for one in layout.attributes}
-        plain = {name: int(value) if isinstance(value, bool) else value for name, value in own.items()}
-        produced = {"dofs": system.n, "system": system.name, "suboctave": __version__}
+        produced = {"dofs": n, "system": self.system.name, "suboctave": __version__}
         dataset = xarray.Dataset(
             dict(flat(arrays)),
             coords={**(coordinates or {}), "parameter": list(values)},
-            attrs={"contents": layout.contents, **plain, **(attributes or {}), **produced},
+            attrs={"contents": self.contents, **own, **(attributes or {}), **produced},
         )
         if "dof" in dataset.dims:
-            dataset = dataset.assign_coords(dof=list(system.dof_names or range(system.n)))
+            dataset = dataset.assign_coords(dof=list(self.system.dof_names or range(n)))
         return dataset

@@ -23,20 +23,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack, overload
 
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
-from suboctave.experiments.common import Layout, ParallelOptions, TimeResult, check_continuous
+from suboctave.experiments.common import On, ParallelOptions, TimeResult, check_continuous
 from suboctave.experiments.poincare import state_sizes
-from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.timedomain.flow import METHODS, Flow, Motions, Report, check_extent, check_motions
+from suboctave.timedomain.flow import METHODS, Flow, Motions, Report, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -71,34 +70,26 @@ class LyapunovExponents(TimeResult):
         (P, m): the averages over the first periods, over all trajectories.
     smooth
         Whether smooth weights gave the smaller standard errors.
+
+    `plot` draws the running averages over the periods, with a band of two standard errors; options are those of
+    `pictures.plot_lyapunov`: `count`, `title`, `size`.
     """
 
-    layout = Layout(
-        "lyapunov exponents",
-        {
-            "exponents": ("exponent",),
-            "standard_errors": ("exponent",),
-            "by_trajectory": ("trajectory", "exponent"),
-            "stretches": ("stretch", "exponent"),
-            "running": ("period", "exponent"),
-            "end": ("state",),
-        },
-        {"omega": float, "divergence": float, "smooth": bool, "transient": int, "tolerance": float},
-    )
-    exponents: Array
-    standard_errors: Array
+    contents = "lyapunov exponents"
+    picture = "plot_lyapunov"
+    exponents: Annotated[Array, On("exponent")]
+    standard_errors: Annotated[Array, On("exponent")]
     divergence: float
-    by_trajectory: Array
-    stretches: Array
-    running: Array
+    by_trajectory: Annotated[Array, On("trajectory", "exponent")]
+    stretches: Annotated[Array, On("stretch", "exponent")]
+    running: Annotated[Array, On("period", "exponent")]
     smooth: bool
     omega: float
     parameters: Mapping[str, float]
     transient: int
     tolerance: float
-    end: Array
+    end: Annotated[Array, On("state")]
     system: System
-    seconds: float = 0.0
 
     @property
     def per_period(self) -> Array:
@@ -148,15 +139,6 @@ class LyapunovExponents(TimeResult):
         return pd.DataFrame({
             "exponent": self.exponents, "standard_error": self.standard_errors, "per_period": self.per_period,
         })  # fmt: skip
-
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """The running averages over the periods, with a band of two standard errors; saved if a path is given.
-
-        Options are those of `pictures.plot_lyapunov`: `count`, `title`, `size`.
-        """
-        from suboctave.pictures.in_time import plot_lyapunov
-
-        return plot_lyapunov(self.to_xarray(), path, **options)
 
     def __repr__(self) -> str:
         values = ", ".join(
@@ -269,9 +251,7 @@ def lyapunov_exponents(
         starts = _starts(flow, first, omega, values, transient, trajectories)
         motions = flow.over(
             starts, omega, transient + periods, values, transient, workers=options.get("workers"), report=report
-        )
-    pass_on(motions.interruption)
-    check_motions(motions)
+        ).checked()
     return _exponents(system, motions, omega, values, transient, 1e-10 if tolerance is None else tolerance)
 
 
@@ -279,7 +259,6 @@ def _exponents(
     system: System, motions: Motions, omega: float, values: Mapping[str, float], transient: int, tolerance: float
 ) -> LyapunovExponents:
     """The exponents from the growth (B, P, m + 1) of m tangent vectors, and of the volume, in every period."""
-    assert motions.growth is not None
     periods, count = motions.growth.shape[1], motions.growth.shape[2] - 1
     rates = motions.growth * (omega / (2.0 * np.pi))
     smooth, mean, error, stretches = averaged(rates)
@@ -343,10 +322,7 @@ def smooth_weights(count: int) -> Array:
 def _starts(flow: Flow, first: Array, omega: float, values: Mapping[str, float], transient: int, count: int) -> Array:
     """States (count, 2n): the end of a transient, and others about it."""
     system = flow.system
-    motions = flow.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True)
-    pass_on(motions.interruption)
-    check_motions(motions)
-    assert motions.peaks is not None
+    motions = flow.over(first, omega, transient + 1, values, skip=max(transient - 1, 0), measure=True).checked()
     sizes = state_sizes(system, motions.peaks[0], omega, values)
     away = np.random.default_rng(0).normal(size=(count, 2 * system.n))
     away[0] = 0.0
@@ -420,23 +396,21 @@ class Separation(TimeResult):
         (S, 2): steps per period or tolerance, and offset.
     time, distance
         (P + 1,) and (S, P + 1): the distance at phase 0 of the load, displacements by omega times their value.
+
+    `plot` draws the distances over time, and their mean rate; options are those of `pictures.plot_separation`: `most`,
+    `title`, `size`.
     """
 
-    layout = Layout(
-        "separation",
-        {"time": ("time",), "rates": ("setting",), "distance": ("setting", "time")},
-        {"omega": float},
-        {"rates": "rate"},
-    )
-    rates: Array
+    contents = "separation"
+    picture = "plot_separation"
+    rates: Annotated[Array, On("setting", name="rate")]
     settings: Array
-    time: Array
-    distance: Array
+    time: Annotated[Array, On("time")]
+    distance: Annotated[Array, On("setting", "time")]
     omega: float
     parameters: Mapping[str, float]
     method: TwoTrajectories
     system: System
-    seconds: float = 0.0
 
     @property
     def exponent(self) -> float:
@@ -467,15 +441,6 @@ class Separation(TimeResult):
 
         setting = "steps_per_period" if self.method.integrator == "newmark" else "tolerance"
         return pd.DataFrame({setting: self.settings[:, 0], "offset": self.settings[:, 1], "exponent": self.rates})
-
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """The distances over time, and their mean rate; saved if a path is given.
-
-        Options are those of `pictures.plot_separation`: `most`, `title`, `size`.
-        """
-        from suboctave.pictures.in_time import plot_separation
-
-        return plot_separation(self.to_xarray(), path, **options)
 
     def __repr__(self) -> str:
         low, high = np.nanpercentile(self.rates, [5, 95]) if np.isfinite(self.rates).any() else (np.nan, np.nan)
@@ -509,10 +474,9 @@ def separate(
             flow = Flow(system, "newmark", steps_per_period=int(setting), tolerance=1e-14, lanes=8)
         else:
             flow = Flow(system, "accurate", tolerance=float(setting), lanes=8)
-        motions = flow.over(starts, omega, how.periods, values, workers=workers)
-        pass_on(motions.interruption)
+        motions = flow.over(starts, omega, how.periods, values, workers=workers).whole()
         if motions.failed.any():
-            check_motions(motions)
+            motions.checked()
         states = np.concatenate([starts[:, None], motions.states], axis=1) * metric
         size = float(np.max(np.linalg.norm(states[0], axis=1)))
         for offset, other in zip(offsets, states[1:], strict=True):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, Unpack, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, Unpack, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
-    Layout,
+    On,
     ParallelOptions,
     TimeResult,
     check_continuous,
@@ -66,27 +66,17 @@ class LyapunovMap(TimeResult):
         False where an interruption (Ctrl-C) left points out.
     """
 
-    layout = Layout(
-        "lyapunov map",
-        {
-            "values": ("value",),
-            "omega": ("omega",),
-            "exponent": ("value", "omega"),
-            "standard_error": ("value", "omega"),
-        },
-        {"name": str, "periods": int, "transient": int, "complete": bool},
-        {"values": "value", "name": "varied"},
-    )
-    name: str
-    omega: Array
-    values: Array
-    exponent: Array
-    standard_error: Array
+    contents = "lyapunov map"
+    picture = "plot_lyapunov_map"
+    name: Annotated[str, On(name="varied")]
+    omega: Annotated[Array, On("omega")]
+    values: Annotated[Array, On("value", name="value")]
+    exponent: Annotated[Array, On("value", "omega")]
+    standard_error: Annotated[Array, On("value", "omega")]
     complete: bool
     periods: int
     transient: int
     system: System
-    seconds: float = 0.0
 
     @property
     def chaotic(self) -> NDArray[np.bool_]:
@@ -112,15 +102,13 @@ class LyapunovMap(TimeResult):
 
         Options are those of `pictures.plot_lyapunov_map`: `title`, `size`.
         """
-        from suboctave.pictures.in_time import plot_lyapunov_map
-
         lines = []
         for curve in [curves] if isinstance(curves, CriticalCurve) else curves:
             if not isinstance(curve, CriticalCurve):
                 raise InputError(f"curves= takes tracked curves of bifurcations, not {type(curve).__name__}")
             period = f"{curve.nu}T" if curve.nu > 1 else "T"
             lines.append((f"{curve.kind} of {period}", curve.omega, curve.parameter(self.name)))
-        return plot_lyapunov_map(self.to_xarray(), path, lines=lines, **options)
+        return super().plot(path, lines=lines, **options)
 
     def __repr__(self) -> str:
         share = float(self.chaotic.mean())
@@ -188,7 +176,6 @@ def lyapunov_map(
             np.repeat(first[None], shape[0] * shape[1], axis=0), np.tile(frequencies, shape[0]), transient + periods,
             varied, transient, workers=options.get("workers"), report=report,
         )  # fmt: skip
-    assert motions.growth is not None
     per_time = frequencies / (2.0 * np.pi)
     mean, error = (part.reshape(shape) * per_time for part in _averaged(motions.growth[:, :, 0]))
     complete = bool(motions.finished.all())

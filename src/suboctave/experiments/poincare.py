@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
-from suboctave.experiments.common import Layout, SectionOptions, TimeResult, checked_integration
+from suboctave.experiments.common import On, SectionOptions, StatesOn, TimeResult, checked_integration
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
@@ -46,30 +46,24 @@ class PoincareSections(TimeResult):
         (B,): False for those that an interruption left out; their points are NaN.
     tolerance
         Relative tolerance of the recognition of periods.
+
+    `plot` draws the points in the plane of displacement and velocity; options are those of `pictures.plot_sections`:
+    `dof`, `title`, `size`.
     """
 
-    layout = Layout(
-        "poincare sections",
-        {
-            "largest": ("trajectory", "section", "dof"),
-            "omega": ("trajectory",),
-            "failed": ("trajectory",),
-            "finished": ("trajectory",),
-        },
-        {"transient": int, "method": str, "tolerance": float, "observed": int},
-    )
-    points: Array
-    largest: Array
-    omega: Array
+    contents = "poincare sections"
+    picture = "plot_sections"
+    points: Annotated[Array, StatesOn("trajectory", "section")]
+    largest: Annotated[Array, On("trajectory", "section", "dof")]
+    omega: Annotated[Array, On("trajectory")]
     varied: Mapping[str, Array]
-    failed: NDArray[np.bool_]
-    finished: NDArray[np.bool_]
+    failed: Annotated[NDArray[np.bool_], On("trajectory")]
+    finished: Annotated[NDArray[np.bool_], On("trajectory")]
     tolerance: float
     transient: int
     method: str
     observed: int
     system: System
-    seconds: float = 0.0
 
     def __len__(self) -> int:
         return len(self.points)
@@ -111,13 +105,10 @@ class PoincareSections(TimeResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Points on (trajectory, section, dof), periods, and what produced them."""
-        n, axes = self.system.n, ("trajectory", "section", "dof")
         columns = [self.varied.get(name, np.full(len(self), v)) for name, v in self.system.parameters.items()]
         parameters = np.array(columns, dtype=float).reshape(-1, len(self)).T
         variables = {
-            "displacement": (axes, self.points[:, :, :n]),
-            "velocity": (axes, self.points[:, :, n:]),
-            "period": (axes[:1], self.periods),
+            "period": (("trajectory",), self.periods),
             "parameters": (("trajectory", "parameter"), parameters),
         }
         return self._dataset(variables, attributes={"varied": "\n".join(self.varied)})
@@ -135,15 +126,6 @@ class PoincareSections(TimeResult):
         columns["section"] = np.tile(np.arange(sections), count)
         columns |= {name: self.points[:, :, i].ravel() for i, name in enumerate(names)}
         return pd.DataFrame(columns | {"period": np.repeat(self.periods, sections)})
-
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """The points in the plane of displacement and velocity; saved if a path is given.
-
-        Options are those of `pictures.plot_sections`: `dof`, `title`, `size`.
-        """
-        from suboctave.pictures.in_time import plot_sections
-
-        return plot_sections(self.to_xarray(), path, **options)
 
     def __repr__(self) -> str:
         count, sections, _ = self.points.shape
@@ -183,7 +165,6 @@ def poincare_sections(
             states, omega, transient + periods, parameters, transient, measure=True, workers=how.workers, report=report
         )
     count = len(motions.states)
-    assert motions.peaks is not None
     sections = PoincareSections(
         points=motions.states,
         largest=motions.peaks,

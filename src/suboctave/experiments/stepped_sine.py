@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,20 +27,20 @@ from suboctave.experiments.common import (
     FEW,
     ComplexArray,
     Integration,
-    Layout,
+    On,
     RecognitionOptions,
     TimeResult,
     checked_integration,
     checked_range,
 )
 from suboctave.experiments.poincare import Attractor, attractor_of
-from suboctave.interruption import Interruption, pass_on
+from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, observed_dof, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
-from suboctave.timedomain.flow import Flow, Motions, check_extent, check_motions
+from suboctave.timedomain.flow import Flow, Motions, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -192,7 +192,6 @@ class _Test:
             motions = _over(flows[1], states, w, self.measure, measured=True)
             states = motions.end.copy()
             for s, v in enumerate(columns):
-                assert motions.peaks is not None
                 x, peaks = motions.states[s], motions.peaks[s]
                 largest = peaks.reshape(self.measure, -1, n).max(axis=1)
                 settled = self._attractor(x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]))
@@ -226,10 +225,7 @@ class _Test:
 def _over(flow: Flow, states: Array, omega: Array, periods: int, measured: bool = False) -> Motions:
     """Follow states; their samples and the largest displacements in between are kept of what is measured."""
     skip = 0 if measured else periods * flow.samples
-    motions = flow.over(states, omega, periods, skip=skip, measure=measured, workers=1)
-    pass_on(motions.interruption)
-    check_motions(motions)
-    return motions
+    return flow.over(states, omega, periods, skip=skip, measure=measured, workers=1).checked()
 
 
 def _loads(system: System, omega: float) -> complex:
@@ -298,40 +294,28 @@ class SteppedSine(TimeResult):
         (S,): at which frequency the tap was given, nan without one.
     complete
         False where an interruption (Ctrl-C) left steps out.
+
+    `plot` draws the fundamentals, over branches (`curves`) and beside data of a rig (`measured`) if any are given;
+    options are those of `pictures.plot_stepped_sine`: `curves`, `measured`, `harmonic`, `dof`, `title`, `size`.
     """
 
-    layout = Layout(
-        "stepped sine",
-        {
-            "directions": ("direction",),
-            "omega": ("omega",),
-            "multiples": ("multiple",),
-            "components": ("direction", "omega", "multiple", "dof"),
-            "response": ("direction", "omega", "dof"),
-            "largest": ("direction", "omega", "dof"),
-            "period": ("direction", "omega"),
-            "ends": ("direction", "omega", "state"),
-            "tapped": ("direction",),
-        },
-        {"settle": int, "measure": int, "noise": float, "observed": int, "complete": bool},
-        {"directions": "direction", "multiples": "multiple", "components": "component"},
-    )
-    omega: Array
-    directions: tuple[str, ...]
-    multiples: Array
-    components: ComplexArray
-    response: ComplexArray
-    largest: Array
-    period: NDArray[np.int_]
-    ends: Array
-    tapped: Array
+    contents = "stepped sine"
+    picture = "plot_stepped_sine"
+    omega: Annotated[Array, On("omega")]
+    directions: Annotated[tuple[str, ...], On("direction", name="direction")]
+    multiples: Annotated[Array, On("multiple", name="multiple")]
+    components: Annotated[ComplexArray, On("direction", "omega", "multiple", "dof", name="component")]
+    response: Annotated[ComplexArray, On("direction", "omega", "dof")]
+    largest: Annotated[Array, On("direction", "omega", "dof")]
+    period: Annotated[NDArray[np.int_], On("direction", "omega")]
+    ends: Annotated[Array, On("direction", "omega", "state")]
+    tapped: Annotated[Array, On("direction")]
     complete: bool
     settle: int
     measure: int
     noise: float
     observed: int
     system: System
-    seconds: float = 0.0
 
     def of(self, direction: str | None = None) -> int:
         """Which row a direction is; without a name that of the only one."""
@@ -374,15 +358,6 @@ class SteppedSine(TimeResult):
         names = ["direction", "omega", "amplitude", "phase_deg"]
         names += [f"harmonic_{k:g}" for k in self.multiples if k != 1.0]
         return pd.DataFrame(rows, columns=[*names, "largest", "period"])
-
-    def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
-        """Draw the measured fundamentals, over branches and beside data of a rig if any are given; saved to a path.
-
-        Options are those of `pictures.plot_stepped_sine`: `harmonic`, `dof`, `title`, `size`.
-        """
-        from suboctave.pictures.in_time import plot_stepped_sine
-
-        return plot_stepped_sine(self.to_xarray(), path, curves=curves, measured=measured, **options)
 
     def __repr__(self) -> str:
         done, settled = int((self.period >= 0).sum()), int((self.period > 0).sum())

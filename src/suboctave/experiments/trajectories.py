@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from suboctave.experiments.common import FEW, Layout, TimeResult, steps_of
-from suboctave.interruption import pass_on
+from suboctave.experiments.common import FEW, On, TimeResult, steps_of
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import reporting
-from suboctave.timedomain.flow import Flow, check_motions
+from suboctave.timedomain.flow import Flow
 
 if TYPE_CHECKING:
     import pandas
@@ -42,23 +41,22 @@ class Trajectory(TimeResult):
         "accurate" or "newmark".
     seconds
         How long it took.
+
+    `plot` draws displacement over time in load periods, stroboscopic instants marked; options are those of
+    `pictures.plot_trajectory`: `dof`, `quantity`, `title`, `size`.
     """
 
-    layout = Layout(
-        "trajectory",
-        {"time": ("time",), "displacement": ("time", "dof"), "velocity": ("time", "dof"), "largest": ("dof",)},
-        {"omega": float, "method": str, "steps_per_period": int},
-    )
-    time: Array
-    displacement: Array
-    velocity: Array
-    largest: Array
+    contents = "trajectory"
+    picture = "plot_trajectory"
+    time: Annotated[Array, On("time")]
+    displacement: Annotated[Array, On("time", "dof")]
+    velocity: Annotated[Array, On("time", "dof")]
+    largest: Annotated[Array, On("dof")]
     omega: float
     parameters: Mapping[str, float]
     steps_per_period: int
     method: str
     system: System
-    seconds: float = 0.0
 
     @property
     def period(self) -> float:
@@ -88,15 +86,6 @@ class Trajectory(TimeResult):
         for kind, values in (("x", self.displacement), ("v", self.velocity)):
             columns |= {f"{kind}_{i}": values[:, i] for i in range(self.system.n)}
         return pd.DataFrame(columns)
-
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """Displacement over time in load periods, stroboscopic instants marked; saved if a path is given.
-
-        Options are those of `pictures.plot_trajectory`: `dof`, `quantity`, `title`, `size`.
-        """
-        from suboctave.pictures.in_time import plot_trajectory
-
-        return plot_trajectory(self.to_xarray(), path, **options)
 
     def __repr__(self) -> str:
         periods = (len(self.time) - 1) / self.steps_per_period
@@ -160,10 +149,7 @@ def integrate(
     with reporting(options.get("progress"), "integrating") as report:
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
-        )
-    pass_on(motions.interruption)
-    check_motions(motions)
-    assert motions.peaks is not None
+        ).checked()
     states, peaks = motions.states[0], motions.peaks[0]
     if transient:  # the last instant of the transient is the first that is given
         peaks = peaks[1:]

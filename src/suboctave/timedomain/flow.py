@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
-from suboctave.interruption import Interruption, check_time
+from suboctave.interruption import Interruption, check_time, pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
@@ -31,7 +31,7 @@ from suboctave.timedomain.layout import Layout
 from suboctave.timedomain.newmark import NewmarkMethod
 from suboctave.timedomain.python_callbacks import PythonCallbacks
 
-__all__ = ["METHODS", "Flow", "Motions", "Report", "check_extent", "check_motions"]
+__all__ = ["METHODS", "Flow", "Motions", "Report", "check_extent"]
 
 METHODS = ("accurate", "newmark")
 Report = Callable[[float, str], None]
@@ -51,7 +51,7 @@ class Motions:
     states
         (B, S, 2n): displacements, then velocities, at the S instants kept.
     peaks
-        (B, S, n): the largest |x_i| since the instant before, between the instants too; None if not asked for.
+        (B, S, n): the largest |x_i| since the instant before, between the instants too; S = 0 if not asked for.
     end
         (B, 2n): the last states.
     failed
@@ -63,7 +63,7 @@ class Motions:
         (B,): whether the trajectory was followed to its end; not all are where it was interrupted.
     growth
         (B, S, k + 1): of a flow with k tangent vectors, the logarithms by which they grew since the instant before,
-        then that by which the volume of states did.
+        then that by which the volume of states did; S = 0 without any.
     tangents
         (B, 2n, k): the tangent vectors at the end, as columns.
     interruption
@@ -71,14 +71,36 @@ class Motions:
     """
 
     states: Array
-    peaks: Array | None
+    peaks: Array
     end: Array
     failed: NDArray[np.bool_]
     unsettled: Array
     finished: NDArray[np.bool_]
-    growth: Array | None = None
-    tangents: Array | None = None
+    growth: Array
+    tangents: Array
     interruption: Interruption | None = None
+
+    def whole(self) -> Motions:
+        """These, if nothing stopped them; else what did so is raised again."""
+        pass_on(self.interruption)
+        return self
+
+    def checked(self) -> Motions:
+        """These, if they are whole and none has failed; else a ConvergenceError with what to change."""
+        self.whole()
+        if self.failed.any():
+            first = int(np.flatnonzero(self.failed)[0])
+            raise ConvergenceError(
+                f"{int(self.failed.sum())} of {len(self.failed)} trajectories (the first is number {first}) left the "
+                "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite "
+                "where it goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
+            )
+        if self.unsettled.any():
+            raise ConvergenceError(
+                f"Newmark's method did not solve {int(self.unsettled.sum())} of its steps: take more steps_per_period "
+                'than now, or method="accurate"'
+            )
+        return self
 
 
 class Flow:
@@ -256,18 +278,17 @@ class _Run:
         self.callbacks = PythonCallbacks(flow.layout.called_back)
         self.batch = replace(batch, address=self.callbacks.address)
         n, count, kept = flow.layout.n, len(batch.states), batch.total - batch.skip
+        tangents = flow.integrator.count
         self.motions = Motions(
             states=np.full((count, kept, 2 * n), np.nan),
-            peaks=np.full((count, kept, n), np.nan) if measure else None,
+            peaks=np.full((count, kept * measure, n), np.nan),
             end=np.full((count, 2 * n), np.nan),
             failed=np.zeros(count, dtype=bool),
             unsettled=np.zeros(count),
             finished=np.zeros(count, dtype=bool),
+            growth=np.full((count, kept * (tangents > 0), tangents + 1), np.nan),
+            tangents=np.full((count, 2 * n, tangents), np.nan),
         )
-        tangents = flow.integrator.count
-        if tangents:
-            growth, vectors = np.full((count, kept, tangents + 1), np.nan), np.full((count, 2 * n, tangents), np.nan)
-            self.motions = replace(self.motions, growth=growth, tangents=vectors)
         lanes = flow.integrator.lanes
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
@@ -380,20 +401,4 @@ def check_extent(trajectories: int, periods: int, numbers: int) -> None:
         raise InputError(
             f"{trajectories} trajectories over {periods} periods are {trajectories * periods:.1e} periods of the load, "
             f"more than can be waited for (at most {_LONGEST:.1e}): take fewer of either"
-        )
-
-
-def check_motions(motions: Motions) -> None:
-    """Refuse motions that failed or whose steps were not solved, with what to change."""
-    if motions.failed.any():
-        first = int(np.flatnonzero(motions.failed)[0])
-        raise ConvergenceError(
-            f"{int(motions.failed.sum())} of {len(motions.failed)} trajectories (the first is number {first}) left the "
-            "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite where "
-            "it goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
-        )
-    if motions.unsettled.any():
-        raise ConvergenceError(
-            f"Newmark's method did not solve {int(motions.unsettled.sum())} of its steps: take more steps_per_period "
-            'than now, or method="accurate"'
         )

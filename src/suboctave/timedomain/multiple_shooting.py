@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
 from suboctave.timedomain.flow import Flow
@@ -197,8 +196,7 @@ class MultipleShooting:
             first.ravel(),
             {name: np.repeat(values, pieces * each) for name, values in parameters.items()},
             self.workers,
-        )
-        pass_on(motions.interruption)
+        ).whole()
         ends = motions.end.reshape(count, pieces, each, m) / sizes[:, None, None, :]
         slopes = (ends[:, :, 0:-1:2] - ends[:, :, 1:-1:2]) / (2.0 * width)
         transition = np.swapaxes(slopes[:, :, :m], 2, 3)

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
-from suboctave.interruption import pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.system import System
 from suboctave.timedomain.flow import Flow
@@ -70,11 +69,9 @@ def traps_about(
     """
     n, size = points.shape
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=size, transition=True)
-    at_points = flow.over(points, omega, n, values, workers=workers)
-    pass_on(at_points.interruption)
+    at_points = flow.over(points, omega, n, values, workers=workers).whole()
     if at_points.failed.any():
         return []
-    assert at_points.tangents is not None
     traps = []
     ball = _unit_ball(size)
     for point, transition in zip(points, at_points.tangents, strict=True):
@@ -106,11 +103,10 @@ def _largest(
 
     def contracts(radius: float) -> bool:
         for some in (ball[:_FIRST], ball[_FIRST:]):
-            motions = flow.over(point + radius * some @ back, omega, periods, values, skip=periods, workers=workers)
-            pass_on(motions.interruption)
+            states = point + radius * some @ back
+            motions = flow.over(states, omega, periods, values, skip=periods, workers=workers).whole()
             if motions.failed.any():
                 return False
-            assert motions.tangents is not None
             derivative = factor @ motions.tangents @ back.T
             if float(np.linalg.norm(derivative, 2, axis=(1, 2)).max()) > _BOUND:
                 return False
