@@ -17,21 +17,18 @@ import functools
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.batch_form import Tangent
 from suboctave.timedomain.adaptive_control import SCALARS, VECTORS
-from suboctave.timedomain.batch import Batch, Group, Method
+from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
 from suboctave.timedomain.law_code import LawCode
 from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
 from suboctave.timedomain.python_callbacks import callback_shapes
 
-__all__ = ["AdaptiveGroup", "AdaptiveMethod", "adaptive_functions"]
+__all__ = ["AdaptiveMethod", "adaptive_functions"]
 
-#: numbers that the rows of a group may fill: what stays in a processor's cache
-_ROOM = 2048
 _FIRST_STEP = 0.01
 #: what an error of a tangent vector counts for, beside one of the motion
 _LOOSER = 1e-3
@@ -92,19 +89,12 @@ class AdaptiveMethod(Method):
     effort = 20
 
     def __init__(
-        self,
-        layout: Layout,
-        samples: int,
-        tolerance: float,
-        lanes: int | None = None,
-        count: int = 0,
-        transition: bool = False,
+        self, layout: Layout, samples: int, tolerance: float, lanes: int | None, count: int, transition: bool
     ) -> None:
-        self.layout, self.samples, self.tolerance = layout, samples, tolerance
-        self.count, self.transition = count, transition
-        self.lanes = lanes or (16 if 16 * adaptive_rows(layout, 1, count).size <= _ROOM else 8)
-        self.function: Any = module_of(*adaptive_functions(layout, self.lanes, count)).adaptive
-        self.rows = adaptive_rows(layout, self.lanes, count)
+        lanes = lanes or (16 if 16 * adaptive_rows(layout, 1, count).size <= ROOM else 8)
+        super().__init__(layout, adaptive_rows(layout, lanes, count), count)
+        self.samples, self.tolerance, self.transition = samples, tolerance, transition
+        self.function: Any = module_of(*adaptive_functions(layout, lanes, count)).adaptive
         self.begins = np.array([self.rows.begin[name] for name in VECTORS], dtype=np.int64)
         size = 2 * layout.n
         generic = np.linalg.qr(np.random.default_rng(0).normal(size=(size, size)))[0]
@@ -115,7 +105,7 @@ class AdaptiveMethod(Method):
         inverse = np.linalg.inv(numbers.mass)
         outputs = inverse @ self.layout.outputs.T
         weight, omega = np.sqrt(np.diagonal(numbers.mass, axis1=1, axis2=2)), numbers.omega[:, None]
-        flat: dict[str, Array] = {
+        rows = {
             "A": -inverse @ numbers.stiffness,
             "B": -inverse @ numbers.damping,
             "L": inverse @ numbers.loads,
@@ -127,60 +117,44 @@ class AdaptiveMethod(Method):
             "metric": np.hstack([omega * weight, weight]),
         }
         if self.count:
-            flat["G"] = self.layout.channels @ outputs
-            flat["trace"] = -np.trace(inverse @ numbers.damping, axis1=1, axis2=2)
-        return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
+            rows["G"] = self.layout.channels @ outputs
+            rows["trace"] = -np.trace(inverse @ numbers.damping, axis1=1, axis2=2)
+        return rows
 
-    def group(self, batch: Batch, members: NDArray[np.int_], alive: int) -> AdaptiveGroup:
-        return AdaptiveGroup(self, batch, members, alive)
-
-
-class AdaptiveGroup(Group):
-    """`lanes` trajectories on their way, of which only the first `alive` move."""
-
-    def __init__(self, method: AdaptiveMethod, batch: Batch, members: NDArray[np.int_], alive: int) -> None:
-        super().__init__(method, batch, members)
-        self.method, rows = method, self.row
-        states, sizes = batch.states[members], batch.sizes[members]
-        rows("y")[:] = states.T
+    def start(self, group: Group, alive: int) -> None:
+        batch, members, rows = group.batch, group.members, group.row
+        rows("y")[:], sizes = batch.states[members].T, batch.sizes[members].T
         weight, period = rows("weight"), rows("period")[0]
-        rows("past")[:] = sizes.T
-        rows("floor")[:] = np.maximum(1e-3 * np.max(sizes.T * weight, axis=0) / weight, 1e-300)
-        rows("h")[:] = rows("next")[:] = np.minimum(_FIRST_STEP, 1.0 / method.samples) * period
+        rows("past")[:] = sizes
+        rows("floor")[:] = np.maximum(1e-3 * np.max(sizes * weight, axis=0) / weight, 1e-300)
+        rows("h")[:] = rows("next")[:] = np.minimum(_FIRST_STEP, 1.0 / self.samples) * period
         rows("left")[:, :alive] = batch.total
         rows("h")[:, alive:] = 0.0
-        rows("plain")[:] = float(method.transition)
+        rows("plain")[:] = float(self.transition)
         # tangent vectors are orthonormal in the metric of the parameters
-        metric = np.ones((states.shape[1], method.lanes)) if method.transition else rows("metric")
-        rows("w")[:] = (method.first.T[:, :, None] / metric).reshape(-1, method.lanes)
-        kept = batch.total - batch.skip if method.count else 0
-        #: what the tangent vectors and the volume grew by, (samples kept, count + 1, lanes)
-        self.growth = np.full((kept, method.count + 1, method.lanes), np.nan)
+        metric = np.ones_like(rows("metric")) if self.transition else rows("metric")
+        rows("w")[:] = (self.first.T[:, :, None] / metric).reshape(-1, self.rows.lanes)
         if batch.first is not None:
             rows("sample")[0] = batch.first[members]
-            rows("t")[0] = batch.first[members] / method.samples * period
+            rows("t")[0] = batch.first[members] / self.samples * period
 
-    def advance(self, effort: int, out: Array, peaks: Array | None) -> bool:
-        """See `Group.advance`; so many steps of each are tried."""
-        method, measured = self.method, np.zeros((0, 0, 0)) if peaks is None else peaks
-        done = method.function(
-            self.z, method.begins, effort, self.fresh, method.samples, self.batch.skip, method.tolerance,
-            self.batch.address, out, measured, peaks is not None, self.growth,
+    def advance(self, group: Group, effort: int) -> bool:
+        """See `Method.advance`; so many steps of each are tried."""
+        batch, begins = group.batch, group.step == 0
+        group.step += effort
+        done = self.function(
+            group.z, self.begins, effort, begins, self.samples, batch.skip, self.tolerance, batch.address,
+            group.states, group.peaks, batch.measure, group.growth,
         )  # fmt: skip
-        self.fresh = False
         return bool(done)
 
-    def left(self) -> float:
-        return float(self.row("left").sum())
+    def left(self, group: Group) -> float:
+        return float(group.row("left").sum())
 
-    def results(self) -> dict[str, Any]:
-        """See `Group.results`; failed are those whose steps became too short, or their numbers too large."""
-        size, count = 2 * self.method.layout.n, self.method.count
-        known = {"end": self.row("y").T, "failed": self.row("failed")[0] > 0.0}
-        if count:
-            known["growth"] = self.growth.transpose(2, 0, 1)
-            known["tangents"] = self.row("w").reshape(count, size, -1).transpose(2, 1, 0)
-        return known
+    def results(self, group: Group) -> dict[str, Array]:
+        """See `Method.results`; failed are those whose steps became too short, or their numbers too large."""
+        tangents = group.row("w").reshape(self.count, 2 * self.layout.n, self.rows.lanes).transpose(2, 1, 0)
+        return {"end": group.row("y").T, "failed": group.row("failed")[0] > 0.0, "tangents": tangents}
 
 
 class _AdaptiveCode(LawCode):

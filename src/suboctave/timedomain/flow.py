@@ -26,7 +26,7 @@ from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.timedomain.adaptive import AdaptiveMethod
-from suboctave.timedomain.batch import Batch, Method
+from suboctave.timedomain.batch import Batch, Group, Method
 from suboctave.timedomain.layout import Layout
 from suboctave.timedomain.newmark import NewmarkMethod
 from suboctave.timedomain.python_callbacks import PythonCallbacks
@@ -197,7 +197,7 @@ class Flow:
         total = periods * self.samples
         skip = min(max(int(skip), 0), total)
         check_extent(len(x), periods, len(x) * (total - skip) * 2 * self.layout.n)
-        return _Run(self, self._batch(x, w, varied, total, skip), measure).go(workers, report)
+        return self._follow(x, w, varied, total, skip, measure).go(workers, report)
 
     def onward(
         self,
@@ -216,21 +216,24 @@ class Flow:
             raise InputError('pieces of a period are followed with method="accurate"')
         x, w, varied = self._broadcast(states, omega, parameters or {})
         at = np.broadcast_to(np.asarray(first) % self.samples, (len(x),)).astype(float)
-        return _Run(self, self._batch(x, w, varied, 1, 0, at), False).go(workers, None)
+        return self._follow(x, w, varied, 1, 0, False, at).go(workers, None)
 
-    def _batch(
+    def _follow(
         self,
         states: Array,
         omega: Array,
         varied: Mapping[str, Array],
         total: int,
         skip: int,
+        measure: bool,
         first: Array | None = None,
-    ) -> Batch:
+    ) -> _Run:
         which = np.arange(len(states)) if len(omega) > 1 else np.zeros(len(states), dtype=int)
         numbers = self.layout.numbers(omega, varied)
-        sizes, address = self.layout.sizes(numbers, states, which), 0
-        return Batch(self.integrator.numbers(numbers), which, states, sizes, total, skip, first, address)
+        rows = {name: value.reshape(numbers.count, -1) for name, value in self.integrator.numbers(numbers).items()}
+        sizes, callbacks = self.layout.sizes(numbers, states, which), PythonCallbacks(self.layout.called_back)
+        batch = Batch(rows, which, states, sizes, total, skip, measure, first, callbacks.address)
+        return _Run(self.integrator, batch, callbacks)
 
     def _broadcast(
         self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
@@ -273,15 +276,18 @@ class Flow:
 class _Run:
     """One batch on its way: groups of trajectories, each followed by one thread in chunks."""
 
-    def __init__(self, flow: Flow, batch: Batch, measure: bool) -> None:
-        self.flow, self.measure = flow, measure
-        self.callbacks = PythonCallbacks(flow.layout.called_back)
-        self.batch = replace(batch, address=self.callbacks.address)
-        n, count, kept = flow.layout.n, len(batch.states), batch.total - batch.skip
-        tangents = flow.integrator.count
+    def __init__(self, method: Method, batch: Batch, callbacks: PythonCallbacks) -> None:
+        self.method, self.batch, self.callbacks = method, batch, callbacks
+        n, count, kept, lanes, tangents = (
+            method.layout.n,
+            len(batch.states),
+            batch.kept,
+            method.rows.lanes,
+            method.count,
+        )
         self.motions = Motions(
             states=np.full((count, kept, 2 * n), np.nan),
-            peaks=np.full((count, kept * measure, n), np.nan),
+            peaks=np.full((count, kept * batch.measure, n), np.nan),
             end=np.full((count, 2 * n), np.nan),
             failed=np.zeros(count, dtype=bool),
             unsettled=np.zeros(count),
@@ -289,7 +295,6 @@ class _Run:
             growth=np.full((count, kept * (tangents > 0), tangents + 1), np.nan),
             tangents=np.full((count, 2 * n, tangents), np.nan),
         )
-        lanes = flow.integrator.lanes
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
         self.stop = threading.Event()
@@ -338,35 +343,27 @@ class _Run:
 
     def _compile(self) -> None:
         """Once, before the threads."""
-        integrator = self.flow.integrator
-        nobody = np.zeros(integrator.lanes, dtype=int)
-        integrator.group(self.batch, nobody, 0).advance(
-            0, np.empty((0, 2 * self.flow.layout.n, integrator.lanes)), None
-        )
+        nobody = np.zeros(self.method.rows.lanes, dtype=int)
+        self.method.advance(Group(self.method, replace(self.batch, skip=self.batch.total), nobody, 0), 0)
 
     def _follow(self, g: int, report: Report | None) -> None:
-        members, integrator, batch = self.groups[g], self.flow.integrator, self.batch
-        lanes, n = integrator.lanes, self.flow.layout.n
+        members, method, batch = self.groups[g], self.method, self.batch
         # what is missing from the last group is made up by its first one, but stands still where it may
-        filled = np.array([members[i] if i < len(members) else members[0] for i in range(lanes)])
-        group = integrator.group(batch, filled, len(members))
-        kept = batch.total - batch.skip
-        out = np.full((kept, 2 * n, lanes), np.nan)
-        peaks = np.full((kept, n, lanes), np.nan) if self.measure else None
-        effort, arrived = integrator.effort, False
+        filled = np.array([members[i] if i < len(members) else members[0] for i in range(method.rows.lanes)])
+        group = Group(method, batch, filled, len(members))
+        effort, arrived = method.effort, False
         while not arrived and not self._stopped():
             started = perf_counter()
-            arrived = group.advance(effort, out, peaks)
+            arrived = method.advance(group, effort)
             effort = _next_chunk(effort, perf_counter() - started)
-            self.done[g] = 1.0 - min(1.0, group.left() / (batch.total * len(members)))
+            self.done[g] = 1.0 - min(1.0, method.left(group) / (batch.total * len(members)))
             self._report(report)
         if not arrived or self.stop.is_set():
             return
-        known = {"states": out.transpose(2, 0, 1), "finished": np.ones(lanes, dtype=bool), **group.results()}
-        if peaks is not None:
-            known["peaks"] = peaks.transpose(2, 0, 1)
-        for name, values in known.items():
+        samples = {name: getattr(group, name).transpose(2, 0, 1) for name in ("states", "peaks", "growth")}
+        for name, values in (samples | method.results(group)).items():
             getattr(self.motions, name)[members.start : members.stop] = values[: len(members)]
+        self.motions.finished[members.start : members.stop] = True
 
     def _stopped(self) -> bool:
         return self.stop.is_set() or self.callbacks.failure is not None

@@ -21,20 +21,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from suboctave.model.elements.base import Array
 from suboctave.model.elements.batch_form import Tangent
-from suboctave.timedomain.batch import Batch, Group, Method
+from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
 from suboctave.timedomain.law_code import LawCode
 from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
 from suboctave.timedomain.python_callbacks import callback_shapes
 
-__all__ = ["NewmarkGroup", "NewmarkMethod", "newmark_function"]
+__all__ = ["NewmarkMethod", "newmark_function"]
 
-#: numbers that the rows of a group may fill: what stays in a processor's cache
-_ROOM = 2048
 _MOST_ITERATIONS = 30
 
 
@@ -57,21 +54,21 @@ def newmark_rows(layout: Layout, lanes: int) -> Rows:
 class NewmarkMethod(Method):
     """The compiled integrator of a layout."""
 
-    def __init__(self, layout: Layout, samples: int, steps: int, tolerance: float, lanes: int | None = None) -> None:
-        self.layout, self.steps, self.tolerance = layout, steps, tolerance
+    def __init__(self, layout: Layout, samples: int, steps: int, tolerance: float, lanes: int | None) -> None:
+        size = newmark_rows(layout, 1).size
+        lanes = lanes or next((lanes for lanes in (32, 16) if lanes * size <= ROOM), 8)
+        super().__init__(layout, newmark_rows(layout, lanes))
+        self.steps, self.tolerance = steps, tolerance
         self.stride, self.effort = steps // samples, steps
-        rows = newmark_rows(layout, 1).size
-        self.lanes = lanes or next((lanes for lanes in (32, 16) if lanes * rows <= _ROOM), 8)
-        self.function: Any = module_of(newmark_function(layout, self.lanes)).newmark
+        self.function: Any = module_of(newmark_function(layout, lanes)).newmark
         self.waves = layout.wave_table(steps)
-        self.rows = newmark_rows(layout, self.lanes)
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
         h = 2.0 * np.pi / (numbers.omega * self.steps)
         h1 = h[:, None, None]
         inverse = np.linalg.inv(4.0 / h1**2 * numbers.mass + 2.0 / h1 * numbers.damping + numbers.stiffness)
         outputs = inverse @ self.layout.outputs.T
-        flat: dict[str, Array] = {
+        return {
             "A": -2.0 * inverse @ numbers.stiffness,
             "B": inverse @ (4.0 / h1 * numbers.mass),
             "L": inverse @ numbers.loads,
@@ -82,38 +79,27 @@ class NewmarkMethod(Method):
             "rate": 2.0 / h,
             "time": 1.0 / numbers.omega,
         }
-        return {name: value.reshape(numbers.count, -1) for name, value in flat.items()}
 
-    def group(self, batch: Batch, members: NDArray[np.int_], alive: int) -> NewmarkGroup:
-        return NewmarkGroup(self, batch, members)
+    def start(self, group: Group, alive: int) -> None:
+        states, n = group.batch.states[group.members].T, self.layout.n
+        group.row("x")[:], group.row("v")[:] = states[:n], states[n:]
 
-
-class NewmarkGroup(Group):
-    """`lanes` trajectories on their way."""
-
-    def __init__(self, method: NewmarkMethod, batch: Batch, members: NDArray[np.int_]) -> None:
-        super().__init__(method, batch, members)
-        self.method, self.step, self.used = method, 0, 0
-        self.end = batch.total * method.stride
-        n = method.layout.n
-        self.row("x")[:], self.row("v")[:] = batch.states[members, :n].T, batch.states[members, n:].T
-
-    def advance(self, effort: int, out: Array, peaks: Array | None) -> bool:
-        method, to = self.method, min(self.step + effort, self.end)
-        measured = np.zeros((0, 0, 0)) if peaks is None else peaks[self.used :]
-        self.used += method.function(
-            self.z, method.waves, self.step, to, method.stride, self.batch.skip * method.stride, peaks is not None,
-            self.fresh, method.tolerance, self.batch.address, out[self.used :], measured,
+    def advance(self, group: Group, effort: int) -> bool:
+        batch, last = group.batch, group.batch.total * self.stride
+        to = min(group.step + effort, last)
+        group.slot += self.function(
+            group.z, self.waves, group.step, to, self.stride, batch.skip * self.stride, batch.measure, group.step == 0,
+            self.tolerance, batch.address, group.states[group.slot :], group.peaks[group.slot :],
         )  # fmt: skip
-        self.fresh, self.step = False, to
-        return to == self.end
+        group.step = to
+        return to == last
 
-    def left(self) -> float:
-        return (self.end - self.step) / self.method.stride * self.method.lanes
+    def left(self, group: Group) -> float:
+        return (group.batch.total - group.step / self.stride) * self.rows.lanes
 
-    def results(self) -> dict[str, Any]:
-        """See `Group.results`; of each the steps whose equations were not solved to the tolerance."""
-        return {"end": np.concatenate([self.row("x"), self.row("v")]).T, "unsettled": self.row("bad")[0]}
+    def results(self, group: Group) -> dict[str, Array]:
+        """See `Method.results`; of each the steps whose equations were not solved to the tolerance."""
+        return {"end": np.concatenate([group.row("x"), group.row("v")]).T, "unsettled": group.row("bad")[0]}
 
 
 def newmark_function(layout: Layout, lanes: int) -> str:
