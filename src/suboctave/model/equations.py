@@ -281,10 +281,10 @@ def _matrix(entries: list[list[Any]]) -> Any:
 
 # ------------------------------------------------------------------------------------------------------------ forces
 class _Forces:
-    """Collects the terms of all equations that are no part of the linear structure.
+    """Collects the terms of all equations that are no part of the linear structure, with their places in each.
 
-    A term that depends on a single combination `d . x` (and its rate) is kept with its place in each equation; the
-    vector of those places says along which direction it acts.
+    A term that depends on a single combination `u = d . x` (and its rate) is a law of u along that direction d. In one
+    that depends on several displacements u stands for the combination that its corners depend on, if that is one.
     """
 
     def __init__(self, names: list[str], parameters: Mapping[str, float]) -> None:
@@ -293,24 +293,31 @@ class _Forces:
         self.x = [symbol(name) for name in names]
         self.v = [symbol(name + PRIME) for name in names]
         self.u, self.rate = symbol("(input)"), symbol("(input)" + PRIME)
-        #: law in u and its rate, direction: in which equations it stands
-        self.along: dict[tuple[Any, tuple[float, ...]], np.ndarray] = {}
-        self.several: list[tuple[int, Any]] = []
+        #: whether other states occur, direction of u (None without), law: the factor in every equation
+        self.laws: dict[tuple[bool, tuple[float, ...] | None, Any], np.ndarray] = {}
 
     def add(self, i: int, term: Any) -> None:
         """A term of the left-hand side of equation i."""
         direction = self._direction(term)
-        if direction is None:
-            self.several.append((i, term))
-            return
-        first = next(j for j, entry in enumerate(direction) if entry)
-        swaps = {self.x[first]: self.u, self.v[first]: self.rate}
-        swaps |= {s[j]: 0 * self.u for s in (self.x, self.v) for j in range(self.n) if j != first}
+        several = direction is None
+        if several:
+            corners = {self._direction(atom.args[0]) for atom in self._corners(term)}
+            direction = corners.pop() if len(corners) == 1 else None
+        swaps: dict[Any, Any] = {}
+        if direction is not None:
+            lead, *others = (j for j, entry in enumerate(direction) if entry)
+            for states, u in ((self.x, self.u), (self.v, self.rate)):
+                kept = {states[j]: states[j] if several else 0 * u for j in others}
+                swaps |= kept | {states[lead]: u - sum((number(direction[j]) * kept[states[j]] for j in others), 0 * u)}
         factor, law = term.xreplace(swaps).as_coeff_Mul()
-        key = (law, tuple(direction))
-        self.along.setdefault(key, np.zeros(self.n))[i] += float(factor)
+        self.laws.setdefault((several, direction, law), np.zeros(self.n))[i] += float(factor)
 
-    def _direction(self, term: Any) -> list[float] | None:
+    def _corners(self, law: Any) -> list[Any]:
+        """Functions with a corner of the state."""
+        states = {self.u, self.rate, *self.x, *self.v}
+        return [atom for atom in law.atoms(*CORNER_FUNCTIONS) if atom.free_symbols & states]
+
+    def _direction(self, term: Any) -> tuple[float, ...] | None:
         """d, its first entry 1, if the term depends on `d . x` and `d . x'` alone."""
         inside = [j for j in range(self.n) if term.free_symbols & {self.x[j], self.v[j]}]
         direction = [0.0] * self.n
@@ -327,36 +334,45 @@ class _Forces:
                 if factor is None or direction[j] not in (0.0, factor):
                     return None
                 direction[j] = factor
-        return direction if all(direction[j] for j in inside) else None
+        return tuple(direction) if all(direction[j] for j in inside) else None
 
     # ----------------------------------------------------------------------------------------------------- elements
     def elements(self, taken: set[str]) -> list[BaseElement]:
         """Everything that was collected; `taken` are names that are in use."""
         made: list[BaseElement] = []
-        smooth: dict[tuple[tuple[float, ...], tuple[float, ...]], Any] = {}
-        for (law, direction), places in self.along.items():
-            if not np.any(places):
-                continue  # terms that cancel
-            acting = tuple(float(place) for place in places)
-            scale = acting[next(j for j, entry in enumerate(direction) if entry)]
-            if scale and np.allclose(places, scale * np.array(direction), rtol=1e-14, atol=0.0):
-                law, acting = law * number(scale), direction
-            stop = self._stop(law, direction) if acting == direction else None
-            if stop is not None:
-                made.append(stop)
-            elif self._has_corner(law):
-                made.append(self._expression(law, direction, acting, taken))
-            else:
-                key = (direction, acting)
-                smooth[key] = smooth.get(key, 0) + law
-        for (direction, acting), law in smooth.items():
-            spring = self._spring(law, direction) if direction == acting else None
-            made.append(spring or self._expression(law, direction, acting, taken))
-        return made + self._coupled(taken)
+        for among_several in (False, True):
+            smooth: dict[tuple[Any, tuple[float, ...]], Any] = {}
+            for (several, direction, law), places in self.laws.items():
+                if several is not among_several or not np.any(places):  # without places: terms that cancel
+                    continue
+                scale = places[np.flatnonzero(places)[0]]
+                acting = tuple((places / scale).tolist())
+                if direction is not None and np.allclose(acting, direction, rtol=1e-14, atol=0.0):
+                    acting = direction
+                law = law * number(scale)
+                if self._corners(law):
+                    made.append(self._element(law, direction, acting, taken))
+                else:
+                    smooth[direction, acting] = smooth.get((direction, acting), 0) + law
+            made += [self._element(law, *where, taken) for where, law in smooth.items() if law != 0]
+        return made
 
-    def _has_corner(self, law: Any) -> bool:
-        states = {self.u, self.rate, *self.x, *self.v}
-        return any(atom.free_symbols & states for atom in law.atoms(*CORNER_FUNCTIONS))
+    def _element(
+        self, law: Any, direction: tuple[float, ...] | None, acting: tuple[float, ...], taken: set[str]
+    ) -> BaseElement:
+        """As if made by hand, where the law is one of u alone that acts along the same direction; else a text."""
+        if direction == acting and not law.free_symbols & {*self.x, *self.v, self.rate, symbol("t"), symbol("omega")}:
+            made = self._stop(law, acting) or self._spring(law, acting)
+            if made is not None:
+                return made
+        inputs: dict[str, Any] = {}
+        if direction is not None:
+            own = self._place(direction)
+            name = self.names[own["dof"]] if isinstance(own.get("dof"), int) else _fresh("u", taken)
+            inputs[name] = next(iter(own.values()))
+            law = law.xreplace({self.u: symbol(name), self.rate: symbol(name + PRIME)})
+        inputs |= {self.names[j]: j for j in range(self.n) if law.free_symbols & {self.x[j], self.v[j]}}
+        return Expression(expression=as_text(law), inputs=inputs, **self._place(acting))
 
     def _stop(self, law: Any, direction: tuple[float, ...]) -> BaseElement | None:
         """`k max(a u + b, 0)`, or the same with a Heaviside function, as an elastic stop."""
@@ -368,27 +384,18 @@ class _Forces:
         if isinstance(atoms[0], Step):
             factor = sympy.cancel(factor / argument)
         slope = argument.diff(self.u)
-        varying = {self.u, self.rate, symbol("t"), symbol("omega")}
-        if (
-            factor.free_symbols & varying
-            or not slope.is_number
-            or slope == 0
-            or argument.free_symbols & (varying - {self.u})
-        ):
+        if self.u in factor.free_symbols or not slope.is_number or slope == 0:
             return None
         stiffness = as_text(factor * slope)
         if coefficient(stiffness).value(self.parameters) < 0.0:  # gets softer there: a spring, but no stop
             return None
         gap = -argument.subs(self.u, 0) / slope
         side = "right" if slope > 0 else "left"
-        place = self._place(direction)
-        return ElasticStop(stiffness=stiffness, gap=as_text(gap), side=side, **place)
+        return ElasticStop(stiffness=stiffness, gap=as_text(gap), side=side, **self._place(direction))
 
     def _spring(self, law: Any, direction: tuple[float, ...]) -> BaseElement | None:
         """A polynomial in the displacement."""
-        if not law.is_polynomial(self.u) or law.free_symbols & {self.rate, symbol("t"), symbol("omega")}:
-            return None
-        if expanded_size(law) > _MOST_TERMS:
+        if not law.is_polynomial(self.u) or expanded_size(law) > _MOST_TERMS:
             return None
         polynomial = sympy.Poly(law, self.u)
         terms = {power: as_text(factor) for (power,), factor in polynomial.terms()}
@@ -399,84 +406,14 @@ class _Forces:
             return CubicSpring(coefficient=terms[3], **place)
         return PolynomialSpring(coefficients=terms, **place)
 
-    def _place(self, direction: tuple[float, ...], name: str = "dof") -> dict[str, Any]:
+    def _place(self, direction: tuple[float, ...]) -> dict[str, Any]:
         """A direction as an index, a pair, or a vector."""
         inside = [(j, entry) for j, entry in enumerate(direction) if entry]
-        if len(inside) == 1 and inside[0][1] == 1.0:
-            return {name: inside[0][0]}
-        if len(inside) == 2 and (inside[0][1], inside[1][1]) == (1.0, -1.0):
-            return {name: (inside[0][0], inside[1][0])}
-        return {"direction": [float(entry) for entry in direction]}
-
-    def _expression(
-        self, law: Any, direction: tuple[float, ...], acting: tuple[float, ...], taken: set[str]
-    ) -> BaseElement:
-        inside = [j for j, entry in enumerate(direction) if entry]
-        name = self.names[inside[0]] if len(inside) == 1 else _fresh("u", taken)
-        law = law.xreplace({self.u: symbol(name), self.rate: symbol(name + PRIME)})
-        read = next(iter(self._place(direction).values()))
-        return Expression(expression=as_text(law), inputs={name: read}, **self._place(acting))
-
-    def _coupled(self, taken: set[str]) -> list[BaseElement]:
-        """Forces that depend on several displacements, along the direction in which each acts."""
-        cores: dict[Any, np.ndarray] = {}
-        for i, term in self.several:
-            factor, core = term.as_coeff_Mul()
-            cores.setdefault(core, np.zeros(self.n))[i] += float(factor)
-        made: list[BaseElement] = []
-        smooth: dict[tuple[float, ...], Any] = {}
-        for core, places in cores.items():
-            if not np.any(places):
-                continue  # terms that cancel
-            scale = places[np.flatnonzero(places)[0]]
-            acting, law = tuple(float(place) for place in places / scale), core * number(scale)
-            if self._has_corner(law):
-                made.append(self._with_corner(acting, law, taken))
-            else:
-                smooth[acting] = smooth.get(acting, 0) + law
-        for acting, law in smooth.items():
-            if law != 0:
-                inputs = {self.names[j]: j for j in self._inside(law)}
-                made.append(Expression(expression=as_text(law), inputs=inputs, **self._place(acting)))
-        return made
-
-    def _inside(self, law: Any) -> list[int]:
-        return [j for j in range(self.n) if law.free_symbols & {self.x[j], self.v[j]}]
-
-    def _with_corner(self, acting: tuple[float, ...], law: Any, taken: set[str]) -> BaseElement:
-        """The displacement that the corner depends on is made the first input, a combination of several if need be."""
-        inside = self._inside(law)
-        forms = {self._form(atom.args[0], inside) for atom in law.atoms(*CORNER_FUNCTIONS)}
-        form = forms.pop()
-        if forms or form is None:
-            plain = {self.names[j]: j for j in inside}
-            return Expression(expression=as_text(law), inputs=plain, **self._place(acting))
-        lead = next(k for k, entry in enumerate(form) if entry)
-        name = _fresh("u", taken)
-        # x_lead = u - sum of the others
-        swaps = {}
-        for mark, states in (("", self.x), (PRIME, self.v)):
-            others = sum((number(form[k]) * states[j] for k, j in enumerate(inside) if k != lead), 0 * self.u)
-            swaps[states[inside[lead]]] = symbol(name + mark) - others
-        changed = law.subs(swaps, simultaneous=True)
-        direction = [0.0] * self.n
-        for k, j in enumerate(inside):
-            direction[j] = form[k]
-        inputs: dict[str, Any] = {name: next(iter(self._place(tuple(direction)).values()))}
-        inputs |= {self.names[j]: j for k, j in enumerate(inside) if k != lead}
-        left = {state.name.rstrip(PRIME) for state in changed.free_symbols}
-        inputs = {n: p for n, p in inputs.items() if n in left or n == name}
-        return Expression(expression=as_text(changed), inputs=inputs, **self._place(acting))
-
-    def _form(self, argument: Any, inside: list[int]) -> tuple[float, ...] | None:
-        """The combination of displacements, or of velocities, on which alone an argument depends, its first entry 1."""
-        slopes, rates = ([argument.diff(states[j]) for j in inside] for states in (self.x, self.v))
-        used = slopes if any(slopes) else rates
-        if (any(rates) and any(slopes)) or not any(used) or not all(slope.is_number for slope in used):
-            return None
-        first = next(slope for slope in used if slope)
-        ratios = tuple(ratio for slope in used if (ratio := _real(slope / first)) is not None)
-        return ratios if len(ratios) == len(used) else None
+        if [entry for _, entry in inside] == [1.0]:
+            return {"dof": inside[0][0]}
+        if [entry for _, entry in inside] == [1.0, -1.0]:
+            return {"dof": (inside[0][0], inside[1][0])}
+        return {"direction": list(direction)}
 
 
 def _fresh(name: str, taken: set[str]) -> str:

@@ -39,7 +39,6 @@ class MatrixCoefficient:
         self.sparse = not isinstance(base, np.ndarray)
         self.names: frozenset[str] = frozenset().union(*(c.names for c, _ in self._terms))
         self._derivatives: dict[str, MatrixCoefficient | None] = {}
-        self._dense = None if self.sparse else (base, [pattern for _, pattern in self._terms])
 
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
@@ -48,11 +47,10 @@ class MatrixCoefficient:
 
     def value(self, values: Mapping[str, float]) -> Array:
         """The matrix (n, n) at these values of the parameters, as a dense array of its own."""
-        if self._dense is None:
+        if self.sparse:
             return np.asarray(self.sparse_value(values).toarray(), dtype=float)
-        base, patterns = self._dense
-        result = base.copy()
-        for (c, _), pattern in zip(self._terms, patterns, strict=True):
+        result: Array = self._base.copy()
+        for c, pattern in self._terms:
             result += c.value(values) * pattern
         return result
 
@@ -143,19 +141,18 @@ def _constant(source: Any, what: str) -> Any:
 
 
 def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
-    if isinstance(source, str | Coefficient) or np.ndim(_object_array(source, what)) == 0:
-        if n is not None and n > 1:
-            if not isinstance(source, str | Coefficient) and source == 0:
-                return MatrixCoefficient(_constant(np.zeros((n, n)), what), (), what)
+    array = _object_array(source, what)
+    if array.ndim == 0 and (n or 1) > 1:
+        if array.item() != 0:
             raise InputError(
                 f"{what} is a single value ({source}), but the mass has {n} degrees of freedom; give a matrix {n} x {n}"
             )
-        source = [[source]]
-    array = _object_array(source, what)
-    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
-        raise InputError(f"{what} must be square, not of shape {array.shape}")
+        array = np.zeros((n or 1, n or 1))
+    array = array.reshape(1, 1) if array.ndim == 0 else array
     if array.dtype != object:
         return MatrixCoefficient(_constant(array, what), (), what)
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
+        raise InputError(f"{what} must be square, not of shape {array.shape}")
     base = np.zeros(array.shape)
     patterns: dict[Coefficient, Array] = {}
     for (i, j), entry in np.ndenumerate(array):
@@ -171,17 +168,15 @@ def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
 
 
 def _object_array(source: Any, what: str) -> Any:
+    """Entries that may be numbers and expressions; an array of numbers as it is."""
     if isinstance(source, np.ndarray):
-        if source.dtype.kind in "fiu":  # numbers only: no need to look at every entry
-            return source
-        if source.dtype.kind not in "OU":
+        if source.dtype.kind not in "OUfiu":
             raise InputError(f"{what} must hold numbers or expressions, not {source.dtype}")
-        return source.astype(object)
-    if not isinstance(source, Sequence) or isinstance(source, str):
-        return np.array(source, dtype=object)
-    lengths = {len(row) for row in source if isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)}
-    if len(lengths) > 1:
-        raise InputError(f"{what} has rows of different lengths: {sorted(lengths)}")
+        return source.astype(object) if source.dtype.kind in "OU" else source
+    if isinstance(source, Sequence) and not isinstance(source, str):
+        lengths = {len(row) for row in source if isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)}
+        if len(lengths) > 1:
+            raise InputError(f"{what} has rows of different lengths: {sorted(lengths)}")
     return np.array(source, dtype=object)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -139,43 +138,36 @@ def _places(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | 
     return _Places(q, 0.37 + 0.9 * np.arange(q.shape[1], dtype=float), steps, by_c)
 
 
+#: laws of an element with one input, and of a coupled one: method and what it gives
+_ONE_INPUT = {
+    "tangent": "f f_u f_v",
+    "curvature": "f_uu f_uv f_vv",
+    "third": "f_uuu f_uuv f_uvv f_vvv",
+    "coefficient_tangent": "f_c f_uc f_vc",
+    "coefficient_curvature": "f_cc",
+}
+_COUPLED = dict(zip(_ONE_INPUT, ("f f_q", "f_qq", "f_qqq", "f_c f_qc", "f_cc"), strict=True))
+
+
 def _wrong_shapes(element: BaseElement, at: _Places, c: Array) -> list[str]:
     """What is wrong with derivatives beyond numbers."""
-    n, nc, size = at.q.shape[1], len(c), len(at.q)
-    expected: list[tuple[str, Any, tuple[int, ...], bool]]
-    if isinstance(element, Element):
-        u, v = at.q
-        moving = element.depends_on_velocity
-        groups = (
-            ("f f_u f_v", element.tangent(u, v, c), (n,)),
-            ("f_uu f_uv f_vv", element.curvature(u, v, c), (n,)),
-            ("f_uuu f_uuv f_uvv f_vvv", element.third(u, v, c), (n,)),
-            ("f_c f_uc f_vc", element.coefficient_tangent(u, v, c), (nc, n)),
-            ("f_cc", (element.coefficient_curvature(u, v, c),), (nc, nc, n)),
-        )
-        expected = [
-            (name, value, shape, moving or "v" not in name)
-            for names, values, shape in groups
-            for name, value in zip(names.split(), values, strict=True)
-        ]
-    else:
-        law, q, theta = as_coupled(element), at.q, at.theta
-        values = (
-            *law.tangent(q, theta, c), law.curvature(q, theta, c), law.third(q, theta, c),
-            *law.coefficient_tangent(q, theta, c), law.coefficient_curvature(q, theta, c),
-        )  # fmt: skip
-        names = ("f", "f_q", "f_qq", "f_qqq", "f_c", "f_qc", "f_cc")
-        shapes = ((), (size,), (size, size), (size, size, size), (nc,), (nc, size), (nc, nc))
-        expected = [(a, b, (*shape, n), True) for a, b, shape in zip(names, values, shapes, strict=True)]
+    one_input = isinstance(element, Element)
+    state = at.q if one_input else (at.q, at.theta)
     messages = []
-    for name, value, shape, there in expected:
-        if (value is not None) != there:
-            state = "missing" if there else "not None"
-            messages.append(f"{name} is {state} although depends_on_velocity is {element.depends_on_velocity}")
-        elif there and np.shape(value) != shape:
-            messages.append(f"{name} has shape {np.shape(value)} instead of {shape}")
-        elif there and not np.all(np.isfinite(value)):
-            messages.append(f"{name} is not finite everywhere")
+    for method, names in (_ONE_INPUT if one_input else _COUPLED).items():
+        values = getattr(element, method)(*state, c)
+        for name, value in zip(names.split(), values if " " in names else [values], strict=True):
+            shape = (len(c),) * name.count("c") + (len(at.q),) * name.count("q") + at.theta.shape
+            there = element.depends_on_velocity or "v" not in name
+            if (value is not None) != there:
+                state_of_it = "missing" if there else "not None"
+                messages.append(
+                    f"{name} is {state_of_it} although depends_on_velocity is {element.depends_on_velocity}"
+                )
+            elif there and np.shape(value) != shape:
+                messages.append(f"{name} has shape {np.shape(value)} instead of {shape}")
+            elif there and not np.all(np.isfinite(value)):
+                messages.append(f"{name} is not finite everywhere")
     return messages
 
 

@@ -261,22 +261,12 @@ class ElasticStop(_Stops):
 
 
 class _Play(_Stops):
-    """No force within a play, a spring on either side of it; `given` are the widths that say where it ends."""
+    """No force within a play, a spring on either side of it."""
 
     sides = (-1, 1)
 
-    def __init__(
-        self,
-        dof: Dof | None,
-        stiffness: Any,
-        left: str,
-        right: str,
-        regularization: Any,
-        direction: ArrayLike | None,
-        given: dict[str, Coefficient],
-    ) -> None:
-        super().__init__(dof, stiffness, {"left": left, "right": right}, regularization, direction)
-        what, width = next(iter(given.items()))
+    def _check_width(self, what: str, width: Coefficient) -> None:
+        """Refuse a negative width that says where the play ends."""
         if width.constant and width.value({}) < 0.0:
             raise InputError(f"{self.label}: {what} must not be negative, not {width.value({}):g}")
 
@@ -306,7 +296,9 @@ class Freeplay(_Play):
     ) -> None:
         required("Freeplay", stiffness=stiffness, gap=gap)
         read = named_coefficient(gap, "Freeplay", "gap")
-        super().__init__(dof, stiffness, f"-({read.text})", read.text, regularization, direction, {"gap": read})
+        ends = {"left": f"-({read.text})", "right": read.text}
+        super().__init__(dof, stiffness, ends, regularization, direction)
+        self._check_width("gap", read)
 
 
 class Clearance(_Play):
@@ -331,6 +323,6 @@ class Clearance(_Play):
         required("Clearance", stiffness=stiffness, clearance=clearance)
         width = named_coefficient(clearance, "Clearance", "clearance")
         centre = named_coefficient(offset, "Clearance", "offset")
-        left, right = (f"({centre.text}) {sign} ({width.text})/2" for sign in "-+")
-        given = {"clearance": width, "offset": centre}
-        super().__init__(dof, stiffness, left, right, regularization, direction, given)
+        ends = {name: f"({centre.text}) {sign} ({width.text})/2" for name, sign in (("left", "-"), ("right", "+"))}
+        super().__init__(dof, stiffness, ends, regularization, direction)
+        self._check_width("clearance", width)
