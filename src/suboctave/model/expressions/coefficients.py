@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from suboctave.errors import InputError, suggest
-from suboctave.model.expressions.reader import FUNCTIONS, Evaluate, read
+from suboctave.model.expressions.reader import CORNERS, FUNCTIONS, Form, number_form, read
 
 
 class Coefficient:
@@ -21,33 +21,16 @@ class Coefficient:
     `text` is what the user wrote, `names` the names that occur in it, `constant` whether there are none.
     """
 
-    __slots__ = ("_affine", "_derivatives", "_evaluate", "_symbolic", "by", "names", "text")
+    __slots__ = ("_derivatives", "_evaluate", "_form", "by", "constant", "names", "text")
 
-    text: str
-    names: frozenset[str]
-    by: tuple[str, ...]
-
-    def __init__(
-        self,
-        text: str,
-        names: frozenset[str],
-        evaluate: Evaluate,
-        affine: Mapping[str, float] | None = None,
-        symbolic: Callable[[], Any] | None = None,
-        by: tuple[str, ...] = (),
-    ) -> None:
+    def __init__(self, text: str, form: Form, by: tuple[str, ...] = ()) -> None:
         self.text = text
-        self.names = names
         self.by = by
-        self._evaluate = evaluate
-        self._affine = affine
-        self._symbolic = symbolic
+        self.names = form.names
+        self.constant = not form.names
+        self._form = form
+        self._evaluate = form.evaluate
         self._derivatives: dict[str, Coefficient] = {}
-
-    @property
-    def constant(self) -> bool:
-        """Whether no name occurs in it."""
-        return not self.names
 
     def value(self, values: Mapping[str, float]) -> float:
         """The number at these values of the parameters; an `InputError` where it has none."""
@@ -72,16 +55,12 @@ class Coefficient:
         return self._derivatives[name]
 
     def _differentiate(self, name: str) -> Coefficient:
-        if self._affine is not None:
-            return _number(self._affine[name])
-        from suboctave.model.expressions.derivatives import scalar_function, symbol
+        if self._form.affine is not None:
+            return coefficient(self._form.affine[name])
+        from suboctave.model.expressions.derivatives import derivative_text
 
-        assert self._symbolic is not None
-        expression = self._symbolic().diff(symbol(name))
-        evaluate, names = scalar_function(expression)
-        if not names:
-            return _number(evaluate({}))
-        return Coefficient(self.text, names, evaluate, symbolic=lambda: expression, by=(*self.by, name))
+        form = read(derivative_text(self._form, name), str(self), FUNCTIONS | CORNERS, slack=2)
+        return Coefficient(self.text, form, (*self.by, name)) if form.constant is None else coefficient(form.constant)
 
     def __str__(self) -> str:
         if self.by:
@@ -116,7 +95,8 @@ def coefficient(source: Any) -> Coefficient:
     if isinstance(source, Coefficient):
         return source
     if isinstance(source, str):
-        return _from_text(source)
+        refused = {"t": "time cannot occur in a coefficient; periodic forces are loads"}
+        return Coefficient(source, read(source, "", FUNCTIONS, refused.get))
     if not isinstance(source, bool) and isinstance(source, numbers.Real):
         try:
             number = float(source)
@@ -124,7 +104,7 @@ def coefficient(source: Any) -> Coefficient:
             number = math.inf
         if not math.isfinite(number):
             raise InputError(f"a coefficient must be finite, not {number}")
-        return _number(number)
+        return Coefficient(repr(number), number_form(number))
     raise InputError(
         f"a coefficient is a number or an expression in the parameters as text, not {source!r} "
         f"({type(source).__name__})"
@@ -139,22 +119,4 @@ def named_coefficient(source: Any, owner: str, name: str) -> Coefficient:
         raise InputError(f"{owner}, {name}: {error}", (name,)) from None
 
 
-def _number(number: float, text: str = "") -> Coefficient:
-    return Coefficient(text or repr(number), frozenset(), lambda _: number, {})
-
-
-ZERO = _number(0.0)
-
-
-def _from_text(text: str) -> Coefficient:
-    refused = {"t": "time cannot occur in a coefficient; periodic forces are loads"}
-    form = read(text, "", FUNCTIONS, refused.get)
-    if form.constant is not None:
-        return _number(form.constant, text)
-
-    def symbolic() -> Any:
-        from suboctave.model.expressions.derivatives import expression_of
-
-        return expression_of(form)
-
-    return Coefficient(text, form.names, form.evaluate, form.affine, symbolic)
+ZERO = coefficient(0.0)

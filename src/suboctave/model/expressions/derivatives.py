@@ -1,15 +1,13 @@
-"""Expressions as SymPy's, which differentiates them. Imported when the first of them is.
+"""Expressions as SymPy's, which differentiates them, and again as code and text. Imported when the first is needed.
 
 Expressions are built from forms that the reader has accepted: no text is handed to SymPy's parser. `abs`, `sign`,
 `heaviside`, and `max(a, b) = b + ramp(a - b)` become functions of our own whose derivatives are those on either side of
 the corner (the regular parts); whether a force is continuous there is checked elsewhere (`law`). SymPy's own `Abs`
 allows for complex arguments, which makes `abs(log(a))` a derivative of real and imaginary parts.
 
-SymPy expressions as code and as text. Imported when the first of them is needed.
-
 One printer writes Python code with NumPy's names for functions. What the names stand for decides what the code works
-on: arrays (`array_function`), numbers (`scalar_function`), or whatever a generated kernel imports under them
-(`lines_of_code`). Code runs with symbols of our own; no user's text enters it.
+on: arrays (`array_function`), or whatever a generated kernel imports under them (`lines_of_code`). Code runs with
+symbols of our own; no user's text enters it. The other writes texts that the reader turns into the same expression.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.str import StrPrinter
 
 from suboctave.errors import InputError, suggest
-from suboctave.model.expressions.reader import CORNERS, FUNCTIONS, PRIME, Evaluate, Form, read
+from suboctave.model.expressions.reader import CORNERS, FUNCTIONS, PRIME, Form, read
 
 _LARGEST_INTEGER = 10**12
 
@@ -175,10 +173,6 @@ _NUMPY = (
     "sqrt", "exp", "log", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "absolute", "sign",
     "maximum",
 )  # fmt: skip
-_SCALAR = {
-    **FUNCTIONS, "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan, "absolute": math.fabs,
-    "sign": CORNERS["sign"], "maximum": max,
-}  # fmt: skip
 #: powers up to this one are products
 _PRODUCTS = 4
 
@@ -260,18 +254,15 @@ def lines_of_code(parts: Sequence[Any], names: Mapping[str, str], prefix: str) -
     return lines, [printer.doprint(part) for part in reduced]
 
 
-def _function(arguments: Sequence[Any], parts: Sequence[Any], space: Mapping[str, Any]) -> Callable[..., Any]:
-    """The function of these symbols whose values are those of the parts."""
-    printer = _Code()
-    function: Callable[..., Any] = sympy.lambdify(
-        arguments, parts, modules=[dict(space)], printer=printer, dummify=True, cse=True
-    )
-    return function
+def derivative_text(form: Form, name: str) -> str:
+    """The derivative of a form by a name, as a text."""
+    return as_text(expression_of(form).diff(symbol(name)).replace(sympy.Abs, Modulus))
 
 
 def array_function(parts: Sequence[Any], q: Sequence[Any], theta: Any, c: Sequence[Any]) -> Callable[..., Any]:
     """A function `(q, theta, c) -> (len(parts), N)` of arrays (Q, N), (N,), (nc,)."""
-    law = _function([*q, theta, *c], parts, {name: getattr(np, name) for name in _NUMPY})
+    functions = {name: getattr(np, name) for name in _NUMPY}
+    law = sympy.lambdify([*q, theta, *c], parts, modules=[functions], printer=_Code(), dummify=True, cse=True)
 
     def rows(q: Any, theta: Any, c: Any) -> Any:
         out = np.empty((len(parts), theta.shape[0]))
@@ -281,16 +272,3 @@ def array_function(parts: Sequence[Any], q: Sequence[Any], theta: Any, c: Sequen
         return out
 
     return rows
-
-
-def scalar_function(expression: Any) -> tuple[Evaluate, frozenset[str]]:
-    """An expression as a function of the values of its names, and these."""
-    symbols = sorted(expression.free_symbols, key=str)
-    names = [one.name for one in symbols]
-    law = _function(symbols, [expression.replace(sympy.Abs, Modulus)], _SCALAR)
-
-    def value(values: Mapping[str, float]) -> float:
-        result = law(*[values[name] for name in names])[0]
-        return result if isinstance(result, float) else math.nan  # a root of a negative number is complex
-
-    return value, frozenset(names)

@@ -82,21 +82,31 @@ class Form:
         affine: dict[str, float] | None = None,
         power: float = 0.0,
         size: float = 1.0,
+        constant: float | None = None,
     ) -> None:
         self.operation, self.parts, self.evaluate, self.names = operation, parts, evaluate, names
-        self.affine, self.power, self.size = affine, power, size
-        self.constant: float | None = None
+        self.affine, self.power, self.size, self.constant = affine, power, size, constant
+
+
+def number_form(value: float, operation: str = "number", parts: tuple[Any, ...] = ()) -> Form:
+    """The form of a number, and of an operation whose value is known."""
+    return Form(operation, parts or (value,), lambda _: value, affine={}, constant=value)
 
 
 def read(
-    text: str, where: str, functions: Mapping[str, Callable[..., float]], refusal: Callable[[str], str | None]
+    text: str,
+    where: str,
+    functions: Mapping[str, Callable[..., float]],
+    refusal: Callable[[str], str | None] = lambda name: None,
+    slack: int = 1,
 ) -> Form:
     """The form of a text in which these functions may occur, and names about which `refusal` has nothing to say.
 
     InputError begins with `where`, if it is given, and tells the column and the part of the text that is not allowed.
+    `slack`: how many times longer and more deeply nested than those of users it may be.
     """
     start = f"{where}: " if where else ""
-    if len(text) > LONGEST:
+    if len(text) > slack * LONGEST:
         raise InputError(f"{start}an expression of {len(text)} characters is too long (at most {LONGEST})")
     source = text.strip()
     begin = len(text) - len(text.lstrip())
@@ -111,7 +121,8 @@ def read(
         column = getattr(error, "offset", None)
         at = f" at column {begin + column}" if column else ""
         raise InputError(f"{start}{at}: {getattr(error, 'msg', error)}") from None
-    return _Reader(source, begin, where or f"in the expression {_shortened(text)}", functions, refusal).read(tree, 0)
+    where = where or f"in the expression {_shortened(text)}"
+    return _Reader(source, begin, where, functions, refusal).read(tree, _DEEPEST * (1 - slack))
 
 
 #: what a prime is written as while Python parses the text: a letter of the same length
@@ -176,9 +187,7 @@ class _Reader:
             value = math.nan
         if not math.isfinite(value):
             raise self.refuse(node, "a part without parameters is not a finite real number")
-        form = Form(operation, parts, lambda _: value, affine={})
-        form.constant = value
-        return form
+        return number_form(value, operation, parts)
 
     def name(self, node: ast.AST, name: str) -> Form:
         if name == "pi":
