@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from suboctave.errors import InputError, suggest
-from suboctave.model.expressions.reader import CORNERS, FUNCTIONS, Form, number_form, read
+from suboctave.model.expressions.reader import FUNCTIONS, Form, number_form, read
 
 
 class Coefficient:
@@ -57,10 +57,10 @@ class Coefficient:
     def _differentiate(self, name: str) -> Coefficient:
         if self._form.affine is not None:
             return coefficient(self._form.affine[name])
-        from suboctave.model.expressions.derivatives import derivative_text
+        from suboctave.model.expressions.derivatives import derivative_form
 
-        form = read(derivative_text(self._form, name), str(self), FUNCTIONS | CORNERS, slack=2)
-        return Coefficient(self.text, form, (*self.by, name)) if form.constant is None else coefficient(form.constant)
+        form = derivative_form(self._form, name)
+        return Coefficient(self.text, form, (*self.by, name)) if form.names else coefficient(form.evaluate({}))
 
     def __str__(self) -> str:
         if self.by:

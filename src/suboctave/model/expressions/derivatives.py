@@ -7,7 +7,8 @@ allows for complex arguments, which makes `abs(log(a))` a derivative of real and
 
 One printer writes Python code with NumPy's names for functions. What the names stand for decides what the code works
 on: arrays (`array_function`), or whatever a generated kernel imports under them (`lines_of_code`). Code runs with
-symbols of our own; no user's text enters it. The other writes texts that the reader turns into the same expression.
+symbols of our own; no user's text enters it. The other writes texts that the reader turns into the same expression, and
+that are code of numbers (`derivative_form`).
 """
 
 from __future__ import annotations
@@ -114,6 +115,8 @@ def _converted(form: Form) -> Any:
         return symbol(form.parts[0])
     if form.operation == "pi":
         return sympy.pi
+    if form.operation == "expression":
+        return form.parts[0]
     if form.constant is not None and form.operation not in ("negative", "+", "-", "*", "/"):
         return number(form.constant)
     match form.operation, [_converted(part) for part in form.parts]:
@@ -173,6 +176,7 @@ _NUMPY = (
     "sqrt", "exp", "log", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "absolute", "sign",
     "maximum",
 )  # fmt: skip
+_SCALAR = {"pi": math.pi, **FUNCTIONS, **CORNERS}
 #: powers up to this one are products
 _PRODUCTS = 4
 
@@ -254,9 +258,18 @@ def lines_of_code(parts: Sequence[Any], names: Mapping[str, str], prefix: str) -
     return lines, [printer.doprint(part) for part in reduced]
 
 
-def derivative_text(form: Form, name: str) -> str:
-    """The derivative of a form by a name, as a text."""
-    return as_text(expression_of(form).diff(symbol(name)).replace(sympy.Abs, Modulus))
+def derivative_form(form: Form, name: str) -> Form:
+    """The derivative of a form by a name."""
+    expression = expression_of(form).diff(symbol(name)).replace(sympy.Abs, Modulus)
+    symbols = sorted(expression.free_symbols, key=str)
+    names = [one.name for one in symbols]
+    law = sympy.lambdify(symbols, expression, modules=[_SCALAR], printer=_Text(), dummify=True, cse=True)
+
+    def evaluate(values: Mapping[str, float]) -> float:
+        result = law(*[values[one] for one in names])
+        return math.nan if isinstance(result, complex) else float(result)  # a root of a negative number is complex
+
+    return Form("expression", (expression,), evaluate, frozenset(names))
 
 
 def array_function(parts: Sequence[Any], q: Sequence[Any], theta: Any, c: Sequence[Any]) -> Callable[..., Any]:

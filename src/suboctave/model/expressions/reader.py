@@ -61,8 +61,8 @@ class Form:
     Attributes
     ----------
     operation, parts
-        One of `+ - * / **`, "negative" or the name of a function, with forms; or "number", "name", "pi" with the
-        number, the name, nothing.
+        One of `+ - * / **`, "negative" or the name of a function, with forms; or "number", "name", "pi", "expression"
+        with the number, the name, nothing, an expression of SymPy.
     evaluate, names, constant
         Its value at values of the names; these; its number, if no name occurs.
     affine
@@ -94,19 +94,14 @@ def number_form(value: float, operation: str = "number", parts: tuple[Any, ...] 
 
 
 def read(
-    text: str,
-    where: str,
-    functions: Mapping[str, Callable[..., float]],
-    refusal: Callable[[str], str | None] = lambda name: None,
-    slack: int = 1,
+    text: str, where: str, functions: Mapping[str, Callable[..., float]], refusal: Callable[[str], str | None]
 ) -> Form:
     """The form of a text in which these functions may occur, and names about which `refusal` has nothing to say.
 
     InputError begins with `where`, if it is given, and tells the column and the part of the text that is not allowed.
-    `slack`: how many times longer and more deeply nested than those of users it may be.
     """
     start = f"{where}: " if where else ""
-    if len(text) > slack * LONGEST:
+    if len(text) > LONGEST:
         raise InputError(f"{start}an expression of {len(text)} characters is too long (at most {LONGEST})")
     source = text.strip()
     begin = len(text) - len(text.lstrip())
@@ -122,7 +117,7 @@ def read(
         at = f" at column {begin + column}" if column else ""
         raise InputError(f"{start}{at}: {getattr(error, 'msg', error)}") from None
     where = where or f"in the expression {_shortened(text)}"
-    return _Reader(source, begin, where, functions, refusal).read(tree, _DEEPEST * (1 - slack))
+    return _Reader(source, begin, where, functions, refusal).read(tree, 0)
 
 
 #: what a prime is written as while Python parses the text: a letter of the same length
