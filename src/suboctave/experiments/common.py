@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.errors import InputError, is_number, shortened, suggest
-from suboctave.model.elements.base import Array
+from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.elements.coupled import as_coupled
-from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, numbers_of, observed_dof
+from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
 from suboctave.store.plain import flat

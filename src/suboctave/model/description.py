@@ -17,6 +17,7 @@ import importlib
 import inspect
 import math
 import numbers
+import pkgutil
 from collections.abc import Mapping, MutableMapping
 from typing import Any, ClassVar
 
@@ -247,11 +248,10 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
 
 def _place_of(function: Any) -> str:
     module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", None)
-    there: Any = None
-    if module and name and "<" not in name:
-        there = importlib.import_module(module)
-        for part in name.split("."):
-            there = getattr(there, part, None)
+    try:
+        there = pkgutil.resolve_name(f"{module}:{name}")
+    except (AttributeError, ImportError, ValueError):
+        there = None
     if there is not function:
         raise InputError(f"cannot be written down: {function!r} is no function at the top of a module")
     return f"{module}:{name}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, chosen_dof, is_number, shortened, suggest
 from suboctave.interruption import time_limit
-from suboctave.model.elements.base import Array
+from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.system import System
 
 #: the largest count of anything
@@ -144,14 +144,6 @@ def start_state(system: System, state: Any) -> Array:
     if array.shape != (2 * system.n,) or not np.isfinite(array).all():
         raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
     return array
-
-
-def numbers_of(given: Any) -> Array:
-    """What was given as an array of floats; an empty one for what is none."""
-    try:
-        return np.array(given, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        return np.zeros(0)
 
 
 def check_range(name: str, bounds: Any, positive: bool = False) -> tuple[float, float]:

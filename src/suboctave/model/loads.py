@@ -55,11 +55,12 @@ class Load(Recorded, ABC, family="load"):
     """
 
     coefficient_names: tuple[str, ...] = ()
+    place: Place | None = None
 
     @property
     def label(self) -> str:
         """How messages name this load."""
-        return type(self).__name__
+        return type(self).__name__ + (f"({self.place})" if self.place is not None else "")
 
     @property
     def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
@@ -102,6 +103,8 @@ class HarmonicLoad(Load):
     `static` is a constant force. Amplitudes and phases may contain `omega` (unbalance: `"m*e*omega**2"`).
     """
 
+    place: Place
+
     def __init__(
         self,
         dof: Dof | None = None,
@@ -126,10 +129,6 @@ class HarmonicLoad(Load):
         self.harmonics = tuple(self._read_harmonic(given) for given in harmonics)
         self.phases = tuple(named_coefficient(given, self.label, "phase") for given in phases)
         self.static = named_coefficient(static, self.label, "static")
-
-    @property
-    def label(self) -> str:
-        return f"HarmonicLoad({self.place})"
 
     @property
     def coefficients(self) -> tuple[tuple[str, Coefficient], ...]:
@@ -163,6 +162,7 @@ class StaticLoad(Load):
     """A constant force on the right-hand side, at `dof` (an index, or a pair) or along `direction`."""
 
     coefficient_names = ("force",)
+    place: Place
     force: Coefficient
 
     def __init__(
@@ -170,10 +170,6 @@ class StaticLoad(Load):
     ) -> None:
         self.place = Place("StaticLoad", dof, direction)
         self._take(force=force)
-
-    @property
-    def label(self) -> str:
-        return f"StaticLoad({self.place})"
 
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
         return (LoadComponent(self.place.direction(n), 0, self.force, ZERO),)
@@ -204,13 +200,9 @@ class RotatingUnbalance(Load):
             places.append(Place("RotatingUnbalance, perpendicular", perpendicular, None))
         if any(len(place.dofs) != 1 for place in places) or len({place.dofs for place in places}) < len(places):
             raise InputError("RotatingUnbalance: dof and perpendicular must be two different DOFs, one index each")
-        self.places = tuple(places)
+        self.place, self.places = places[0], tuple(places)
         self._take(mass_eccentricity=mass_eccentricity, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
-
-    @property
-    def label(self) -> str:
-        return f"RotatingUnbalance({self.places[0]})"
 
     def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
         amplitude = coefficient(f"({self.mass_eccentricity.text}) * {self.harmonic**2} * omega**2")

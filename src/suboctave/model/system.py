@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import keyword
-import math
-import numbers
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -13,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError, Key, Refusals, located, shortened, suggest
+from suboctave.errors import InputError, Key, Refusals, is_number, located, shortened, suggest
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
@@ -360,15 +358,9 @@ def _name(name: Any) -> str:
 
 
 def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise InputError(f"parameter {name!r} must be a finite number, not {value!r}")
-    try:
-        number = float(value)
-    except OverflowError:  # a whole number of hundreds of digits
-        number = math.inf
-    if not math.isfinite(number):
-        raise InputError(f"parameter {name!r} must be a finite number, not {number}")
-    return number
+    if isinstance(value, bool) or not is_number(value):
+        raise InputError(f"parameter {name!r} must be a finite number, not {shortened(value)}")
+    return float(value)
 
 
 # ------------------------------------------------------------------------------------------------------- description

@@ -10,9 +10,9 @@ displacements, or on time, are in `coupled`. Derivatives that are not given are 
 
 from __future__ import annotations
 
-import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,6 +28,14 @@ Array: TypeAlias = NDArray[np.float64]
 Dof: TypeAlias = int | Sequence[int]
 
 
+def numbers_of(given: Any) -> Array:
+    """What was given as an array of floats; an empty one for what is none."""
+    try:
+        return np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return np.zeros(0)
+
+
 class Place:
     """Where something acts: `dof=i` along `e_i`, `dof=(i, j)` along `e_i - e_j`, or any `direction` vector."""
 
@@ -41,14 +49,10 @@ class Place:
             self.vector: Array | None = None if direction is None else self._read_vector(direction)
 
     def _read_dofs(self, dof: Dof) -> tuple[int, ...]:
-        given: Any = dof
-        entries = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
-        try:
-            dofs = tuple(operator.index(entry) for entry in entries)
-        except TypeError:
-            raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}") from None
-        if len(dofs) not in (1, 2) or any(isinstance(entry, bool) for entry in entries):
+        entries = tuple(dof) if isinstance(dof, Sequence | np.ndarray) else (dof,)
+        if len(entries) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in entries):
             raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}")
+        dofs = tuple(int(entry) for entry in entries)
         if min(dofs) < 0:
             raise InputError(f"{self.owner}: dof {min(dofs)} is negative; degrees of freedom count from 0")
         if len(set(dofs)) < len(dofs):
@@ -56,10 +60,7 @@ class Place:
         return dofs
 
     def _read_vector(self, direction: ArrayLike) -> Array:
-        try:
-            vector = np.array(direction, dtype=float)
-        except (TypeError, ValueError, OverflowError):
-            vector = np.zeros(0)
+        vector = numbers_of(direction)
         if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
             raise InputError(f"{self.owner}: direction must be a vector of finite numbers, not all zero")
         vector.setflags(write=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable as Function, Mapping, Sequence
+from collections.abc import Callable as Function, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,12 @@ from suboctave.model.expressions.coefficients import Coefficient
 Number = float | str | Coefficient
 #: step of complex differences
 _COMPLEX = 1e-30
-_CHECKED, _AGREE = 9, 1e-6
+_CHECKED = 9
 #: by which factors that step is shortened until two differences agree, which they do not while a corner lies between
 _SHORTER = (1.0, 0.1, 0.01)
 #: scales of the motions at which given derivatives are checked: what is sharp about zero is seen at the small ones
 _SCALES = (1.0, 0.1, 0.01, 0.001)
-#: how far given derivatives may be from differences, relative to the largest force and slope
+#: how far derivatives may be from differences, relative to the largest force and slope
 _GIVEN = 1e-5
 #: held while the filters of warnings are changed, which are those of the process
 _filtering = threading.RLock()
@@ -63,7 +63,6 @@ class Callable(Element):
         super().__init__(dof, list((coefficients or {}).values()), direction=direction)
         assert function is not None
         self.function, self.derivatives = function, derivatives
-        self._complex = False
         self._complex = derivatives is None and self._bears_complex()
 
     @property
@@ -89,24 +88,29 @@ class Callable(Element):
             self._check_given(scales * np.tile(u, len(_SCALES)), scales * np.tile(v, len(_SCALES)), c)
 
     def _check_given(self, u: Array, v: Array, c: Array) -> None:
-        """Refuse derivatives that are not those of the force wherever differences settle: not across a corner."""
-        f = self._value(u, v, c)
-        finer = [self._differences(u, v, c, factor) for factor in _SHORTER]
-        for i, (name, given) in enumerate(zip("xv", self._given(u, v, c), strict=True)):
-            if not np.all(np.isfinite(given)):
+        """Refuse derivatives that are not those of the force wherever differences settle."""
+        given = self._given(u, v, c)
+        for name, slope in zip("xv", given, strict=True):
+            if not np.all(np.isfinite(slope)):
                 raise InputError(f"{self.label}: f_{name} from derivatives= is not finite between -1 and 1")
-            steps = np.array([pair[i] for pair in finer])
-            apart = np.abs(np.diff(steps, axis=0))
-            best = np.argmin(apart, axis=0)
-            settled, doubt = (np.take_along_axis(x, best[None], axis=0)[0] for x in (steps[1:], apart))
-            size = max(float(np.abs(f).max()), float(np.nanmax(np.abs(given))))
-            wrong = np.flatnonzero(np.abs(given - settled) > _GIVEN * size + doubt)
-            if wrong.size:
-                k = wrong[0]
-                raise InputError(
-                    f"{self.label}: f_{name} from derivatives= is not the derivative of the force: at x = {u[k]:.4g}, "
-                    f"v = {v[k]:.4g} it gives {given[k]:.6g}, differences give {settled[k]:.6g}"
-                )
+        for i, k, settled in self._disagreements(given, u, v, c):
+            raise InputError(
+                f"{self.label}: f_{'xv'[i]} from derivatives= is not the derivative of the force: at x = {u[k]:.4g}, "
+                f"v = {v[k]:.4g} it gives {given[i][k]:.6g}, differences give {settled:.6g}"
+            )
+
+    def _disagreements(
+        self, slopes: tuple[Array, Array], u: Array, v: Array, c: Array
+    ) -> Iterator[tuple[int, int, float]]:
+        """Where differences settle, not across a corner, at another slope: of which argument, place, their slope."""
+        f = self._value(u, v, c)
+        finer = np.array([self._differences(u, v, c, factor) for factor in _SHORTER])
+        apart = np.abs(np.diff(finer, axis=0))
+        best = np.argmin(apart, axis=0)[None]
+        settled, doubt = (np.take_along_axis(x, best, axis=0)[0] for x in (finer[1:], apart))
+        sizes = np.maximum(np.nanmax(np.abs(f)), np.nanmax(np.abs(slopes), axis=1, keepdims=True))
+        for i, k in np.argwhere(np.abs(slopes - settled) > _GIVEN * sizes + doubt):
+            yield int(i), int(k), float(settled[i, k])
 
     def _draws(self) -> tuple[Array, Array]:
         angles = np.arange(1, _CHECKED + 1)
@@ -120,21 +124,19 @@ class Callable(Element):
             with _filtering, np.errstate(all="ignore"), warnings.catch_warnings():
                 warnings.simplefilter("error", np.exceptions.ComplexWarning)
                 real = np.asarray(self.function(u, v, *c))
-                for arguments in ((u + 1j * _COMPLEX, v), (u, v + 1j * _COMPLEX)):
-                    got = np.asarray(self.function(*arguments, *c))
-                    if got.shape != u.shape or not np.allclose(got.real, real, rtol=1e-12, atol=0.0, equal_nan=True):
-                        return False
-                self._complex = True
-                exact = self._slopes(u, v, c)
-                self._complex = False
-                rough = self._slopes(u, v, c)
+                stepped = self._stepped(u, v, c)
+                if any(f.shape != u.shape or not np.allclose(f.real, real, 1e-12, 0.0, True) for f in stepped):
+                    return False
+                # a function that drops imaginary parts has slopes of zero
+                slopes = stepped[0].imag / _COMPLEX, stepped[1].imag / _COMPLEX
+                return not any(True for _ in self._disagreements(slopes, u, v, c))
         except Exception:  # the user's function may raise anything on complex numbers
             return False
-        size = float(np.nanmax(np.abs(real), initial=0.0)) + max(
-            float(np.nanmax(np.abs(r), initial=0.0)) for r in rough
-        )
-        # a function that drops imaginary parts has slopes of zero; corners between the points may disagree elsewhere
-        return all(float(np.nanmedian(np.abs(a - b))) <= _AGREE * size for a, b in zip(exact, rough, strict=True))
+
+    def _stepped(self, u: Array, v: Array, c: Array) -> list[np.ndarray]:
+        """The force at complex steps of displacement and of velocity."""
+        places = (u + 1j * _COMPLEX, v), (u, v + 1j * _COMPLEX)
+        return [np.asarray(self.function(*place, *c)) for place in places]
 
     def _value(self, u: Array, v: Array, c: Array) -> Array:
         try:
@@ -167,11 +169,8 @@ class Callable(Element):
         if self.derivatives is not None:
             return self._given(u, v, c)
         if self._complex:
-            h = _COMPLEX
-            return (
-                np.imag(self.function(u + 1j * h, v, *c)) / h * np.ones_like(u),
-                np.imag(self.function(u, v + 1j * h, *c)) / h * np.ones_like(u),
-            )
+            by_u, by_v = (np.imag(f) / _COMPLEX * np.ones_like(u) for f in self._stepped(u, v, c))
+            return by_u, by_v
         return self._differences(u, v, c)
 
     def _differences(self, u: Array, v: Array, c: Array, factor: float = 1.0) -> tuple[Array, Array]:

@@ -135,6 +135,15 @@ def as_coupled(element: BaseElement) -> CoupledElement | Law | _OneInput:
     return _OneInput(element)
 
 
+def _of_law(name: str) -> Any:
+    """The method of this name of an expression's law."""
+
+    def method(self: Expression, q: Array, theta: Array, c: Array) -> Any:
+        return getattr(self._law, name)(q, theta, c)
+
+    return method
+
+
 class Expression(CoupledElement):
     """A force given as text, with exact derivatives.
 
@@ -200,17 +209,8 @@ class Expression(CoupledElement):
         """What the text shows: a polynomial, corners, or nothing."""
         return self._law.sampling(c)
 
-    def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
-        return self._law.tangent(q, theta, c)
-
-    def curvature(self, q: Array, theta: Array, c: Array) -> Array:
-        return self._law.curvature(q, theta, c)
-
-    def third(self, q: Array, theta: Array, c: Array) -> Array:
-        return self._law.third(q, theta, c)
-
-    def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
-        return self._law.coefficient_tangent(q, theta, c)
-
-    def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
-        return self._law.coefficient_curvature(q, theta, c)
+    tangent = _of_law("tangent")
+    curvature = _of_law("curvature")
+    third = _of_law("third")
+    coefficient_tangent = _of_law("coefficient_tangent")
+    coefficient_curvature = _of_law("coefficient_curvature")

@@ -16,11 +16,11 @@ where the stop is open at rest.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,9 @@ from suboctave.model.elements.base import Array, DeclaredElement, Dof, required
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear, SharpSampling
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 
+if TYPE_CHECKING:
+    from suboctave.model.expressions.law import Law
+
 Number = float | str | Coefficient
 _SIDES = {"right": 1, "left": -1}
 #: sharpness, and sharpness times gap, beyond which the squares of rounded laws leave the range of floats
@@ -37,90 +40,34 @@ _SHARPEST = 1e100
 
 
 # ------------------------------------------------------------------------------------------------------ laws of a stop
-class _Phi(NamedTuple):
-    """phi and its derivatives by y and by s."""
+def _text(side: int, gap: str, regularised: bool) -> str:
+    """The law of one stop as a text, for its derivatives by the coefficients."""
+    if not regularised:
+        return f"stiffness*max(x - {gap}, 0)" if side > 0 else f"-stiffness*max({gap} - x, 0)"
 
-    value: Any
-    y: Any
-    yy: Any
-    s: Any
-    ys: Any
-    ss: Any
+    def phi(y: str) -> str:
+        sharp = f"regularization*({y})"
+        return f"(({y})*(1/2 + atan({sharp})/pi) - log(1 + ({sharp})**2)/(2*pi*regularization))"
 
-
-def _phi(y: Any, s: float) -> _Phi:
-    angle, bell, log = np.arctan(s * y) / np.pi, 1.0 / (np.pi * (1.0 + (s * y) ** 2)), np.log1p((s * y) ** 2) / np.pi
-    phi_y = 0.5 + angle
-    return _Phi(
-        y * phi_y - log / (2.0 * s), phi_y, s * bell, log / (2.0 * s**2), y * bell, y**2 * bell / s - log / s**3
-    )
+    change = f"{phi(f'x - {gap}')} - {phi(f'-{gap}')}"
+    law = f"{change} + max(-{gap}, 0)" if side > 0 else f"x - ({change}) - max({gap}, 0)"
+    return f"stiffness*({law})"
 
 
-@dataclass(frozen=True)
-class _Rounded:
-    """The regularised law of one stop, per unit of stiffness, and its derivatives by gap and sharpness."""
-
-    side: int
-    b: float
-    s: float
-
-    @cached_property
-    def _at_rest(self) -> _Phi:
-        return _phi(-self.b, self.s)
-
-    @cached_property
-    def _preload(self) -> float:
-        """`-side b` where that is positive, its derivative by the gap."""
-        return -1.0 if self.side * self.b < 0.0 else 0.0
-
-    @property
-    def constant(self) -> float:
-        """Constant in `SharpSampling`."""
-        return float(self._preload * self.b - self.side * (self._at_rest.value + 0.5 * self.b))
-
-    def constant_change(self, b: float, s: float) -> float:
-        """Its change with these changes of the gap and the sharpness."""
-        by_gap = self.side * (self._at_rest.y - 0.5) + self._preload
-        return float(by_gap * b - self.side * self._at_rest.s * s)
-
-    def rates(self, u: Array) -> tuple[Array, Array]:
-        """`f_c, f_uc`, (2, N)."""
-        at, rest, side = _phi(u - self.b, self.s), self._at_rest, self.side
-        f_c = np.array([self._preload - side * (at.y - rest.y), side * (at.s - rest.s)])
-        return f_c, side * np.array([-at.yy, at.ys])
-
-    def bends(self, u: Array) -> Array:
-        """`f_cc`, (2, 2, N)."""
-        at, rest = _phi(u - self.b, self.s), self._at_rest
-        mixed = rest.ys - at.ys
-        return self.side * np.array([[at.yy - rest.yy, mixed], [mixed, at.ss - rest.ss]])
-
-
-@dataclass(frozen=True)
-class _Exact:
-    """The exact law of one stop, per unit of stiffness, and the regular parts of its derivatives by the gap."""
-
-    side: int
-    b: float
-
-    def rates(self, u: Array) -> tuple[Array, Array]:
-        """`f_c, f_uc`, (1, N)."""
-        return -(self.side * (u[None] - self.b) > 0.0).astype(float), np.zeros((1, len(u)))
-
-    def bends(self, u: Array) -> Array:
-        """`f_cc`, (1, 1, N)."""
-        return np.zeros((1, 1, len(u)))
+def _constant(side: int, b: float, s: float) -> tuple[float, float, float]:
+    """The constant of a regularised law per unit of stiffness, `r - side b / 2`; its rates by gap and sharpness."""
+    phi_y, log = 0.5 + math.atan(-s * b) / math.pi, math.log1p((s * b) ** 2) / (2.0 * math.pi * s)
+    preloaded = 1.0 if side * b < 0.0 else 0.0
+    return side * (b * (phi_y - 0.5) + log) - preloaded * b, side * (phi_y - 0.5) - preloaded, -side * log / s
 
 
 @lru_cache(maxsize=256)
-def _rounded(sides: tuple[int, ...], c: tuple[float, ...]) -> tuple[SharpSampling, tuple[_Rounded, ...]]:
+def _arctan_steps(sides: tuple[int, ...], c: tuple[float, ...]) -> SharpSampling:
     """All stops with the coefficients c: stiffness, gaps, sharpness."""
     k, *gaps, s = c
-    laws = tuple(_Rounded(side, gap, s) for side, gap in zip(sides, gaps, strict=True))
+    constant = k * sum(_constant(side, b, s)[0] for side, b in zip(sides, gaps, strict=True))
     steps = tuple(k * side for side in sides)
-    constant = sum(k * law.constant for law in laws)
-    whole = SharpSampling(tuple(gaps), (1.0 / s,) * len(gaps), constant, 0.5 * k * len(gaps), steps)
-    return whole, laws
+    return SharpSampling(tuple(gaps), (1.0 / s,) * len(gaps), constant, 0.5 * k * len(gaps), steps)
 
 
 # ---------------------------------------------------------------------------------------------------------- elements
@@ -174,44 +121,39 @@ class _Stops(DeclaredElement):
     def law_at(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gaps with width 1/s."""
         if self.regularised:
-            return _rounded(self.sides, tuple(c.tolist()))[0]
+            return _arctan_steps(self.sides, tuple(c.tolist()))
         return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
 
     def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
         if not self.regularised:
             return None
         (k, *gaps, s), (by_k, *by_gaps, by_s) = c.tolist(), rates.tolist()
-        laws = _rounded(self.sides, (k, *gaps, s))[1]
-        moved = zip(laws, by_gaps, strict=True)
-        constant = sum(by_k * law.constant + k * law.constant_change(by_gap, by_s) for law, by_gap in moved)
+        constant = 0.0
+        for side, gap, by_gap in zip(self.sides, gaps, by_gaps, strict=True):
+            value, slope, by_sharpness = _constant(side, gap, s)
+            constant += by_k * value + k * (slope * by_gap + by_sharpness * by_s)
         widths, steps = (-by_s / s**2,) * len(gaps), tuple(by_k * side for side in self.sides)
         return SharpSampling(tuple(by_gaps), widths, constant, 0.5 * by_k * len(gaps), steps)
 
-    def _laws(self, c: Array) -> list[tuple[list[int], _Rounded | _Exact]]:
-        """Of every stop: which of the coefficients besides the stiffness are its own, and its law."""
-        if self.regularised:
-            return [([i, len(c) - 1], law) for i, law in enumerate(_rounded(self.sides, tuple(c.tolist()))[1], start=1)]
-        return [([i], _Exact(side, c[i])) for i, side in enumerate(self.sides, start=1)]
+    def _written(self) -> tuple[Law, list[int], list[int]]:
+        """The law as a text; where its coefficients, in alphabetical order, stand among those here, and conversely."""
+        from suboctave.model.expressions.law import law_of
+
+        stops = zip(self.sides, self.coefficient_names[1:], strict=False)
+        text = " + ".join(_text(side, gap, self.regularised) for side, gap in stops)
+        order = np.argsort(self.coefficient_names)
+        return law_of(text, ("x",), False, type(self).__name__), order.tolist(), np.argsort(order).tolist()
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`; for the exact law the regular parts."""
-        f_c, f_uc = np.zeros((2, len(c), len(u)))
-        f_c[0], f_uc[0], _ = self.tangent(u, v, np.array([1.0, *c[1:]]))
-        for own, law in self._laws(c):
-            force, slope = law.rates(u)
-            f_c[own] += c[0] * force
-            f_uc[own] += c[0] * slope
-        return f_c, f_uc, None
+        law, order, here = self._written()
+        f_c, f_qc = law.coefficient_tangent(u[None], np.zeros_like(u), c[order])
+        return f_c[here], f_qc[here, 0], None
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
-        f_cc = np.zeros((len(c), len(c), len(u)))
-        for own, law in self._laws(c):
-            by_own, _ = law.rates(u)
-            f_cc[0, own] += by_own
-            f_cc[own, 0] += by_own
-            f_cc[np.ix_(own, own)] += c[0] * law.bends(u)
-        return f_cc
+        law, order, here = self._written()
+        return law.coefficient_curvature(u[None], np.zeros_like(u), c[order])[np.ix_(here, here)]
 
 
 class ElasticStop(_Stops):

@@ -6,12 +6,11 @@ imported when the first of them is.
 
 from __future__ import annotations
 
-import math
 import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.model.expressions.reader import FUNCTIONS, Form, number_form, read
 
 
@@ -97,18 +96,14 @@ def coefficient(source: Any) -> Coefficient:
     if isinstance(source, str):
         refused = {"t": "time cannot occur in a coefficient; periodic forces are loads"}
         return Coefficient(source, read(source, "", FUNCTIONS, refused.get))
-    if not isinstance(source, bool) and isinstance(source, numbers.Real):
-        try:
-            number = float(source)
-        except OverflowError:  # a whole number of hundreds of digits
-            number = math.inf
-        if not math.isfinite(number):
-            raise InputError(f"a coefficient must be finite, not {number}")
-        return Coefficient(repr(number), number_form(number))
-    raise InputError(
-        f"a coefficient is a number or an expression in the parameters as text, not {source!r} "
-        f"({type(source).__name__})"
-    )
+    if isinstance(source, bool) or not isinstance(source, numbers.Real):
+        raise InputError(
+            f"a coefficient is a number or an expression in the parameters as text, not {source!r} "
+            f"({type(source).__name__})"
+        )
+    if not is_number(source):
+        raise InputError(f"a coefficient must be finite, not {shortened(source)}")
+    return Coefficient(repr(float(source)), number_form(float(source)))
 
 
 def named_coefficient(source: Any, owner: str, name: str) -> Coefficient:

@@ -172,10 +172,6 @@ _CODE = {
     "Ramp": "maximum({}, 0.0)", "Step": "(1.0 * ({} > 0.0))", "Modulus": "absolute({})", "Abs": "absolute({})",
     "Sign": "sign({})", "sign": "sign({})", "PositiveRamp": "maximum({}, 1e-60)", "DiracDelta": "0.0",
 }  # fmt: skip
-_NUMPY = (
-    "sqrt", "exp", "log", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "absolute", "sign",
-    "maximum",
-)  # fmt: skip
 _SCALAR = {"pi": math.pi, **FUNCTIONS, **CORNERS}
 #: powers up to this one are products
 _PRODUCTS = 4
@@ -274,8 +270,7 @@ def derivative_form(form: Form, name: str) -> Form:
 
 def array_function(parts: Sequence[Any], q: Sequence[Any], theta: Any, c: Sequence[Any]) -> Callable[..., Any]:
     """A function `(q, theta, c) -> (len(parts), N)` of arrays (Q, N), (N,), (nc,)."""
-    functions = {name: getattr(np, name) for name in _NUMPY}
-    law = sympy.lambdify([*q, theta, *c], parts, modules=[functions], printer=_Code(), dummify=True, cse=True)
+    law = sympy.lambdify([*q, theta, *c], parts, modules=[vars(np)], printer=_Code(), dummify=True, cse=True)
 
     def rows(q: Any, theta: Any, c: Any) -> Any:
         out = np.empty((len(parts), theta.shape[0]))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from suboctave.errors import InputError, suggest
@@ -18,20 +19,10 @@ Evaluate = Callable[[Mapping[str, float]], float]
 
 #: functions that any expression may contain
 FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "sqrt": math.sqrt,
-    "exp": math.exp,
-    "log": math.log,
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "asin": math.asin,
-    "acos": math.acos,
-    "atan": math.atan,
-    "sinh": math.sinh,
-    "cosh": math.cosh,
-    "tanh": math.tanh,
+    "sqrt": math.sqrt, "exp": math.exp, "log": math.log, "sin": math.sin, "cos": math.cos, "tan": math.tan,
+    "asin": math.asin, "acos": math.acos, "atan": math.atan, "sinh": math.sinh, "cosh": math.cosh, "tanh": math.tanh,
     "abs": math.fabs,
-}
+}  # fmt: skip
 #: functions with corners or jumps, of forces only
 CORNERS: dict[str, Callable[..., float]] = {
     "sign": lambda x: float((x > 0.0) - (x < 0.0)),
@@ -55,6 +46,7 @@ _MOST_OPERATIONS = 500
 
 
 # ------------------------------------------------------------------------------------------------------------ reader
+@dataclass(slots=True)
 class Form:
     """An expression that has been read: an operation and its parts, with its closure and what is known about it.
 
@@ -71,21 +63,14 @@ class Form:
         The highest power of anything in it, powers of powers multiplied; how many operations it stands for.
     """
 
-    __slots__ = ("affine", "constant", "evaluate", "names", "operation", "parts", "power", "size")
-
-    def __init__(
-        self,
-        operation: str,
-        parts: tuple[Any, ...],
-        evaluate: Evaluate,
-        names: frozenset[str] = frozenset(),
-        affine: dict[str, float] | None = None,
-        power: float = 0.0,
-        size: float = 1.0,
-        constant: float | None = None,
-    ) -> None:
-        self.operation, self.parts, self.evaluate, self.names = operation, parts, evaluate, names
-        self.affine, self.power, self.size, self.constant = affine, power, size, constant
+    operation: str
+    parts: tuple[Any, ...]
+    evaluate: Evaluate
+    names: frozenset[str] = frozenset()
+    affine: dict[str, float] | None = None
+    power: float = 0.0
+    size: float = 1.0
+    constant: float | None = None
 
 
 def number_form(value: float, operation: str = "number", parts: tuple[Any, ...] = ()) -> Form:
@@ -128,19 +113,15 @@ def _shortened(text: str) -> str:
     return repr((text if len(text) <= 60 else text[:57] + "...").replace(PRIME, "'"))
 
 
+@dataclass
 class _Reader:
     """Turns syntax into forms, and refuses everything that is not on the list."""
 
-    def __init__(
-        self,
-        text: str,
-        begin: int,
-        where: str,
-        functions: Mapping[str, Callable[..., float]],
-        refusal: Callable[[str], str | None],
-    ) -> None:
-        self.text, self.begin, self.where = text, begin, where
-        self.functions, self.refusal = functions, refusal
+    text: str
+    begin: int
+    where: str
+    functions: Mapping[str, Callable[..., float]]
+    refusal: Callable[[str], str | None]
 
     def refuse(self, node: ast.AST, reason: str) -> InputError:
         column = len(self.text.encode()[: getattr(node, "col_offset", 0)].decode()) + self.begin + 1
@@ -210,14 +191,13 @@ class _Reader:
             if size > _MOST_OPERATIONS:
                 raise self.refuse(node, f"{name} of arguments this long; split it into terms")
             size += 2.0 + arguments[1].size
-        f = closures[0]
-        evaluate: Evaluate = (
-            (lambda values: function(f(values)))
-            if len(closures) == 1
-            else (lambda values: function(*(one(values) for one in closures)))
-        )
         names = frozenset().union(*(argument.names for argument in arguments))
-        return Form(name, tuple(arguments), evaluate, names, power=1.0, size=size)
+        f, *others = closures
+        if others:
+            return Form(
+                name, tuple(arguments), lambda at: function(*(one(at) for one in closures)), names, None, 1.0, size
+            )
+        return Form(name, tuple(arguments), lambda at: function(f(at)), names, None, 1.0, size)
 
     def binary(self, node: ast.AST, operation: ast.operator, left: Form, right: Form) -> Form:
         sign = _SIGNS.get(type(operation))
