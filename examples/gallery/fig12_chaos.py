@@ -21,10 +21,11 @@ print(chart)
 if len(sys.argv) > 1:
     chart.plot(sys.argv[1], curves=second, size="double-column")
 
-# Point B of the paper's section 5.1 is chaotic, here with Kc = 4.7, too; far from the border nothing is.
+# Point B of the paper's section 5.1 is chaotic, here with Kc = 4.7, too; far from the border next to nothing is: few
+# motions from rest reach what is chaotic there beside the periodic ones.
 b = int(np.argmin(abs(chart.values - 1.6))), int(np.argmin(abs(chart.omega - 2.6)))
 assert chart.chaotic[b]
-assert not chart.chaotic[:, chart.omega < 2.3].any()
+assert chart.chaotic[:, chart.omega < 2.3].mean() < 0.02
 # Most of what is chaotic lies within the border of 4T motions.
 inside = np.zeros_like(chart.chaotic)
 for j, value in enumerate(chart.values):
