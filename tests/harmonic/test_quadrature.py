@@ -11,7 +11,6 @@ from slow import slow
 import suboctave as so
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis
-from suboctave.harmonic.aft.sampled import settled_samples
 from suboctave.harmonic.trigonometric import crossings
 from suboctave.model import AdaptiveSampling, CubicSpring, ElasticStop, HarmonicLoad, PolynomialSpring, System, library
 
@@ -111,8 +110,9 @@ def test_polynomial_laws_are_integrated_exactly(powers):
 
 def test_weights_add_up_to_the_period():
     for element in (CubicSpring(0, 1.0), ElasticStop(0, 1.0, 0.4, regularization=1e4)):
-        zr, zi, weights, *_ = channel_of(element, motion_of("rough"), 15).laws[0].path
-        assert weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
+        nodes = channel_of(element, motion_of("rough"), 15).laws[0].nodes
+        zr, zi = nodes.zr, nodes.zi
+        assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
         assert np.abs(zr**2 + zi**2 - 1.0).max() < 1e-13
         assert len(zr) == len(np.unique(np.arctan2(zi, zr)))
 
@@ -126,7 +126,8 @@ def test_motions_of_few_harmonics_are_integrated_as_well(harmonics, gap):
     c = np.array([0.1] + [0.7 / k**2 * np.exp(1j * k) for k in range(1, harmonics + 1)])
     stop, top = ElasticStop(0, 1.0, gap, side="right", regularization=40.0), 2 * harmonics + 1
     spectra = channel_of(stop, c, top)
-    zr, zi, *_ = spectra.laws[0].path
+    nodes = spectra.laws[0].nodes
+    zr, zi = nodes.zr, nodes.zi
     assert np.abs(zr**2 + zi**2 - 1.0).max() < 1e-14
     tau = 2 * np.pi * np.arange(8192) / 8192
     f, f_u, _ = stop.tangent(value(c, tau), np.zeros_like(tau), stop.coefficient_values({}))
@@ -144,9 +145,8 @@ class Silent(ElasticStop):
 
 
 def samples_for(element, c):
-    channel = channel_of(element, c, 17)
-    ((member, _),) = channel.members()
-    return settled_samples(channel.along, member)
+    (law,) = channel_of(element, c, 17).laws
+    return law.settled_samples(law.members[0])
 
 
 class Broken(CubicSpring):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from suboctave.harmonic.aft.channel import Channel, Group
+from suboctave.harmonic.aft.channel import Channel, Group, laws_along
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, Member
-from suboctave.harmonic.aft.table import DirectionLaws
 
 
 def channel_of(element, motion, top: int, samples: int | None = None) -> Channel:
@@ -14,11 +13,10 @@ def channel_of(element, motion, top: int, samples: int | None = None) -> Channel
     c = element.coefficient_values({})
     group = Group(np.ones(1), np.ones((1, 1)), (0,), element.depends_on_velocity)
     along = Along(np.ascontiguousarray(motion, dtype=complex)[None], 1.0, 1, group.moving, top)
-    laws = DirectionLaws.of((Member(0, element, element.sampling(c), c, samples),))
-    return Channel(group, along, laws.along(along))
+    return Channel(group, along, laws_along(along, [Member(0, element, element.sampling(c), c, samples)]))
 
 
 def by_coefficients(channel: Channel) -> CoefficientSpectra:
     """Derivatives by the coefficients of its only element."""
-    ((member, law),) = channel.members()
-    return channel.coefficient_spectra(member, law)
+    (law,) = channel.laws
+    return law.by_coefficients(law.members[0])

@@ -57,12 +57,12 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     """Every gap of every element on a motion."""
     grid = state.balance.grid
     gaps = []
-    for law, motion in zip(state.laws.groups, state.motions, strict=True):
-        if law.levels:
+    for own, motion in zip(state.laws.levels, state.motions, strict=True):
+        if own:
             turns = _rows(extrema(motion, grid[0], grid[1]))
-            gaps += [GapExtrema(element, place, level, *turns) for element, place, level in law.levels]
+            gaps += [GapExtrema(element, place, level, *turns) for element, place, level in own]
     for channel in state.own_channels:
-        for member, _ in channel.members():
+        for _, member in channel.members():
             places = levels_of(member.kind, member.coefficients)
             if places:
                 turns = _rows(extrema(channel.along.motion, grid[0], grid[1]))
@@ -128,10 +128,10 @@ def _along(element: BaseElement) -> float:
 
 def rests_in_corner(state: BalanceState) -> bool:
     """Whether the stiffness or damping of an element jumps at rest, u = v = 0."""
-    if any(np.any(law.pieces[:, 1] == 0.0) for law in state.laws.groups):
+    if np.any(state.packed.pieces[:, 1] == 0.0):
         return True
     for channel in state.own_channels:
-        ((member, _),) = channel.members()
+        ((_, member),) = channel.members()
         kind, law = member.kind, as_coupled(member.element)
         if not isinstance(kind, CornerSampling):
             continue

@@ -10,7 +10,7 @@ of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui 
 one channel each, with its own direction to the left and to the right. Channels without force make panels follow what
 such a law follows (a corner in velocity, a sharp law in velocity), and give the time at the nodes.
 
-Piecewise-linear laws and polynomials in u are evaluated in compiled code. All other elements give their tangents at all
+Laws that their smoothness class is all of are evaluated in compiled code. All other elements give their tangents at all
 nodes at once, along the motion as it stands and, where it is corrected by `d(tau)`, again; but for sharp laws `f_u +
 f_uu d + f_uv d'` is taken at the old nodes. Panels are graded towards the old passages, and where d exceeds the law's
 width the new ones lie between the nodes; the linear form has the right integral all the same.
@@ -54,15 +54,14 @@ from suboctave.floquet.time_mesh import (
     split,
 )
 from suboctave.harmonic.aft.channel import Channel, Group
+from suboctave.harmonic.aft.closed_form import NO_ROWS
 from suboctave.harmonic.aft.general import GeneralLaw, Smoothness
-from suboctave.harmonic.aft.law import LawAlong
-from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
+from suboctave.harmonic.aft.table import PackedLaws, Probe
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.linear_part import LinearPart
-from suboctave.harmonic.quadrature import FEWEST, search_grid, singular_instants
+from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
-from suboctave.model.elements.base import Element
 
 #: longest panel in units of the fastest time scale: there collocation is exact to rounding
 _LONGEST = 0.8
@@ -74,7 +73,8 @@ _BLIND, _TANGENT = 48.0, 7.0
 _SLICE = 1e-9
 #: how close to a corner where powers of a half begin panels are graded, in units of the motion
 _ROUGH = 1e-6
-_NONE, _NO_PIECES, _NO_PASSAGES = np.zeros(0), np.zeros((0, 3)), np.zeros((2, 0))
+_NO_PASSAGES = np.zeros((2, 0))
+_NOTHING = Probe()
 
 
 class Linearised:
@@ -97,13 +97,12 @@ class Linearised:
     def __init__(self, state: BalanceState) -> None:
         balance = state.balance
         self.state = state
-        self._given = state.laws.groups
-        own = self._own = Channels(state, len(self._given))
+        own = self._own = Channels(state)
         self._modes = modes = _in_modes(state.linear, balance.all_groups)
         self.size = 2 * len(modes.stiffness)
-        self._laws = laws = PackedLaws.of(self._given + own.laws) if own.laws else state.packed
+        self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
         self._motions, self._forces, self.active = state.motions, state.force_spectra, modes.active
-        if own.laws:
+        if own.probes:
             self._motions = np.concatenate((state.motions, own.motions))
             self._forces = np.concatenate((state.force_spectra[: own.first], own.forces))
             self.active = np.concatenate((np.arange(own.first), own.numbers))[modes.active]
@@ -137,18 +136,6 @@ class Linearised:
             panels, self._motions, self._forces, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
             laws.step_owner, laws.line,
         )  # fmt: skip
-        #: (group, element, its coefficients, whether sharp, f_u, f_v) of the elements not known in closed form
-        self._sampled = []
-        for g, law in enumerate(() if self.state.packed.closed_form else self._given):
-            for members, sharp in ((law.graded, True), (law.uniform, False)):
-                for _, element, _, a, _ in members:
-                    assert isinstance(element, Element)
-                    force, f_u, f_v = element.tangent(self.path[g, 0], self.path[g, 1], a)
-                    self.law[g, 0] += force
-                    self.law[g, 1] += f_u
-                    if f_v is not None:
-                        self.law[g, 2] += f_v
-                    self._sampled.append((g, element, a, sharp, f_u, f_v))
         self._own.evaluate(self.path, self.law)
         parts: np.ndarray
         total: float
@@ -181,20 +168,6 @@ class Linearised:
             self.path, self.law, change, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
             laws.step_owner, self.events, self.start, len(self.spans),
         )  # fmt: skip
-        for g, element, a, sharp, f_u, f_v in self._sampled:
-            u, v = self.path[g]
-            d_u, d_v = change[g]
-            if sharp:
-                f_uu, f_uv, f_vv = element.curvature(u, v, a)
-                f_u = f_u + f_uu * d_u
-                if f_v is not None and f_uv is not None and f_vv is not None:
-                    f_u = f_u + f_uv * d_v
-                    f_v = f_v + f_uv * d_u + f_vv * d_v
-            else:
-                _, f_u, f_v = element.tangent(u + d_u, v + d_v, a)
-            law[g, 1] += f_u
-            if f_v is not None:
-                law[g, 2] += f_v
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
@@ -258,50 +231,57 @@ def _in_modes(linear: LinearPart, groups: tuple[Group, ...]) -> _Modes:
 
 
 class Channels:
-    """The channels of all elements with nodes of their own, after those of the `first` groups.
+    """Laws that are asked at nodes, and the channels of elements with nodes of their own, after those of the groups.
 
     Attributes
     ----------
+    first
+        Number of groups.
     motions, forces
-        Displacement and Fourier coefficients of the force of every channel, lists of (H + 1,) and (top + 1,).
+        Displacement and Fourier coefficients of the force of every channel of their own, lists of (H + 1,) and
+        (top + 1,).
     numbers
         The channel of every input of these elements.
-    laws
-        What panels follow: see `DirectionLaws`.
+    probes
+        What panels follow along these channels.
     degree, finest
         Degree of the tangents as polynomials in the motion; longest panel that they allow.
     """
 
-    def __init__(self, state: BalanceState, first: int) -> None:
-        self.state, self.first = state, first
+    def __init__(self, state: BalanceState) -> None:
+        self.state, self.first = state, len(state.balance.groups)
         self.motions: list[ComplexArray] = []
         self.forces: list[ComplexArray] = []
         self.numbers: list[int] = []
-        self.laws: list[DirectionLaws] = []
+        self.probes: list[Probe] = []
         self.degree, self.finest = 0, math.inf
-        self._elements: list[tuple[GeneralLaw, int, Array]] = []
+        #: every law, the channel of its first input, and what its forces along every input are multiplied by
+        self._laws: list[tuple[GeneralLaw, int, Array]] = []
         self._tangents: list[Array] = []
         #: channels with marks of corners, by the first channel of their element; first and last panel between marks,
         #: by channel
         self._sliced: dict[int, list[tuple[int, int]]] = {}
         self._slices: dict[int, list[tuple[int, int]]] = {}
         self._clock = -1
+        if not state.packed.whole:
+            for g, channel in enumerate(state.channels[: self.first]):
+                own = [law for law in channel.laws if isinstance(law, GeneralLaw) and not law.whole]
+                self._laws += [(law, g, np.ones(1)) for law in own]
         for channel in state.own_channels if state.balance.own else ():
-            self._add(channel.laws[0], channel)
-        if any(law.harmonic for law, _, _ in self._elements):
+            self._add(channel)
+        if any(law.harmonic for law, _, _ in self._laws):
             turning = np.zeros(state.basis.harmonics + 1, dtype=complex)
             turning[1] = 1.0
             self._clock = self._channel(turning)
 
-    def _channel(
-        self, motion: ComplexArray, pieces: Array = _NO_PIECES, singular: tuple[Array, Array] = (_NONE, _NONE)
-    ) -> int:
+    def _channel(self, motion: ComplexArray, probe: Probe = _NOTHING) -> int:
         self.motions.append(motion)
         self.forces.append(np.zeros(self.state.balance.top + 1, dtype=complex))
-        self.laws.append(DirectionLaws(pieces, points=singular[0], widths=singular[1]))
+        self.probes.append(probe)
         return self.first + len(self.motions) - 1
 
-    def _add(self, nodal: LawAlong, own: Channel) -> None:
+    def _add(self, own: Channel) -> None:
+        (nodal,) = own.laws
         assert isinstance(nodal, GeneralLaw)
         along, law = nodal.along, nodal.smoothness
         scale = np.ones(own.count)
@@ -310,23 +290,21 @@ class Channels:
             if len(d) == 1:
                 # see `_in_modes`
                 scale[i] = own.out[0] / d[0]
-            points = law.points if i == 0 else ()
-            self.numbers.append(self._channel(motion, _marks(points, motion), _grading(law, points, motion)))
+            self.numbers.append(self._channel(motion, _probe(law, law.points if i == 0 else (), motion)))
             if i == 0 and law.points:
                 self._sliced.setdefault(self.first + begin, []).append((self.first + begin, 0))
         self.forces[begin] = scale[0] * own.spectra[0]
-        self._elements.append((nodal, self.first + begin, scale))
+        self._laws.append((nodal, self.first + begin, scale))
         velocity = 1j * along.rate * np.arange(len(along.motions[0])) * along.motions[0]
         if law.velocities and velocity.any():
-            marks, grading = _marks(law.velocities, velocity), _grading(law, law.velocities, velocity)
-            probe = self._channel(velocity, marks, grading)
+            probe = self._channel(velocity, _probe(law, law.velocities, velocity))
             self._sliced.setdefault(self.first + begin, []).append((probe, 1))
-        if law.sharp[0] and velocity.any():
-            self._channel(velocity, singular=(np.array(law.sharp[0]), np.array(law.sharp[1])))
+        if law.sharp_velocities[0] and velocity.any():
+            self._channel(velocity, Probe(NO_ROWS, *law.sharp_velocities))
         degree = max(1, law.degree - 1)
         self.degree = max(self.degree, degree)
         if law.cornered or law.unknown:
-            self.finest = min(self.finest, _BLIND / (nodal.samples or FEWEST))
+            self.finest = min(self.finest, _BLIND / nodal.samples)
         if nodal.harmonic:
             varying = nodal.harmonic * nodal.along.nu + degree * nodal.along.high
             self.finest = min(self.finest, _TANGENT / varying)
@@ -334,7 +312,7 @@ class Channels:
     def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
         """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
         rows = path[begin : begin + nodal.count]
-        q = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.along.moving else rows[:, 0]
+        q = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
         if self._clock < 0 or not nodal.harmonic:
             return np.ascontiguousarray(q), np.zeros(q.shape[1])
         cosine, slope = path[self._clock]
@@ -343,9 +321,9 @@ class Channels:
     def evaluate(self, path: Array, law: Array) -> None:
         """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, >= 3, N)."""
         self._tangents = []
-        for nodal, begin, scale in self._elements:
+        for nodal, begin, scale in self._laws:
             q, theta = self._state(nodal, begin, path)
-            force, f_q = nodal.law.tangent(q, theta, nodal.c)
+            force, f_q = nodal.tangent(q, theta)
             law[begin, 0] += scale[0] * force
             self._tangents.append(f_q)
             self._put(nodal, begin, scale, f_q, law)
@@ -355,7 +333,7 @@ class Channels:
         count = nodal.count
         for i in range(count):
             law[begin + i, 1] += scale[i] * f_q[i]
-            if nodal.along.moving:
+            if nodal.moving:
                 law[begin + i, 2] += scale[i] * f_q[count + i]
 
     def changed(self, path: Array, change: Array, law: Array, spans: Array) -> None:
@@ -364,14 +342,14 @@ class Channels:
         Of laws with corners every node keeps its side. For the time by which the motion reaches a corner later the law
         before it stays: an impulse, put into the slice that was cut out there.
         """
-        for (nodal, begin, scale), f_q in zip(self._elements, self._tangents, strict=True):
+        for (nodal, begin, scale), f_q in zip(self._laws, self._tangents, strict=True):
             q, theta = self._state(nodal, begin, path)
             rows = change[begin : begin + nodal.count]
-            d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.along.moving else rows[:, 0]
-            if nodal.smoothness.sharp[0]:
-                new = f_q + np.einsum("rsn,sn->rn", nodal.law.curvature(q, theta, nodal.c), d)
+            d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
+            if nodal.smoothness.sharp:
+                new = f_q + np.einsum("rsn,sn->rn", nodal.curvature(q, theta), d)
             else:
-                new = nodal.law.tangent(_moved(nodal, q, d), theta, nodal.c)[1]
+                new = nodal.tangent(_moved(nodal, q, d), theta)[1]
             self._put(nodal, begin, scale, new, law)
             for channel, order in self._sliced.get(begin, ()):
                 row = order * nodal.count
@@ -421,17 +399,15 @@ def _moved(nodal: GeneralLaw, q: Array, d: Array) -> Array:
     return moved
 
 
-def _grading(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> tuple[Array, Array]:
-    """Where panels are graded towards corners, as towards a law that is sharp there."""
-    if not law.rough or not levels:
-        return _NONE, _NONE
-    return np.array(levels, dtype=float), np.full(len(levels), _ROUGH * float(np.abs(motion).max()))
-
-
-def _marks(levels: tuple[float, ...], motion: ComplexArray) -> Array:
-    """Pieces without stiffness: panels end where the motion crosses them, just before and just after a corner."""
-    near = _SLICE * 2.0 * float(np.abs(motion).max())
-    return np.array([(0.0, level + side * near, 1.0) for level in levels for side in (-1.0, 1.0)]).reshape(-1, 3)
+def _probe(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> Probe:
+    """Panels end where the motion crosses pieces without stiffness, just before and just after corners; towards rough
+    ones they are graded, as towards a law that is sharp there.
+    """
+    size = float(np.abs(motion).max())
+    near = _SLICE * 2.0 * size
+    pieces = [(0.0, level + side * near, 1.0) for level in levels for side in (-1.0, 1.0)]
+    rough = levels if law.rough else ()
+    return Probe(np.array(pieces).reshape(-1, 3), rough, [_ROUGH * size] * len(rough))
 
 
 #: a correction larger than this share of the motion is cut down to it

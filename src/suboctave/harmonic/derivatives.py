@@ -111,17 +111,17 @@ def _by_coefficients(state: BalanceState, channel: Channel, a: Direction, b: Dir
     result = np.zeros(basis.size)
     if not (a.parameters or b.parameters):
         return result
-    for member, law in channel.members():
+    for law, member in channel.members():
         rates_a, rates_b = (member.element.parameter_rates(state.values, one.parameters) for one in (a, b))
         if not (rates_a.any() or rates_b.any()):
             continue
-        by = channel.coefficient_spectra(member, law)
+        by = law.by_coefficients(member)
         for rates, other in ((rates_a, b), (rates_b, a)):
             if not rates.any():
                 continue
             for i, d in enumerate(channel.ins):
                 result += toeplitz(rates @ by.tangent[:, i], high) @ (other.x @ d)
-                if channel.moving:
+                if by.tangent.shape[1] > channel.count:
                     change = state.omega * basis.derivative(other.x @ d) + other.omega * basis.derivative(state.x @ d)
                     result += toeplitz(rates @ by.tangent[:, channel.count + i], high) @ change
         spectrum = np.einsum("i,j,ijq->q", rates_a, rates_b, by.curvature)

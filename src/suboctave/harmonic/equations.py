@@ -17,7 +17,7 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.harmonic.aft.channel import Group
 from suboctave.harmonic.aft.law import Member
-from suboctave.harmonic.aft.table import DirectionLaws, PackedLaws
+from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import Sparse, sparse
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
@@ -26,22 +26,33 @@ from suboctave.harmonic.quadrature import search_grid
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import CoupledElement
-from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, Sampling
+from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, Sampling, levels
 from suboctave.model.system import System
 
 _Same = TypeVar("_Same", bound="Equations")
 
 
 class Laws:
-    """The laws of all elements at parameter values: one by one, and sorted for every group of one displacement."""
+    """The laws of all elements at parameter values: one by one, and those of every group of one displacement."""
 
-    def __init__(self, members: list[Member], groups: list[DirectionLaws]) -> None:
-        self.members, self.groups = members, groups
+    def __init__(self, members: list[Member], groups: list[Group]) -> None:
+        self.members = members
+        self.groups = [[members[i] for i in group.members] for group in groups]
 
     @lazy
     def packed(self) -> PackedLaws:
         """The groups' laws that are known in closed form, as arrays."""
-        return PackedLaws.of(self.groups)
+        return PackedLaws(self.groups)
+
+    @lazy
+    def levels(self) -> list[list[tuple[int, int, float]]]:
+        """Displacements at which a law has a corner, or is sharp, group by group: element, which of its own,
+        displacement.
+        """
+        return [
+            [(m.number, place, at) for m in group for place, at in enumerate(levels(m.kind, m.coefficients))]
+            for group in self.groups
+        ]
 
 
 class Equations:
@@ -168,8 +179,7 @@ class Equations:
                 c = element.coefficient_values(values)
                 cached = self._members[i] = at, Member(i, element, element.sampling(c), c, self.samples[i])
             members.append(cached[1])
-        groups = [DirectionLaws.of(tuple([members[i] for i in group.members])) for group in self.groups]
-        self._laws[own] = key, Laws(members, groups)
+        self._laws[own] = key, Laws(members, self.groups)
         return self._laws[own][1]
 
     @lazy

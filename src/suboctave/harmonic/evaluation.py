@@ -14,11 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.aft.channel import Channel, Group
+from suboctave.harmonic.aft.channel import Channel, Group, laws_along
 from suboctave.harmonic.aft.closed_form import add_spectra, places
-from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
-from suboctave.harmonic.aft.sampled import settled_samples
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import add_operator, apply_blocks, balance_residual, block_diagonal, sparse, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, by_rows, spectrum_to_real
@@ -77,9 +75,8 @@ class HarmonicBalance(Equations):
         state = self.at(x, omega, values)
         samples: list[int | None] = [None] * len(self.samples)
         for channel in state.channels:
-            for member, law in channel.members():
-                own = law.settled_samples() if isinstance(law, GeneralLaw) else settled_samples(channel.along, member)
-                samples[member.number] = own
+            for law, member in channel.members():
+                samples[member.number] = law.settled_samples(member)
         return self.with_samples(tuple(samples))
 
 
@@ -147,7 +144,7 @@ class BalanceState:
             Along(self.motions[g : g + 1], self.rate, self.basis.nu, group.moving, balance.top)
             for g, group in enumerate(balance.groups)
         ]
-        return [(along, laws.along(along)) for along, laws in zip(alongs, self.laws.groups, strict=True)]
+        return [(along, laws_along(along, members)) for along, members in zip(alongs, self.laws.groups, strict=True)]
 
     @lazy
     def channels(self) -> list[Channel]:
@@ -165,7 +162,7 @@ class BalanceState:
         for group in self.balance.own:
             along = Along(by_rows(group.inputs @ self.x.T), self.rate, self.basis.nu, group.moving, self.balance.top)
             members = tuple([self.laws.members[i] for i in group.members])
-            channels.append(Channel(group, along, [GeneralLaw(along, members)]))
+            channels.append(Channel(group, along, laws_along(along, members)))
         return channels
 
     def local(self, index: int) -> LocalMotion:
@@ -181,13 +178,13 @@ class BalanceState:
         """
         balance, packed, motions = self.balance, self.packed, self.motions
         table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
-        at = places(self.basis.harmonics, balance.top, packed.polynomial.shape[1] - 1)
+        at = places(self.basis.harmonics, balance.top, max(0, packed.polynomial.shape[1] - 1))
         if balance.groups:
             add_spectra(motions, packed.known, *at, table)
-        if not packed.closed_form:
+        if not packed.whole:
             for g, (along, laws) in enumerate(self._along):
                 for law in laws:
-                    if not law.in_closed_form:
+                    if not law.whole:
                         law.add_spectra(table[: 1 + along.size, g])
         for c, channel in enumerate(self.own_channels, len(balance.groups)):
             table[0, c] = channel.spectra[0]

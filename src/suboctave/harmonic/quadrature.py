@@ -75,9 +75,11 @@ def search_grid(high: int) -> Nodes:
     return uniform_nodes(8 * high + 8)
 
 
-def even(count: int) -> int:
-    """A number of samples, at least `count`, of a few fixed sizes so that tables are shared."""
-    return 8 * math.ceil(count / 8)
+def polynomial_nodes(highest: int, top: int) -> Nodes:
+    """Instants, no harmonic of which up to `highest` aliases onto those up to `top`; of a few numbers, so that tables
+    are shared.
+    """
+    return uniform_nodes(8 * math.ceil((highest + top + 1) / 8))
 
 
 def graded_nodes(motion: ComplexArray, points: Array, widths: Array, top: int) -> Nodes:

@@ -9,16 +9,19 @@ or time has its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
+from suboctave.harmonic.aft.general import GeneralLaw
+from suboctave.harmonic.aft.law import Along, LawAlong, Member, Second, Third
+from suboctave.harmonic.aft.pieces import Pieces
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
+from suboctave.model.elements.smoothness import PiecewiseLinear
 
-__all__ = ["Channel", "Group"]
+__all__ = ["Channel", "Group", "laws_along"]
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
 
@@ -39,6 +42,14 @@ class Group:
     inputs: Array
     members: tuple[int, ...]
     moving: bool
+
+
+def laws_along(along: Along, members: Iterable[Member]) -> list[LawAlong]:
+    """The laws of elements along a motion, those that are integrated alike together."""
+    alike: dict[tuple[type, bool], list[Member]] = {}
+    for member in members:
+        alike.setdefault((type(member.kind), member.element.depends_on_velocity), []).append(member)
+    return [(Pieces if kind is PiecewiseLinear else GeneralLaw)(along, own) for (kind, _), own in alike.items()]
 
 
 class Channel:
@@ -75,37 +86,35 @@ class Channel:
     @lazy
     def second(self) -> list[Second]:
         """Second derivatives."""
-        return [part for law in self.laws for part in law.second() if len(part.zr)]
+        parts = [part for law in self.laws for part in law.second() if len(part.zr)]
+        return [part._replace(weights=self._widened(part.weights, 2)) for part in parts]
 
     @lazy
     def third(self) -> list[Third]:
         """Third derivatives."""
-        return [part for law in self.laws for part in law.third() if len(part.zr)]
+        parts = [part for law in self.laws for part in law.third() if len(part.zr)]
+        return [
+            Third(zr, zi, self._widened(weights, 3), None if slopes is None else self._widened(slopes, 3))
+            for zr, zi, weights, slopes in parts
+        ]
+
+    def _widened(self, weights: Array, order: int) -> Array:
+        """Weights (Q', .., N) of a law that may not read the velocity, among all entries of q, (Q, .., N)."""
+        read, size = len(weights), self.along.size
+        return weights if read == size else np.pad(weights, [(0, size - read)] * order + [(0, 0)])
 
     def change(self, rates: Mapping[int, Array]) -> ComplexArray:
         """What changes of elements' coefficients, `rates` (nc,) by element, do to f and f_q, (1 + Q, top + 1)."""
         out = np.zeros((1 + self.along.size, self.along.top + 1), dtype=complex)
         for law in self.laws:
-            law.add_change(dict(rates), out)
+            law.add_change(rates, out)
         return out
 
-    def members(self) -> Iterator[tuple[Member, LawAlong]]:
+    def members(self) -> list[tuple[LawAlong, Member]]:
         """Every element with the law that it is part of."""
-        for law in self.laws:
-            for member in law.members:
-                yield member, law
-
-    def coefficient_spectra(self, member: Member, law: LawAlong) -> CoefficientSpectra:
-        """Derivatives by the coefficients of one element; kept."""
-        if member.number not in self._by_coefficients:
-            self._by_coefficients[member.number] = law.coefficient_spectra(member)
-        return self._by_coefficients[member.number]
-
-    @lazy
-    def _by_coefficients(self) -> dict[int, CoefficientSpectra]:
-        return {}
+        return [(law, member) for law in self.laws for member in law.members]
 
     def reaching(self, top: int) -> Channel:
         """The same with Fourier coefficients up to `top`."""
         along = self.along.reaching(top)
-        return Channel(self.group, along, [law.reaching(along, law.members) for law in self.laws])
+        return Channel(self.group, along, laws_along(along, [member for _, member in self.members()]))

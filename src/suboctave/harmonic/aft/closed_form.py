@@ -16,24 +16,16 @@ from functools import lru_cache
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.harmonic.aft.law import Along
-from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import Nodes, even, rule_tables, search_grid, sharp_nodes, uniform_nodes
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.quadrature import polynomial_nodes, rule_tables, search_grid, sharp_nodes
 from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, spectra
 
-__all__ = ["NONE", "NO_LINE", "NO_ROWS", "add_law", "add_spectra", "add_step", "add_values", "places"]
-
-#: no coefficients of polynomials, no pieces or steps, no constant and slope
-NONE, NO_ROWS, NO_LINE = np.zeros(0), np.zeros((0, 3)), np.zeros(2)
+#: no pieces or steps
+NO_ROWS = np.zeros((0, 3))
 _LOW, _HIGH = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0
 _P0, _P1, _P2, _P3 = -0.3333333333333333, 0.1999999999999552, -0.14285714284666542, 0.11111111015256361
 _P4, _P5, _P6, _P7 = -0.09090904578123903, 0.07692183190826087, -0.06664511447381948, 0.0585814891280221
 _P8, _P9, _P10 = -0.0508544973794026, 0.03923165829558719, -0.01917688711906226
-
-
-def polynomial_nodes(degree: int, high: int, top: int) -> Nodes:
-    """Instants, none of whose harmonics up to `degree` times `high` alias onto those up to `top`."""
-    return uniform_nodes(even(degree * high + top + 1))
 
 
 @lru_cache(maxsize=64)
@@ -41,22 +33,8 @@ def places(high: int, top: int, degree: int) -> tuple[tuple[Array, ...], tuple[A
     """Where laws are looked at, as `add_spectra` wants it, for motions of harmonics up to `high`, Fourier coefficients
     up to `top`, polynomials of that degree.
     """
-    grid, nodes = search_grid(high), polynomial_nodes(max(degree, 0), high, top)
+    grid, nodes = search_grid(high), polynomial_nodes(degree * high, top)
     return (grid.zr, grid.zi), (nodes.zr, nodes.zi, nodes.weights), rule_tables()
-
-
-def add_law(
-    along: Along,
-    out: ComplexArray,
-    pieces: Array = NO_ROWS,
-    polynomial: Array = NONE,
-    steps: Array = NO_ROWS,
-    line: Array = NO_LINE,
-) -> None:
-    """Add the Fourier coefficients of laws of one displacement and of their slope to `out` (>= 2, top + 1)."""
-    ends = np.array((0, len(pieces))), np.array((0, len(steps)))
-    laws = pieces, ends[0], polynomial[None], steps, ends[1], line[None]
-    add_spectra(along.motions[:1], laws, *places(along.high, along.top, len(polynomial) - 1), out[:, None])
 
 
 @kernel()

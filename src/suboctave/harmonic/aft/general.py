@@ -1,4 +1,4 @@
-"""Laws of several inputs, of time, with corners, or sharp in velocity: the general case.
+"""Laws that are asked at nodes: of several inputs, of time, with corners, sharp, smooth: all but piecewise-linear ones.
 
 A coupled element acts along d_out with `f(q, theta)` (`model.elements.coupled`); an element with one input is the case
 d_1 = d_out. Time is `theta = nu tau`: at fixed coefficients it does not change with omega. A force with corners has
@@ -17,13 +17,13 @@ with `eta.a = sum_s eta_s a_s`.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
-from suboctave.harmonic.aft.sampled import relative_change
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import (
     FEWEST,
@@ -32,14 +32,14 @@ from suboctave.harmonic.quadrature import (
     SETTLED,
     Nodes,
     between_corners,
-    even,
     graded_nodes,
+    polynomial_nodes,
     search_grid,
     uniform_nodes,
 )
 from suboctave.harmonic.trigonometric import crossings, motion, spectra
 from suboctave.lazy import lazy
-from suboctave.model.elements.coupled import as_coupled
+from suboctave.model.elements.coupled import as_coupled, changed_law
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     CornerSampling,
@@ -79,47 +79,60 @@ class _Comb(NamedTuple):
 
 class Smoothness(NamedTuple):
     """How smooth a law is: corners in displacement and velocity, and whether powers of a half begin there; places and
-    widths of its singularities in velocity; its degree, if it is a polynomial, or 0; whether it is smooth only between
-    corners; whether all that is unknown.
+    widths of its singularities in velocity; whether it is sharp at all; its degree, if it is a polynomial, or 0;
+    whether it is smooth only between corners; whether all that is unknown.
     """
 
     points: tuple[float, ...] = ()
     velocities: tuple[float, ...] = ()
     rough: bool = False
-    sharp: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    sharp_velocities: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    sharp: bool = False
     degree: int = 0
     cornered: bool = False
     unknown: bool = False
 
 
 class GeneralLaw(LawAlong):
-    """One element along a motion."""
+    """Elements along a motion whose laws are of one smoothness class; those with corners, and all that read several
+    displacements, time or a velocity in which they are sharp, come alone.
+    """
 
-    def __init__(self, along: Along, members: tuple[Member, ...]) -> None:
+    def __init__(self, along: Along, members: Sequence[Member]) -> None:
         super().__init__(along, members)
-        (member,) = members
-        self.number, self.element, self.kind, self.c, self.samples = member
-        self.law = as_coupled(self.element)
+        _, self.element, self.kind, self.c, _ = members[0]
+        self.laws = [as_coupled(member.element) for member in members]
+        self.law = self.laws[0]
         self.count = len(along.motions)
+        self.moving = self.element.depends_on_velocity
         self.harmonic = self.law.time_harmonic
 
     @property
+    def samples(self) -> int:
+        """Number of samples of laws of unknown smoothness."""
+        return max(member.samples or FEWEST for member in self.members)
+
+    @property
     def smoothness(self) -> Smoothness:
-        """How smooth the law is, in numbers."""
+        """How smooth the laws are, in numbers."""
         kind = self.kind
         if isinstance(kind, CornerSampling):
             return Smoothness(kind.points, kind.velocities, kind.rough, cornered=True)
         if isinstance(kind, SharpVelocitySampling):
-            return Smoothness(sharp=(kind.velocities, kind.widths))
+            return Smoothness(sharp_velocities=(kind.velocities, kind.widths), sharp=True)
         if isinstance(kind, PolynomialSampling):
-            return Smoothness(degree=kind.degree)
-        return Smoothness(unknown=isinstance(kind, AdaptiveSampling))
+            return Smoothness(degree=self._degree)
+        return Smoothness(sharp=isinstance(kind, SharpSampling), unknown=isinstance(kind, AdaptiveSampling))
+
+    @property
+    def _degree(self) -> int:
+        return max([m.kind.degree for m in self.members if isinstance(m.kind, PolynomialSampling)], default=0)
 
     def state_at(self, zr: Array, zi: Array) -> tuple[Array, Array]:
-        """q (Q, N) and theta (N,) at instants."""
+        """q (Q', N) and theta (N,) at instants."""
         along = self.along
         values = np.array([motion(one, zr, zi) for one in along.motions])
-        q = np.concatenate((values[:, 0], along.rate * values[:, 1])) if along.moving else values[:, 0]
+        q = np.concatenate((values[:, 0], along.rate * values[:, 1])) if self.moving else values[:, 0]
         theta = along.nu * np.arctan2(zi, zr) if self.harmonic else np.zeros_like(zr)
         return np.ascontiguousarray(q), theta
 
@@ -129,15 +142,19 @@ class GeneralLaw(LawAlong):
         kind, along = self.kind, self.along
         varying = self.harmonic * along.nu
         if isinstance(kind, PolynomialSampling):
-            return uniform_nodes(even(kind.degree * along.high + varying + along.top + 1))
+            return polynomial_nodes(self._degree * along.high + varying, along.top)
         if isinstance(kind, SharpVelocitySampling):
             if not self._velocity.any():
-                return uniform_nodes(even(2 * along.top + 2))
+                return polynomial_nodes(along.top + 1, along.top)
             return graded_nodes(self._velocity, np.array(kind.velocities), np.array(kind.widths), along.top)
         if isinstance(kind, SharpSampling):
-            return graded_nodes(along.motion, np.array(kind.points), np.array(kind.widths), along.top)
+            sharp = [m.kind for m in self.members if isinstance(m.kind, SharpSampling)]
+            points, widths = (
+                np.concatenate(parts) for parts in zip(*[(k.points, k.widths) for k in sharp], strict=True)
+            )
+            return graded_nodes(along.motion, points, widths, along.top)
         fewest = 1 << math.ceil(math.log2(2 * along.top + 2 + 2 * varying))
-        count = max(self.samples or FEWEST, fewest)
+        count = max(self.samples, fewest)
         corners = np.unique(np.concatenate([_NO_INSTANTS] + [corner.at for corner in self.corners]))
         if not len(corners):
             return uniform_nodes(count)
@@ -171,7 +188,7 @@ class GeneralLaw(LawAlong):
 
     @lazy
     def path(self) -> tuple[Array, Array]:
-        """q (Q, N) and theta (N,) at the nodes."""
+        """q (Q', N) and theta (N,) at the nodes."""
         return self.state_at(self.nodes.zr, self.nodes.zi)
 
     def project(self, values: Array) -> ComplexArray:
@@ -181,44 +198,74 @@ class GeneralLaw(LawAlong):
         coefficients: ComplexArray = spectra(flat, nodes.weights, nodes.zr, nodes.zi, top)
         return coefficients.reshape(np.shape(values)[:-1] + (top + 1,))
 
-    @lazy
-    def spectra(self) -> ComplexArray:
-        """Fourier coefficients of f and of f_q, (1 + Q, top + 1)."""
-        q, theta = self.path
-        f, f_q = self.law.tangent(q, theta, self.c)
-        if np.shape(f) != theta.shape or np.shape(f_q) != q.shape:
-            raise InputError(f"{self.element.label}: tangent must return arrays of shape {theta.shape} and {q.shape}")
-        rows = self.project(np.concatenate((f[None], f_q)))
-        if not np.isfinite(rows).all():
-            raise ConvergenceError(
-                f"{self.element.label} returned a force that is not finite (largest displacement "
-                f"{np.abs(q[: self.count]).max():.3g})"
-            )
-        return rows
+    def tangent(self, q: Array, theta: Array) -> tuple[Array, Array]:
+        """f (N,) and f_q (Q', N) at states."""
+        force, slopes = np.zeros_like(theta), np.zeros_like(q)
+        for law, member in zip(self.laws, self.members, strict=True):
+            f, f_q = law.tangent(q, theta, member.coefficients)
+            if np.shape(f) != theta.shape or np.shape(f_q) != q.shape:
+                label = member.element.label
+                raise InputError(f"{label}: tangent must return arrays of shape {theta.shape} and {q.shape}")
+            force += f
+            slopes += f_q
+        return force, slopes
+
+    def curvature(self, q: Array, theta: Array) -> Array:
+        """f_qq (Q', Q', N) at states, its regular part."""
+        total = np.zeros((len(q), *q.shape))
+        for law, member in zip(self.laws, self.members, strict=True):
+            whole, c = member.whole, member.coefficients
+            total += law.curvature(q, theta, c) if whole is None else whole.curvature(q[0], c)
+        return total
+
+    def third_derivative(self, q: Array, theta: Array) -> Array:
+        """f_qqq (Q', Q', Q', N) at states, its regular part."""
+        total = np.zeros((len(q), len(q), *q.shape))
+        for law, member in zip(self.laws, self.members, strict=True):
+            whole, c = member.whole, member.coefficients
+            total += law.third(q, theta, c) if whole is None else whole.third(q[0], c)
+        return total
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
-        out += self.spectra
+        f, f_q = self.tangent(*self.path)
+        out[: 1 + len(f_q)] += self.project(np.concatenate((f[None], f_q)))
 
-    def coefficient_spectra(self, member: Member) -> CoefficientSpectra:
-        """See `LawAlong.coefficient_spectra`."""
-        return self._coefficient_spectra
-
-    @lazy
-    def _coefficient_spectra(self) -> CoefficientSpectra:
-        q, theta = self.path
-        f_c, f_qc = self.law.coefficient_tangent(q, theta, self.c)
-        f_cc = self.law.coefficient_curvature(q, theta, self.c)
+    def by_coefficients(self, member: Member) -> CoefficientSpectra:
+        """See `LawAlong.by_coefficients`."""
+        law = as_coupled(member.element)
+        f_c, f_qc = law.coefficient_tangent(*self.path, member.coefficients)
+        f_cc = law.coefficient_curvature(*self.path, member.coefficients)
         derivatives = CoefficientSpectra(self.project(f_c), self.project(f_qc), self.project(f_cc))
-        rates = self.element.level_rates(self.c) if self._combs else _NO_INSTANTS
-        for comb in self._combs:
-            # a corner that moves with a coefficient takes its Dirac function along
-            ones = np.ones((1, len(comb.zr)))
-            spectrum = spectra(ones, comb.weights, comb.zr, comb.zi, self.along.top)[0]
-            by = rates[comb.corner.number]
-            derivatives.tangent[:, comb.corner.row] -= np.multiply.outer(by, spectrum)
+        for row, by, spectrum in self._moved_corners():
+            derivatives.tangent[:, row] -= np.multiply.outer(by, spectrum)
             derivatives.curvature[:] += np.multiply.outer(np.multiply.outer(by, by), spectrum)
         return derivatives
+
+    def add_change(self, rates: Mapping[int, Array], out: ComplexArray) -> None:
+        """See `LawAlong.add_change`."""
+        changed = [member for member in self.members if member.number in rates]
+        if not changed:
+            return
+        q, theta = self.path
+        total = np.zeros((1 + len(q), len(theta)))
+        for member in changed:
+            f, f_q = changed_law(member.element, q, theta, member.coefficients, rates[member.number])
+            total[0] += f
+            total[1:] += f_q
+        out[: len(total)] += self.project(total)
+        for row, by, spectrum in self._moved_corners():
+            out[1 + row] -= (rates[self.members[0].number] @ by) * spectrum
+
+    def _moved_corners(self) -> Iterator[tuple[int, Array, ComplexArray]]:
+        """Of every corner its row of q, how it moves with the coefficients, (nc,), and the spectrum (top + 1,) of its
+        Dirac function, which it takes along.
+        """
+        if self._combs:
+            rates = self.element.level_rates(self.c)
+            for corner, zr, zi, weights in self._combs:
+                spectrum = spectra(np.ones((1, len(zr))), weights, zr, zi, self.along.top)[0]
+                yield corner.row, rates[corner.number], spectrum
 
     @lazy
     def _combs(self) -> list[_Comb]:
@@ -244,7 +291,7 @@ class GeneralLaw(LawAlong):
         """Jump of `f_r` where row r of q passes a corner; q (Q, N), theta (N,) at the instants of passing."""
 
         def across(distance: float) -> Array:
-            above, below = (self.law.tangent(side, theta, self.c)[1] for side in self.beside(corner, q, distance))
+            above, below = (self.tangent(side, theta)[1] for side in self.beside(corner, q, distance))
             jump: Array = above[corner.row] - below[corner.row]
             return jump
 
@@ -266,9 +313,8 @@ class GeneralLaw(LawAlong):
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
-        nodes = self.nodes
-        q, theta = self.path
-        parts = [Second(nodes.zr, nodes.zi, nodes.weights * self.law.curvature(q, theta, self.c))]
+        nodes, q = self.nodes, self.path[0]
+        parts = [Second(nodes.zr, nodes.zi, nodes.weights * self.curvature(*self.path))]
         for comb in self._combs:
             weights = np.zeros((len(q), len(q), len(comb.zr)))
             weights[comb.corner.row, comb.corner.row] = comb.weights
@@ -278,9 +324,7 @@ class GeneralLaw(LawAlong):
     def third(self) -> list[Third]:
         """See `LawAlong.third`."""
         nodes = self.nodes
-        q, theta = self.path
-        weights = nodes.weights * np.asarray(self.law.third(q, theta, self.c))
-        parts = [Third(nodes.zr, nodes.zi, weights, None)]
+        parts = [Third(nodes.zr, nodes.zi, nodes.weights * self.third_derivative(*self.path), None)]
         for corner in self.corners:
             if len(corner.at):
                 parts.append(_at_corner(self, corner))
@@ -288,27 +332,37 @@ class GeneralLaw(LawAlong):
                     parts.append(_finite_part(self, corner))
         return parts
 
-    def settled_samples(self) -> int | None:
-        """Number of nodes with which force and tangent have settled; None where the smoothness decides.
+    def settled_samples(self, member: Member) -> int | None:
+        """See `LawAlong.settled_samples`.
 
         Raises
         ------
         ConvergenceError
             If even 32768 do not suffice.
         """
-        if not isinstance(self.kind, AdaptiveSampling | CornerSampling):
+        if not isinstance(member.kind, AdaptiveSampling | CornerSampling):
             return None
-        count = max(FEWEST, 1 << math.ceil(math.log2(2 * self.along.top + 2)))
+        along = self.along
+        count = max(FEWEST, 1 << math.ceil(math.log2(2 * along.top + 2)))
         previous: ComplexArray | None = None
         while count <= MOST:
-            current = GeneralLaw(self.along, (self.members[0]._replace(samples=count),)).spectra
-            if previous is not None and relative_change(previous, current) < SETTLED:
+            current = np.zeros((1 + along.size, along.top + 1), dtype=complex)
+            GeneralLaw(along, [member._replace(samples=count)]).add_spectra(current)
+            if previous is not None and _relative_change(previous, current) < SETTLED:
                 return count // 2
             previous, count = current, 2 * count
         raise ConvergenceError(
-            f"{self.element.label}: the force does not settle with {MOST} nodes per period: it is too sharp to be "
-            "sampled blindly. Tell where its law is sharp or has corners (sampling), or use an element that does"
+            f"{member.element.label}: the force does not settle with {MOST} samples per period: it is too sharp to be "
+            "sampled blindly. Tell where its law is sharp or has corners (sampling returning SharpSampling(points, "
+            "widths) or CornerSampling), write it as a text (Expression), whose corners are located, or use an exact "
+            "piecewise-linear element"
         )
+
+
+def _relative_change(a: ComplexArray, b: ComplexArray) -> float:
+    """Largest change of a row of spectra in units of its largest coefficient."""
+    size = np.maximum(np.abs(b).max(axis=1), np.finfo(float).tiny)
+    return float((np.abs(b - a).max(axis=1) / size).max())
 
 
 def _finite_part(law: GeneralLaw, corner: Corner) -> Third:
@@ -347,7 +401,7 @@ def _singularity(law: GeneralLaw, corner: Corner, side: float, q: Array, theta: 
     def third(distance: float) -> Array:
         there = q.copy()
         there[row] = corner.level + side * distance
-        return np.asarray(law.law.third(there, theta, law.c))[row, row, row]
+        return law.third_derivative(there, theta)[row, row, row]
 
     near, far = third(y), third(4.0 * y)
     with np.errstate(all="ignore"):
@@ -368,7 +422,7 @@ def _at_corner(law: GeneralLaw, corner: Corner) -> Third:
 
     def bend(distance: float) -> Array:
         """Jumps of f_rs."""
-        above, below = (law.law.curvature(side, theta, law.c)[row] for side in law.beside(corner, q, distance))
+        above, below = (law.curvature(side, theta)[row] for side in law.beside(corner, q, distance))
         jumps: Array = above - below
         return jumps
 
@@ -415,7 +469,7 @@ def _without_powers(values: list[Array], row: int) -> Array:
 def _rates_of_state(law: GeneralLaw, zr: Array, zi: Array) -> tuple[Array, Array]:
     """First and second derivatives by tau of q at instants, (Q, N) each."""
     first, second = [], []
-    for order in (0, 1) if law.along.moving else (0,):
+    for order in (0, 1) if law.moving else (0,):
         for one in law.along.motions:
             k = 1j * np.arange(len(one))
             series = np.ascontiguousarray(k * one * (law.along.rate * k) ** order)

@@ -1,7 +1,8 @@
 """The contract of a law along a motion.
 
-A law acts along one direction d_out and reads q, the displacements `u_i = d_i . x` along its inputs and, if it depends
-on velocity, their rates v_i: `q = (u_1, .., u_m, v_1, .., v_m)`, Q entries. Along a periodic motion it gives
+A law acts along one direction d_out and reads q, the displacements `u_i = d_i . x` along its inputs
+and, if it depends on velocity, their rates v_i: `q = (u_1, .., u_m, v_1, .., v_m)`, Q entries. Along a periodic motion
+it gives
 
 - the Fourier coefficients `g_q = mean(g exp(-i q tau))`, q = 0 .. top, of f and of f_q: they serve every basis
   (integer, half-odd, shifted by kappa), since Galerkin matrices depend on differences and sums of frequencies only;
@@ -23,20 +24,19 @@ besides Dirac functions with the jumps of f_rs. A piecewise-linear law has nothi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
-
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.elements.base import BaseElement
-from suboctave.model.elements.smoothness import Sampling
+from suboctave.model.elements.smoothness import Sampling, WholeLaw
 
 __all__ = ["Along", "CoefficientSpectra", "LawAlong", "LocalMotion", "Member", "Second", "Third"]
 
 
 class Member(NamedTuple):
-    """An element among those of a law: its number in the system, itself, the smoothness of its law, its coefficients,
+    """An element at parameter values: its number in the system, itself, the smoothness of its law, its coefficients,
     and its frozen number of samples, None where the smoothness decides.
     """
 
@@ -45,6 +45,11 @@ class Member(NamedTuple):
     kind: Sampling
     coefficients: Array
     samples: int | None
+
+    @property
+    def whole(self) -> WholeLaw | None:
+        """The law, where its smoothness class is all of it."""
+        return self.kind if isinstance(self.kind, WholeLaw) and self.kind.whole else None
 
 
 @dataclass(eq=False)
@@ -87,14 +92,6 @@ class Along:
         """The same with Fourier coefficients up to `top`."""
         return replace(self, top=top)
 
-    def in_displacement(self, weights: Array, order: int) -> Array:
-        """Weights (N,) of the derivative of that order by u, as W (Q, .., Q, N), of a law of u alone."""
-        if self.size == 1:
-            return weights.reshape((1,) * order + weights.shape)
-        out = np.zeros((self.size,) * order + weights.shape)
-        out[(0,) * order] = weights
-        return out
-
 
 class Second(NamedTuple):
     """Second derivatives as weights W (Q, Q, N) at instants `z = exp(i tau)`."""
@@ -114,7 +111,7 @@ class Third(NamedTuple):
 
 
 class CoefficientSpectra(NamedTuple):
-    """Fourier coefficients of `f_c` (nc, top + 1), `f_qc` (nc, Q, top + 1) and `f_cc` (nc, nc, top + 1)."""
+    """Fourier coefficients of `f_c` (nc, top + 1), `f_qc` (nc, Q', top + 1) and `f_cc` (nc, nc, top + 1)."""
 
     force: ComplexArray
     tangent: ComplexArray
@@ -139,14 +136,19 @@ class LocalMotion(NamedTuple):
 
 
 class LawAlong(ABC):
-    """A law, or the sum of laws that are integrated together, along a motion; a new kind of law is a new subclass."""
+    """A law, or the sum of laws of one kind, along a motion; a new kind of law is a new subclass.
 
-    #: whether `closed_form` has its spectra
-    in_closed_form = False
+    Of q it reads the first entries, Q' in number: the displacements alone, if it does not depend on velocity.
+    """
 
-    def __init__(self, along: Along, members: tuple[Member, ...]) -> None:
+    def __init__(self, along: Along, members: Sequence[Member]) -> None:
         self.along = along
         self.members = members
+
+    @property
+    def whole(self) -> bool:
+        """Whether the smoothness classes of its elements are all of their laws."""
+        return all(member.whole is not None for member in self.members)
 
     @abstractmethod
     def add_spectra(self, out: ComplexArray) -> None:
@@ -154,27 +156,24 @@ class LawAlong(ABC):
 
     @abstractmethod
     def second(self) -> list[Second]:
-        """Second derivatives."""
+        """Second derivatives, (Q', Q', N)."""
 
     @abstractmethod
     def third(self) -> list[Third]:
-        """Third derivatives."""
+        """Third derivatives, (Q', Q', Q', N)."""
 
     @abstractmethod
-    def coefficient_spectra(self, member: Member) -> CoefficientSpectra:
-        """Derivatives by the coefficients of one element."""
+    def by_coefficients(self, member: Member) -> CoefficientSpectra:
+        """Derivatives by the coefficients of one of its elements."""
 
-    def add_change(self, rates: dict[int, Array], out: ComplexArray) -> None:
+    @abstractmethod
+    def add_change(self, rates: Mapping[int, Array], out: ComplexArray) -> None:
         """Add what changes of elements' coefficients, `rates` (nc,) by element, do to f and f_q to `out` (1 + Q,
         top + 1).
         """
-        for member in self.members:
-            rate = rates.get(member.number)
-            if rate is not None:
-                by = self.coefficient_spectra(member)
-                out[0] += rate @ by.force
-                out[1:] += np.einsum("c,cqk->qk", rate, by.tangent)
 
-    def reaching(self, along: Along, members: tuple[Member, ...]) -> LawAlong:
-        """The same law along a motion with other Fourier coefficients."""
-        return type(self)(along, members)
+    def settled_samples(self, member: Member) -> int | None:
+        """Number of samples with which force and tangent of one of its elements have settled; None where the smoothness
+        decides.
+        """
+        return None

@@ -9,62 +9,57 @@ rates k', b' of stiffness and gap the force changes by `(k' (u - b) - k b') chi`
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from suboctave.harmonic.aft.closed_form import add_law, contact_spectrum, product_spectrum
-from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
+from suboctave.harmonic.aft.closed_form import add_spectra, contact_spectrum, places, product_spectrum
+from suboctave.harmonic.aft.law import CoefficientSpectra, LawAlong, Member, Second, Third
+from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.trigonometric import crossings_of, motion, spectra
 from suboctave.lazy import lazy
-from suboctave.model.elements.smoothness import PiecewiseLinear
+from suboctave.model.elements.smoothness import Piece, PiecewiseLinear
 
 __all__ = ["Pieces"]
 
 
 class Pieces(LawAlong):
-    """All pieces along one direction: stiffness, gap, side, (P, 3)."""
-
-    in_closed_form = True
-
-    def __init__(self, along: Along, members: tuple[Member, ...], pieces: Array) -> None:
-        super().__init__(along, members)
-        self.pieces = pieces
-
-    def reaching(self, along: Along, members: tuple[Member, ...]) -> Pieces:
-        """See `LawAlong.reaching`."""
-        return Pieces(along, members, self.pieces)
+    """All pieces along one direction."""
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
-        add_law(self.along, out, pieces=self.pieces)
+        along, known = self.along, PackedLaws([self.members]).known
+        add_spectra(along.motions, known, *places(along.high, along.top, 0), out[:, None])
+
+    @lazy
+    def _values(self) -> Array:
+        """See `crossings_of`."""
+        grid = search_grid(self.along.high)
+        return motion(self.along.motion, grid.zr, grid.zi)
 
     @lazy
     def _corners(self) -> Array:
-        grid = search_grid(self.along.high)
-        return corner_weights(self.along.motion, self.pieces, motion(self.along.motion, grid.zr, grid.zi))
+        return corner_weights(self.along.motion, PackedLaws([self.members]).pieces, self._values)
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
         zr, zi, second, _, _ = self._corners
-        return [Second(zr, zi, self.along.in_displacement(second, 2))]
+        return [Second(zr, zi, second[None, None])]
 
     def third(self) -> list[Third]:
         """See `LawAlong.third`."""
         zr, zi, _, third, slope = self._corners
-        return [Third(zr, zi, self.along.in_displacement(third, 3), self.along.in_displacement(slope, 3))]
+        return [Third(zr, zi, third[None, None, None], slope[None, None, None])]
 
-    def coefficient_spectra(self, member: Member) -> CoefficientSpectra:
-        """See `LawAlong.coefficient_spectra`."""
-        along, c, count = self.along, member.coefficients, len(member.coefficients)
-        assert isinstance(member.kind, PiecewiseLinear)
-        grid = search_grid(along.high)
-        values = motion(along.motion, grid.zr, grid.zi)
+    def by_coefficients(self, member: Member) -> CoefficientSpectra:
+        """See `LawAlong.by_coefficients`."""
+        along, c, count, values = self.along, member.coefficients, len(member.coefficients), self._values
         force = np.zeros((count, along.top + 1), dtype=complex)
-        tangent = np.zeros((count, along.size, along.top + 1), dtype=complex)
+        tangent = np.zeros((count, 1, along.top + 1), dtype=complex)
         second = np.zeros((count, count, along.top + 1), dtype=complex)
-        for piece in member.kind.pieces:
+        for piece in _pieces(member):
             i, j, gap = piece.stiffness, piece.gap, float(c[piece.gap])
             tau, above = crossings_of(along.motion, gap, values)
             whole = contact_spectrum(tau, above, piece.side, along.top + along.high)
@@ -80,37 +75,28 @@ class Pieces(LawAlong):
             second[j, j] += comb
         return CoefficientSpectra(force, tangent, second)
 
-    def add_change(self, rates: dict[int, Array], out: ComplexArray) -> None:
+    def add_change(self, rates: Mapping[int, Array], out: ComplexArray) -> None:
         """See `LawAlong.add_change`."""
-        rows = []
+        c, high, top = self.along.motion, self.along.high, self.along.top
         for member in self.members:
-            if member.number in rates:
-                assert isinstance(member.kind, PiecewiseLinear)
-                own, by = member.coefficients.tolist(), rates[member.number].tolist()
-                rows += [(own[p.stiffness], own[p.gap], p.side, by[p.stiffness], by[p.gap]) for p in member.kind.pieces]
-        if rows:
-            grid = search_grid(self.along.high)
-            values = motion(self.along.motion, grid.zr, grid.zi)
-            add_changed_pieces(self.along.motion, np.array(rows), values, out[0], out[1])
+            if member.number not in rates:
+                continue
+            own, by = member.coefficients.tolist(), rates[member.number].tolist()
+            for piece in _pieces(member):
+                gap, by_stiffness, by_gap = own[piece.gap], by[piece.stiffness], by[piece.gap]
+                crossed, above = crossings_of(c, gap, self._values)
+                chi = contact_spectrum(crossed, above, piece.side, top + high)
+                force = by_gap * own[piece.stiffness]
+                out[0] += by_stiffness * product_spectrum(c, gap, chi, top) - force * chi[: top + 1]
+                out[1] += by_stiffness * chi[: top + 1]
+                if by_gap != 0.0:
+                    weights = piece.side * force / (2.0 * math.pi * np.abs(_rates(c, crossed)[0]))
+                    out[1] -= weights @ np.exp(-1j * np.multiply.outer(crossed, np.arange(top + 1)))
 
 
-def add_changed_pieces(
-    c: ComplexArray, pieces: Array, values: Array, force: ComplexArray, stiffness: ComplexArray
-) -> None:
-    """Add what changes of piecewise-linear laws do to the spectra of force and stiffness (top + 1,), in place.
-
-    c: complex coefficients of the displacement (H + 1,); pieces: stiffness, gap, side, rates of stiffness and gap
-    (P, 5); values: see `crossings_of`.
-    """
-    top, high = len(force) - 1, len(c) - 1
-    for k, gap, side, by_stiffness, by_gap in pieces.tolist():
-        crossed, above = crossings_of(c, gap, values)
-        chi = contact_spectrum(crossed, above, side, top + high)
-        force += by_stiffness * product_spectrum(c, gap, chi, top) - k * by_gap * chi[: top + 1]
-        stiffness += by_stiffness * chi[: top + 1]
-        if by_gap != 0.0:
-            weights = side * k * by_gap / (2.0 * math.pi * np.abs(_rates(c, crossed)[0]))
-            stiffness -= weights @ np.exp(-1j * np.multiply.outer(crossed, np.arange(top + 1)))
+def _pieces(member: Member) -> tuple[Piece, ...]:
+    assert isinstance(member.kind, PiecewiseLinear)
+    return member.kind.pieces
 
 
 def corner_weights(c: ComplexArray, pieces: Array, values: Array) -> Array:

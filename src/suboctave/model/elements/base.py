@@ -217,12 +217,6 @@ class Element(BaseElement):
         f_c, f_uc, f_vc = self.coefficient_tangent(u, v, c)
         return rates @ f_c, rates @ f_uc, None if f_vc is None else rates @ f_vc
 
-    def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
-        """Rates of the numbers of a law that is a sum of arctan steps, in their places, along a change of the
-        coefficients, `rates` (nc,); None where they are not known.
-        """
-        return None
-
     @abstractmethod
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""

@@ -99,15 +99,20 @@ class _OneInput:
         return q[0], q[1] if self._moving else np.zeros_like(q[0])
 
     def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
-        f, *rest = self.element.tangent(*self._state(q), c)
-        return f, np.array(rest[: 1 + self._moving])
+        f, f_u, f_v = self.element.tangent(*self._state(q), c)
+        if f_v is not None and not self._moving:
+            raise InputError(
+                f"{self.element.label} returns f_v, a derivative by velocity: its class must say depends_on_velocity = "
+                "True"
+            )
+        return f, np.array([f_u, np.zeros_like(f_u) if f_v is None else f_v] if self._moving else [f_u])
 
     def curvature(self, q: Array, theta: Array, c: Array) -> Array:
-        f_uu, f_uv, f_vv = self.element.curvature(*self._state(q), c)
+        f_uu, f_uv, f_vv = _rows(q[0], self.element.curvature(*self._state(q), c))
         return np.array([[f_uu, f_uv], [f_uv, f_vv]]) if self._moving else np.array([[f_uu]])
 
     def third(self, q: Array, theta: Array, c: Array) -> Array:
-        f_uuu, f_uuv, f_uvv, f_vvv = self.element.third(*self._state(q), c)
+        f_uuu, f_uuv, f_uvv, f_vvv = _rows(q[0], self.element.third(*self._state(q), c))
         if not self._moving:
             return np.array([[[f_uuu]]])
         return np.array([[[f_uuu, f_uuv], [f_uuv, f_uvv]], [[f_uuv, f_uvv], [f_uvv, f_vvv]]])
@@ -118,6 +123,11 @@ class _OneInput:
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         return self.element.coefficient_curvature(*self._state(q), c)
+
+
+def _rows(u: Array, parts: Sequence[Array | None]) -> list[Array]:
+    """Derivatives as arrays like u, those that are left out as zeros."""
+    return [np.broadcast_to(0.0 if part is None else part, u.shape) for part in parts]
 
 
 def reads(element: BaseElement, n: int) -> Array:
@@ -142,6 +152,16 @@ def _of_law(name: str) -> Any:
         return getattr(self._law, name)(q, theta, c)
 
     return method
+
+
+def changed_law(element: BaseElement, q: Array, theta: Array, c: Array, rates: Array) -> tuple[Array, Array]:
+    """What a change of the coefficients, `rates` (nc,), does to f and f_q, (N,) and (Q, N)."""
+    if isinstance(element, Element):
+        moving = element.depends_on_velocity
+        f, f_u, f_v = element.coefficient_change(q[0], q[1] if moving else np.zeros_like(q[0]), c, rates)
+        return f, np.array([f_u, f_v] if moving else [f_u])
+    f_c, f_qc = as_coupled(element).coefficient_tangent(q, theta, c)
+    return rates @ f_c, np.tensordot(rates, f_qc, 1)
 
 
 class Expression(CoupledElement):

@@ -124,16 +124,19 @@ class _Stops(DeclaredElement):
             return _arctan_steps(self.sides, tuple(c.tolist()))
         return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
 
-    def smoothness_change(self, c: Array, rates: Array) -> SharpSampling | None:
+    def coefficient_change(self, u: Array, v: Array, c: Array, rates: Array) -> tuple[Array, Array, None]:
+        """See `Element.coefficient_change`: rounded steps change by the rates of their places, widths and sizes."""
         if not self.regularised:
-            return None
+            f_c, f_uc, _ = self.coefficient_tangent(u, v, c)
+            return rates @ f_c, rates @ f_uc, None
         (k, *gaps, s), (by_k, *by_gaps, by_s) = c.tolist(), rates.tolist()
         constant = 0.0
         for side, gap, by_gap in zip(self.sides, gaps, by_gaps, strict=True):
             value, slope, by_sharpness = _constant(side, gap, s)
             constant += by_k * value + k * (slope * by_gap + by_sharpness * by_s)
         widths, steps = (-by_s / s**2,) * len(gaps), tuple(by_k * side for side in self.sides)
-        return SharpSampling(tuple(by_gaps), widths, constant, 0.5 * by_k * len(gaps), steps)
+        by = SharpSampling(tuple(by_gaps), widths, constant, 0.5 * by_k * len(gaps), steps)
+        return *_arctan_steps(self.sides, (k, *gaps, s)).changed(u, by), None
 
     def _written(self) -> tuple[Law, list[int], list[int]]:
         """The law as a text; where its coefficients, in alphabetical order, stand among those here, and conversely."""
