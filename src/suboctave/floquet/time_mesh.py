@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.compiled import kernel
 from suboctave.harmonic.aft.closed_form import add_step, add_values
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.trigonometric import crossings_of, displacement, jet
+from suboctave.harmonic.trigonometric import crossings_of, displacement, extrema, jet
 
 #: nodes per panel, both ends among them: quadrature of order 12
 ORDER = 7
@@ -76,49 +76,26 @@ def events_along(c, pieces, owner, passages, zr, zi):
     c (G, H + 1): the motion along all directions; pieces (Q, 3), owner (Q,): stiffness, gap, side of each, and its
     direction; passages (2, K): instants and depths; zr, zi: a uniform grid on the circle.
     """
-    n = zr.shape[0]
-    h = 2.0 * math.pi / n
-    rows = np.empty((3 * n * pieces.shape[0] + passages.shape[1], 6))
+    rows = np.empty((2 * zr.shape[0] * pieces.shape[0] + passages.shape[1], 6))
     count = 0
-    last = -1
-    size = 0.0
-    values = np.empty((2, n))
+    turns, size = np.empty((3, 0)), 0.0
     for q in range(pieces.shape[0]):
-        g = owner[q]
-        gap = pieces[q, 1]
-        if g != last:
-            displacement(c[g], zr, zi, values)
-            low = high = values[0, 0]
-            for j in range(n):
-                low, high = min(low, values[0, j]), max(high, values[0, j])
-            size = high - low
-            last = g
-        at, _above = crossings_of(c[g], gap, values)
+        g, gap = owner[q], pieces[q, 1]
+        if q == 0 or g != owner[q - 1]:
+            turns = extrema(c[g], zr, zi)
+            size = turns[1].max() - turns[1].min() if turns.shape[1] > 0 else 0.0
+        at, _above = crossings_of(c[g], gap, turns)
         for tau in at:
             _x, d, s = jet(c[g], math.cos(tau), math.sin(tau))
             rows[count, 0], rows[count, 1], rows[count, 2] = tau, np.inf, d
             rows[count, 3], rows[count, 4], rows[count, 5] = s, 0.0, q
             count += 1
-        for j in range(n):
-            follow = j + 1 if j + 1 < n else 0
-            f0 = values[0, j] - gap
-            f1 = values[0, follow] - gap
-            d0 = values[1, j]
-            d1 = values[1, follow]
+        for j in range(turns.shape[1]):
             # an extremum towards the gap that falls short of it
-            if d0 * d1 >= 0.0 or (f0 > 0.0) != (d0 < 0.0) or (f0 > 0.0) != (f1 > 0.0):
-                continue
-            if min(abs(f0), abs(f1)) > h * (abs(d0) + abs(d1)) + _MISS * size:
-                continue
-            tau = j * h + h * d0 / (d0 - d1)
-            x, d, s = jet(c[g], math.cos(tau), math.sin(tau))
-            for _ in range(3):
-                if s != 0.0 and abs(d / s) < h:
-                    tau -= d / s
-                    x, d, s = jet(c[g], math.cos(tau), math.sin(tau))
-            if abs(x - gap) < _MISS * size and (x > gap) == (f0 > 0.0) and s != 0.0:
-                rows[count, 0], rows[count, 1], rows[count, 2] = tau, np.inf, 0.0
-                rows[count, 3], rows[count, 4], rows[count, 5] = s, x - gap, q
+            miss, s = turns[1, j] - gap, turns[2, j]
+            if abs(miss) < _MISS * size and (miss > 0.0) == (s > 0.0) and s != 0.0:
+                rows[count, 0], rows[count, 1], rows[count, 2] = turns[0, j], np.inf, 0.0
+                rows[count, 3], rows[count, 4], rows[count, 5] = s, miss, q
                 count += 1
     for i in range(passages.shape[1]):
         rows[count, 0], rows[count, 1], rows[count, 5] = passages[0, i], passages[1, i], -1.0

@@ -139,132 +139,6 @@ def jet(c, zr, zi):
 
 
 @kernel()
-def _search(c, level, lo, hi, f0, d0, f1, d1, roots, count):
-    """Append the crossings of `level` in (lo, hi), an interval with one extremum at most; returns the new count.
-
-    f, d: the motion minus level and its derivative at both ends.
-    """
-    between, there = hi, f1
-    if (f0 > 0.0) == (f1 > 0.0):
-        if not ((f0 > 0.0 and d0 < 0.0 and d1 > 0.0) or (f0 <= 0.0 and d0 > 0.0 and d1 < 0.0)):
-            return count
-        # an extremum towards the level lies in between: does it reach across?
-        if min(abs(f0), abs(f1)) > (hi - lo) * (abs(d0) + abs(d1)):
-            return count
-        first, last = lo, hi
-        between = lo + (hi - lo) * d0 / (d0 - d1)
-        for _ in range(60):
-            x, d, s = jet(c, math.cos(between), math.sin(between))
-            if (x - level > 0.0) != (f0 > 0.0):
-                break
-            if (d > 0.0) == (d0 > 0.0):
-                first = between
-            else:
-                last = between
-            new = between - d / s if s != 0.0 else 0.5 * (first + last)
-            if not (first < new < last):
-                new = 0.5 * (first + last)
-            if abs(new - between) < 1e-14:
-                break
-            between = new
-        x, d, s = jet(c, math.cos(between), math.sin(between))
-        there = x - level
-        if (there > 0.0) == (f0 > 0.0):
-            return count
-    # a root in each bracket, by Newton's method kept inside it
-    for part in range(1 if between == hi else 2):
-        first, last, before = (lo, between, f0) if part == 0 else (between, hi, there)
-        tau, step = 0.5 * (first + last), last - first
-        for _ in range(100):
-            x, d, _s = jet(c, math.cos(tau), math.sin(tau))
-            f = x - level
-            if f == 0.0:
-                break
-            if (f > 0.0) == (before > 0.0):
-                first = tau
-            else:
-                last = tau
-            new = tau - f / d if d != 0.0 else np.inf
-            if not (first < new < last):
-                # a step out of the bracket that rounding alone explains: the root is here
-                if abs(new - tau) < 1e-14 * max(1.0, abs(tau)) or last - first < 4e-16 * max(1.0, abs(tau)):
-                    break
-                new = 0.5 * (first + last)
-            previous, step = step, abs(new - tau)
-            tau = new
-            # converging quadratically: the step after one of 1e-8 is below rounding
-            if step < 1e-15 * max(1.0, abs(tau)) or (step < 1e-8 and step < 1e-4 * previous):
-                x, d, _s = jet(c, math.cos(tau), math.sin(tau))
-                if d != 0.0 and abs(x - level) < abs(d) * 1e-12:
-                    tau -= (x - level) / d
-                break
-        roots[count] = tau
-        count += 1
-    return count
-
-
-@kernel()
-def crossings_of(c, level, values):
-    """`crossings`, from value and derivative of the motion (2, N) on a uniform grid that starts at tau = 0."""
-    n = values.shape[1]
-    h = 2.0 * math.pi / n
-    roots = np.empty(4 * n)
-    # not a literal, for which the search would be compiled twice
-    count = np.int64(0)
-    for j in range(n):
-        f0 = values[0, j] - level
-        f1 = values[0, (j + 1) % n] - level
-        d0 = values[1, j]
-        d1 = values[1, (j + 1) % n]
-        near = min(abs(f0), abs(f1)) <= h * (abs(d0) + abs(d1))
-        if d0 * d1 > 0.0 and near:
-            # slope of the cubic: d0 + b s + a s^2, s in (0, 1)
-            mean = (f1 - f0) / h
-            a = 3.0 * (d0 + d1 - 2.0 * mean)
-            b = 2.0 * (3.0 * mean - 2.0 * d0 - d1)
-            # its extremum towards zero lies inside, and is less than half of the lesser slope at the ends
-            if a * d0 > 0.0 and 0.0 < -b / a < 2.0 and abs(d0) - b * b / (4.0 * abs(a)) < 0.5 * min(abs(d0), abs(d1)):
-                lo, hi = j * h, (j + 1) * h
-                tau = lo - 0.5 * h * b / a
-                x, d, s = jet(c, math.cos(tau), math.sin(tau))
-                new = tau - 0.5 * h * h * s / a
-                if lo < new < hi:
-                    tau = new
-                    x, d, s = jet(c, math.cos(tau), math.sin(tau))
-                if d * d0 < 0.0:
-                    count = _search(c, level, lo, tau, f0, d0, x - level, d, roots, count)
-                    count = _search(c, level, tau, hi, x - level, d, f1, d1, roots, count)
-                    continue
-        if (f0 > 0.0) != (f1 > 0.0) or (near and d0 * d1 < 0.0):
-            count = _search(c, level, j * h, (j + 1) * h, f0, d0, f1, d1, roots, count)
-    return roots[:count], values[0, 0] - level > 0.0
-
-
-def crossings(c: ComplexArray, level: float, zr: Array, zi: Array) -> tuple[Array, bool]:
-    """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
-
-    Sampled on the uniform grid z; a pair hidden between two samples is looked for at every extremum near the level
-    (whose parabola comes within half its own rise of it), and two extrema between two samples where the cubic through
-    them slows down. Exact up to rounding.
-    """
-    result: tuple[Array, bool] = crossings_of(c, level, motion(c, zr, zi))
-    return result
-
-
-def peak(c: ComplexArray, samples: int) -> tuple[float, float, float]:
-    """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
-
-    `samples`: equidistant instants from which extrema are looked for.
-    """
-    angle = 2.0 * math.pi * np.arange(samples) / samples
-    tau, value, _ = extrema(c, np.cos(angle), np.sin(angle))
-    if not len(tau):
-        return abs(float(c[0].real)), 0.0, float(c[0].real)
-    i = int(np.argmax(np.abs(value)))
-    return abs(float(value[i])), float(tau[i]), float(value[i])
-
-
-@kernel()
 def extrema(c, zr, zi):
     """Local extrema of `Re sum_k c_k exp(i k tau)` over a period: tau, value, second derivative, (3, m); ascending in
     tau.
@@ -323,6 +197,80 @@ def extrema(c, zr, zi):
             turns[0, count], turns[1, count], turns[2, count] = t, x, -abs(s) if rises else abs(s)
             count += 1
     return turns[:, :count].copy()
+
+
+@kernel()
+def crossings_of(c, level, turns):
+    """Instants in [0, 2 pi) at which the motion crosses `level`, ascending, and whether it lies above before the first.
+
+    turns: the motion's extrema, between any two of which it rises or falls (`extrema`). Exact up to rounding.
+    """
+    m = turns.shape[1]
+    roots, count = np.empty(m), 0
+    above = m == 0 and c[0].real > level
+    for k in range(m):
+        # the last bracket comes first: it may reach beyond the period
+        i, j = (m - 1, 0) if k == 0 else (k - 1, k)
+        f0, f1 = turns[1, i] - level, turns[1, j] - level
+        if k == 0:
+            above = f0 > 0.0
+        if (f0 > 0.0) == (f1 > 0.0):
+            continue
+        first, last = turns[0, i] - (2.0 * math.pi if k == 0 else 0.0), turns[0, j]
+        # as if it were a cosine, then Newton's method kept inside the bracket
+        tau, step = first + (last - first) * math.acos((f0 + f1) / (f1 - f0)) / math.pi, last - first
+        for _ in range(100):
+            x, d, _s = jet(c, math.cos(tau), math.sin(tau))
+            f = x - level
+            if f == 0.0:
+                break
+            if (f > 0.0) == (f0 > 0.0):
+                first = tau
+            else:
+                last = tau
+            new = tau - f / d if d != 0.0 else np.inf
+            if not (first < new < last):
+                # a step out of the bracket that rounding alone explains: the root is here
+                if abs(new - tau) < 1e-14 * max(1.0, abs(tau)) or last - first < 4e-16 * max(1.0, abs(tau)):
+                    break
+                new = 0.5 * (first + last)
+            previous, step = step, abs(new - tau)
+            tau = new
+            # converging quadratically: the step after one of 1e-8 is below rounding
+            if step < 1e-15 * max(1.0, abs(tau)) or (step < 1e-8 and step < 1e-4 * previous):
+                x, d, _s = jet(c, math.cos(tau), math.sin(tau))
+                if d != 0.0 and abs(x - level) < abs(d) * 1e-12:
+                    tau -= (x - level) / d
+                break
+        roots[count] = tau
+        count += 1
+    if count > 0 and roots[0] < 0.0:
+        # of the period before: the last of this one
+        before = roots[0] + 2.0 * math.pi
+        for k in range(1, count):
+            roots[k - 1] = roots[k]
+        roots[count - 1] = before
+        above = not above
+    return roots[:count], above
+
+
+def crossings(c: ComplexArray, level: float, zr: Array, zi: Array) -> tuple[Array, bool]:
+    """`crossings_of`, with extrema searched on the uniform grid z."""
+    result: tuple[Array, bool] = crossings_of(c, level, extrema(c, zr, zi))
+    return result
+
+
+def peak(c: ComplexArray, samples: int) -> tuple[float, float, float]:
+    """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
+
+    `samples`: equidistant instants from which extrema are looked for.
+    """
+    angle = 2.0 * math.pi * np.arange(samples) / samples
+    tau, value, _ = extrema(c, np.cos(angle), np.sin(angle))
+    if not len(tau):
+        return abs(float(c[0].real)), 0.0, float(c[0].real)
+    i = int(np.argmax(np.abs(value)))
+    return abs(float(value[i])), float(tau[i]), float(value[i])
 
 
 @kernel()

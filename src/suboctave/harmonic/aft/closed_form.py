@@ -18,7 +18,7 @@ import numpy as np
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.quadrature import polynomial_nodes, rule_tables, search_grid, sharp_nodes
-from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, spectra
+from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, extrema, spectra
 
 #: no pieces or steps
 NO_ROWS = np.zeros((0, 3))
@@ -169,13 +169,12 @@ def add_spectra(motions, laws, grid, nodes, rules, table):
     for g in range(motions.shape[0]):
         c, force, stiffness = motions[g], table[0, g], table[1, g]
         if first[g + 1] > first[g]:
-            path = np.empty((2, grid[0].shape[0]))
-            displacement(c, grid[0], grid[1], path)
+            turns = extrema(c, grid[0], grid[1])
             slope = np.zeros(top + high + 1, dtype=np.complex128)
             touching = False
             for p in range(first[g], first[g + 1]):
                 k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-                crossed, above = crossings_of(c, gap, path)
+                crossed, above = crossings_of(c, gap, turns)
                 if crossed.shape[0] == 0 and above != (side > 0):
                     continue
                 touching = True

@@ -37,7 +37,7 @@ from suboctave.harmonic.quadrature import (
     search_grid,
     uniform_nodes,
 )
-from suboctave.harmonic.trigonometric import crossings, motion, spectra
+from suboctave.harmonic.trigonometric import crossings_of, extrema, motion, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.coupled import as_coupled, changed_law
 from suboctave.model.elements.smoothness import (
@@ -179,10 +179,11 @@ class GeneralLaw(LawAlong):
             (0, self.along.motion, kind.points),
             (self.count, self._velocity, kind.velocities),
         ):
+            turns = extrema(series, grid.zr, grid.zi)
             for level in levels:
                 # a velocity that is zero throughout rests in its corner
                 resting = not series[1:].any()
-                at = _NO_INSTANTS if resting else crossings(series, float(level), grid.zr, grid.zi)[0]
+                at = _NO_INSTANTS if resting else crossings_of(series, float(level), turns)[0]
                 corners.append(Corner(len(corners), row, float(level), np.asarray(at)))
         return corners
 

@@ -18,7 +18,7 @@ from suboctave.harmonic.aft.law import CoefficientSpectra, LawAlong, Member, Sec
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import search_grid
-from suboctave.harmonic.trigonometric import crossings_of, motion, spectra
+from suboctave.harmonic.trigonometric import crossings_of, extrema, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear
 
@@ -34,14 +34,15 @@ class Pieces(LawAlong):
         add_spectra(along.motions, known, *places(along.high, along.top, 0), out[:, None])
 
     @lazy
-    def _values(self) -> Array:
-        """See `crossings_of`."""
+    def _turns(self) -> Array:
+        """The motion's extrema."""
         grid = search_grid(self.along.high)
-        return motion(self.along.motion, grid.zr, grid.zi)
+        turns: Array = extrema(self.along.motion, grid.zr, grid.zi)
+        return turns
 
     @lazy
     def _corners(self) -> Array:
-        return corner_weights(self.along.motion, PackedLaws([self.members]).pieces, self._values)
+        return corner_weights(self.along.motion, PackedLaws([self.members]).pieces, self._turns)
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
@@ -55,16 +56,16 @@ class Pieces(LawAlong):
 
     def by_coefficients(self, member: Member) -> CoefficientSpectra:
         """See `LawAlong.by_coefficients`."""
-        along, c, count, values = self.along, member.coefficients, len(member.coefficients), self._values
+        along, c, count, turns = self.along, member.coefficients, len(member.coefficients), self._turns
         force = np.zeros((count, along.top + 1), dtype=complex)
         tangent = np.zeros((count, 1, along.top + 1), dtype=complex)
         second = np.zeros((count, count, along.top + 1), dtype=complex)
         for piece in _pieces(member):
             i, j, gap = piece.stiffness, piece.gap, float(c[piece.gap])
-            tau, above = crossings_of(along.motion, gap, values)
+            tau, above = crossings_of(along.motion, gap, turns)
             whole = contact_spectrum(tau, above, piece.side, along.top + along.high)
             chi = whole[: along.top + 1]
-            zr, zi, weights, _, _ = corner_weights(along.motion, np.array([[1.0, gap, 1.0]]), values)
+            zr, zi, weights, _, _ = corner_weights(along.motion, np.array([[1.0, gap, 1.0]]), turns)
             comb = piece.side * c[i] * spectra(np.ones((1, len(zr))), weights, zr, zi, along.top)[0]
             force[i] += product_spectrum(along.motion, gap, whole, along.top)
             force[j] -= c[i] * chi
@@ -84,7 +85,7 @@ class Pieces(LawAlong):
             own, by = member.coefficients.tolist(), rates[member.number].tolist()
             for piece in _pieces(member):
                 gap, by_stiffness, by_gap = own[piece.gap], by[piece.stiffness], by[piece.gap]
-                crossed, above = crossings_of(c, gap, self._values)
+                crossed, above = crossings_of(c, gap, self._turns)
                 chi = contact_spectrum(crossed, above, piece.side, top + high)
                 force = by_gap * own[piece.stiffness]
                 out[0] += by_stiffness * product_spectrum(c, gap, chi, top) - force * chi[: top + 1]
@@ -99,13 +100,13 @@ def _pieces(member: Member) -> tuple[Piece, ...]:
     return member.kind.pieces
 
 
-def corner_weights(c: ComplexArray, pieces: Array, values: Array) -> Array:
+def corner_weights(c: ComplexArray, pieces: Array, turns: Array) -> Array:
     """Instants at which the gaps of piecewise-linear pieces (stiffness, gap, side) are crossed: cosines, sines, and the
     weights there, (5, N); `f_uu` has `side stiffness / |u'|`.
     """
     corners = []
     for k, gap, side in pieces.tolist():
-        tau, _ = crossings_of(c, gap, values)
+        tau, _ = crossings_of(c, gap, turns)
         speed, bend = _rates(c, tau)
         weight = side * k / np.abs(speed)
         corners.append((np.cos(tau), np.sin(tau), weight, weight * bend / speed**2, -weight / speed))
