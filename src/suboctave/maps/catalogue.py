@@ -188,10 +188,9 @@ class Catalogue(Work):
         """
         where = f"searching {period_name(order)} motions at {self.name} = {value:.6g}"
         self.progress(share, where)
+        at = self.at(value), self.omega, order, known, self.harmonics
         try:
-            return isolated_branches(
-                self.at(value), self.omega, order, known, self.harmonics, seeds=seeds, **self.options
-            )
+            return isolated_branches(*at, seeds=seeds, **self.options)
         except ConvergenceError as failure:
             self.note(f"{where}: {failure}")
             return []
@@ -207,7 +206,7 @@ class Catalogue(Work):
         """As `carrier_of`; None, with a note, where that cannot be decided."""
         try:
             return carrier_of(branch, attached, self.options)
-        except (ConvergenceError, InputError) as failure:
+        except FAILURES as failure:
             self.note(f"whether a closed branch at {self.name} = {value:.6g} is isolated is open: {failure}")
             return None
 
@@ -221,13 +220,10 @@ class Catalogue(Work):
 
     def piece_of(self, item: Bifurcation, value: float) -> MonotonePiece | None:
         """The known piece that a bifurcation at a value of the parameter, or its mirror image, lies on: the nearest."""
-        gaps = [
-            (gap, piece)
-            for piece in self.pieces
-            if piece.kind == item.kind and piece.nu == item.orbit.basis.nu and piece.contains(value)
-            if (gap := gap_to(item.orbit, piece.nodes, self.name, images=True)) is not None
-        ]
-        return min(gaps, key=lambda pair: pair[0])[1] if gaps else None
+        alike = (p for p in self.pieces if p.kind == item.kind and p.nu == item.orbit.basis.nu and p.contains(value))
+        gaps = {piece: gap_to(item.orbit, piece.nodes, self.name, images=True) for piece in alike}
+        near = {piece: gap for piece, gap in gaps.items() if gap is not None}
+        return min(near, key=near.__getitem__, default=None)
 
     def known(self, item: Bifurcation, value: float) -> MonotonePiece | None:
         """The piece that a bifurcation lies on, followed over the parameter if it is new; None if that fails."""
@@ -327,11 +323,6 @@ MOST_VALUES = 10_000
 COARSE = Seeds(8, 4, 3)
 
 
-def is_count(number: Any, least: int) -> bool:
-    """Whether something is a whole number that is not too small."""
-    return isinstance(number, int) and not isinstance(number, bool) and number >= least
-
-
 def listed(values: Any) -> list[Any]:
     """The items of a sequence or an array; a single None for anything else."""
     return list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [None]
@@ -347,22 +338,22 @@ def check_seeds(seeds: Any) -> Seeds | None:
 def checked_orders(search: Any, least: int) -> tuple[int, ...]:
     """Periods, in periods of the load, of a search among resonances."""
     given = listed(search)
-    if not all(is_count(order, least) for order in given):
+    if not all(isinstance(order, int) and not isinstance(order, bool) and order >= least for order in given):
         raise InputError(f"search must be periods in periods of the load, {least} or more, as (2, 3), not {search!r}")
     return tuple(given)
 
 
-def checked_values(values: Any, bounds: tuple[float, float]) -> list[float]:
-    """Values of the design parameter: how many from bound to bound, or the values themselves."""
+def checked_values(name: str, given: Any, bounds: tuple[float, float], least: int = 1) -> list[float] | int:
+    """Values of a parameter within bounds: how many, at least so many, or the values themselves."""
     low, high = bounds
-    if isinstance(values, int) and not isinstance(values, bool):
-        if not 2 <= values <= MOST_VALUES:
-            raise InputError(
-                f"values must be at least 2 and at most {MOST_VALUES}, or the values of the parameter themselves, not "
-                f"{shortened(values)}"
-            )
-        return [float(v) for v in np.linspace(low, high, values)]
-    given = listed(values)
-    if not given or not all(is_number(v) and low <= v <= high for v in given):
-        raise InputError(f"values must be how many, or numbers within the bounds ({low:g}, {high:g}), not {values!r}")
-    return sorted({float(v) for v in given})
+    if isinstance(given, int) and not isinstance(given, bool):
+        if least <= given <= MOST_VALUES:
+            return given
+        raise InputError(
+            f"{name} must be at least {least} and at most {MOST_VALUES}, or the values of the parameter themselves, "
+            f"not {shortened(given)}"
+        )
+    values = listed(given)
+    if len(values) < min(least, 1) or not all(is_number(value) and low <= value <= high for value in values):
+        raise InputError(f"{name} must be how many, or numbers from {low:.9g} to {high:.9g}, not {given!r}")
+    return [float(value) for value in values]

@@ -132,45 +132,42 @@ _ISOLAS = "isolas"
 
 def isolas_to_datasets(isolas: Isolas) -> dict[str, xarray.Dataset]:
     """The head under the name "", curves and closed branches under names of their own; the head lists them."""
-    pieces = [piece for isola in isolas for piece in isola.pieces]
-    curves = list(dict.fromkeys([*isolas.limit_points, *(piece.curve for piece in pieces), *isolas.doublings]))
-    own = [curve for curve in curves if curve not in isolas.doublings]
-    parts: dict[str, Any] = {f"limit_points_{i}": curve for i, curve in enumerate(own)}
-    parts |= {f"doublings_{i}": curve for i, curve in enumerate(isolas.doublings)}
-    names = {id(curve): name for name, curve in parts.items()}
+    own = dict.fromkeys([*isolas.limit_points, *(piece.curve for isola in isolas for piece in isola.pieces)])
+    curves = {f"limit_points_{i}": curve for i, curve in enumerate(c for c in own if c not in isolas.doublings)}
+    curves |= {f"doublings_{i}": curve for i, curve in enumerate(isolas.doublings)}
     closed = [branch for isola in isolas for branch in isola.known.values()]
-    parts |= {f"closed_{i}": branch for i, branch in enumerate(closed)}
     record = {
         "listed": len(isolas.limit_points),
-        "bounds": tuple(isolas.bounds),
-        "omega": tuple(isolas.omega),
-        "isolas": [_written_isola(isola, names, curves) for isola in isolas],
+        "bounds": isolas.bounds,
+        "omega": isolas.omega,
+        "isolas": [_written_isola(isola, curves) for isola in isolas],
     }
     head = head_dataset(isolas)
-    return map_datasets(isolas, {k: (v.dims, v.values, v.attrs) for k, v in head.items()}, head.attrs, record, parts)
+    variables = {name: (v.dims, v.values, v.attrs) for name, v in head.items()}
+    parts: dict[str, Branch] = {**curves, **{f"closed_{i}": branch for i, branch in enumerate(closed)}}
+    return map_datasets(isolas, variables, head.attrs, record, parts)
 
 
-def _written_isola(isola: Isola, names: Mapping[int, str], curves: Sequence[TrackedBranch]) -> dict[str, Any]:
+def _written_isola(isola: Isola, curves: Mapping[str, TrackedBranch]) -> dict[str, Any]:
     """What a file holds of one isola besides the numbers."""
+    names = {curve: name for name, curve in curves.items()}
     return {
-        "range": tuple(isola.range),
-        "reasons": tuple(isola.reasons),
+        "range": isola.range,
+        "reasons": isola.reasons,
         "notes": isola.notes,
-        "ends": [None if end is None else _end(end, names, curves) for end in isola.ends],
-        "legs": [
-            [names[id(piece.curve)], piece_number(piece, pieces_of(piece.curve, piece.along))] for piece in isola.pieces
-        ],
+        "ends": [None if end is None else _written_end(end, curves) for end in isola.ends],
+        "legs": [[names[p.curve], piece_number(p, pieces_of(p.curve, p.along))] for p in isola.pieces],
         "options": options_of(isola.options),
         "known": list(isola.known),
     }
 
 
-def _end(end: IsolaEnd, names: Mapping[int, str], curves: Sequence[TrackedBranch]) -> list[Any]:
+def _written_end(end: IsolaEnd, curves: Mapping[str, TrackedBranch]) -> list[Any]:
     """Kind, curve and place among its events of the event that an end is."""
-    for curve in curves:
+    for name, curve in curves.items():
         for place, event in enumerate(curve.bifurcations.met):
             if event.orbit is end.orbit:
-                return [end.kind, names[id(curve)], place]
+                return [end.kind, name, place]
     raise InputError(f"the {end!r} lies on none of the curves: it cannot be written to a file")
 
 
@@ -232,16 +229,11 @@ def isola_map_to_datasets(isola_map: IsolaMap) -> dict[str, xarray.Dataset]:
     between which two ends: a number, or a border by its number among those of all curves.
     """
     curves, borders = isola_map.curves, isola_map.borders()
-    omega = isola_map.regions[0].isola.omega if isola_map.regions else (np.nan, np.nan)
-    within = isola_map.within or (np.nan, np.nan)
-    isolas = Isolas(
-        (region.isola for region in isola_map.regions), isola_map.system, isola_map.parameter, within, omega
-    )
+    found = [region.isola for region in isola_map.regions]
+    omega, within = found[0].omega if found else (np.nan, np.nan), isola_map.within or (np.nan, np.nan)
+    isolas = Isolas(found, isola_map.system, isola_map.parameter, within, omega)
     record = {
-        "parameter": isola_map.parameter,
-        "second": isola_map.second,
-        "within": isola_map.within,
-        "bounds": tuple(isola_map.bounds),
+        **{name: getattr(isola_map, name) for name in ("parameter", "second", "within", "bounds")},
         "regions": [
             {
                 "isola": list(isolas).index(region.isola),
@@ -289,25 +281,17 @@ register(Codec("isola map", IsolaMap, isola_map_to_datasets, isola_map_from_data
 
 def regime_map_to_datasets(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
     """The head under the name "", curves and branches under names of their own."""
-    pieces = _pieces(regimes.curves, regimes.parameter)
+    pieces = [piece for curve in regimes.curves for piece in pieces_of(curve, regimes.parameter)]
     slices = list(dict.fromkeys(strip.slice for strip in regimes.strips if strip.slice is not None))
-    places: dict[int, tuple[str, int]] = {}
-    branches: dict[str, Branch] = {f"curve_{i}": curve for i, curve in enumerate(regimes.curves)}
-    used = {id(point) for each in slices for arc in each.arcs for point in arc.points}
-    for branch in (branch for each in slices for branch, _ in each.branches):
-        points = {id(point): i for i, point in enumerate(branch.points)}
-        if used.isdisjoint(points):
-            continue
-        name = f"branch_{len(branches) - len(regimes.curves)}"
-        branches[name] = branch
-        places |= {key: (name, i) for key, i in points.items()}
+    curves: dict[str, Branch] = {f"curve_{i}": curve for i, curve in enumerate(regimes.curves)}
+    on_arcs = {id(point) for each in slices for arc in each.arcs for point in arc.points}
+    met = (branch for each in slices for branch, _ in each.branches)
+    used = [branch for branch in met if any(id(point) in on_arcs for point in branch.points)]
+    branches = {f"branch_{i}": branch for i, branch in enumerate(used)}
+    places = {id(point): (n, i) for n, branch in branches.items() for i, point in enumerate(branch.points)}
     record = {
-        "parameter": regimes.parameter,
-        "bounds": tuple(regimes.bounds),
-        "omega": tuple(regimes.omega),
+        **{name: getattr(regimes, name) for name in ("parameter", "bounds", "omega", "depth", "resolution")},
         "options": options_of(regimes.options),
-        "depth": regimes.depth,
-        "resolution": regimes.resolution,
         "slices": [
             {"value": each.value, "arcs": [_written_arc(arc, places, pieces) for arc in each.arcs]} for each in slices
         ],
@@ -315,11 +299,7 @@ def regime_map_to_datasets(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
             (s.low, s.high, None if s.slice is None else slices.index(s.slice), s.examined) for s in regimes.strips
         ],
     }
-    return map_datasets(regimes, *table_head(regimes), record, branches)
-
-
-def _pieces(curves: Sequence[TrackedBranch], parameter: str) -> list[MonotonePiece]:
-    return [piece for curve in curves for piece in pieces_of(curve, parameter)]
+    return map_datasets(regimes, *table_head(regimes), record, curves | branches)
 
 
 def _written_arc(arc: Arc, places: Mapping[int, tuple[str, int]], pieces: Sequence[MonotonePiece]) -> dict[str, Any]:
@@ -342,12 +322,12 @@ def regime_map_from_datasets(
     """The map that `regime_map_to_datasets` wrote."""
     stored = opened(groups, "map", allow_code, linear)
     record, branches, curves = stored.record, stored.parts, stored.named("curve_")
-    pieces = _pieces(curves, record["parameter"])
     name, bounds, omega = record["parameter"], record["bounds"], SearchRange(*record["omega"])
-    options = record["options"]
-    catalogue = Catalogue(stored.system, name, bounds, omega, "adaptive", options, len(curves), curves, pieces)
-    catalogue.notes += record["notes"]
-    catalogue.interruption = record["interruption"]
+    given = stored.system, name, bounds, omega, "adaptive", record["options"], len(curves)
+    catalogue = Catalogue(*given, notes=list(record["notes"]), interruption=record["interruption"])
+    for curve in curves:
+        catalogue.add(curve)
+    pieces = catalogue.pieces
     slices = []
     for given in record["slices"]:
         met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]

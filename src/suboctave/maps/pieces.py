@@ -14,7 +14,7 @@ has one motion at each frequency within it. What ends it is a bifurcation, or th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -28,7 +28,6 @@ from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.locate import Guess
 from suboctave.curves.events.monitors import LIMIT_POINT
 from suboctave.curves.identity import gap_to, lies_on
-from suboctave.curves.junction import Junction
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.points import BranchPoint, TrackedPoint
 from suboctave.curves.refine import solved_bifurcation
@@ -256,7 +255,7 @@ def pieces_of(curve: TrackedBranch, along: str, name: str = "omega") -> list[Mon
         # the seam of a closed curve is no end: what begins there goes on from its last points
         nodes, _, last = pieces.pop(0)
         pieces[-1] = (pieces[-1][0] + nodes, pieces[-1][1], last)
-    cut = (piece for uncut in pieces for piece in _one_way(uncut, along))
+    cut = (piece for uncut in pieces for piece in _one_way(*uncut, along))
     return [MonotonePiece(curve, along, name, tuple(nodes), (a, b)) for nodes, a, b in cut if len(nodes) > 1]
 
 
@@ -272,16 +271,14 @@ def _turns(event: TrackedEvent, along: str, of_extrema: bool) -> bool:
     return event.kind == "CP" and not of_extrema
 
 
-def _one_way(piece: Piece, along: str) -> list[Piece]:
+def _one_way(
+    nodes: list[TrackedPoint], first: TrackedEvent | None, last: TrackedEvent | None, along: str
+) -> Iterator[Piece]:
     """A piece cut where its nodes turn though no event was located there (a curve's last step before its end)."""
-    nodes, first, last = piece
-    signs = np.sign(np.diff(_read(nodes, along)))
-    breaks = [i + 1 for i in range(len(signs) - 1) if signs[i] * signs[i + 1] < 0.0]
-    places = [0, *breaks, len(nodes) - 1]
-    return [
-        (nodes[a : b + 1], first if a == 0 else None, last if b == len(nodes) - 1 else None)
-        for a, b in pairwise(places)
-    ]
+    signs, end = np.sign(np.diff(_read(nodes, along))), len(nodes) - 1
+    turns = np.flatnonzero(signs[:-1] * signs[1:] < 0.0) + 1
+    for a, b in pairwise([0, *turns, end]):
+        yield nodes[a : b + 1], first if a == 0 else None, last if b == end else None
 
 
 def _read(nodes: Sequence[TrackedPoint], name: str) -> Array:
@@ -343,10 +340,9 @@ class Stretch:
 
 def stretches(branch: Branch, others: Iterable[Bifurcation] = ()) -> list[Stretch]:
     """The stretches of a branch, in order; `others` are the bifurcations at which it may leave or meet its parent."""
-    places = branch.arclength
-    changes = sorted(branch.bifurcations, key=lambda b: b.arclength)
+    places, points = branch.arclength, branch.points
     whole = float(places[-1])
-    points = branch.points
+    changes = sorted(branch.bifurcations, key=lambda b: b.arclength)
     marks: list[tuple[float, Bifurcation | float]] = [(b.arclength, b) for b in changes]
     if branch.closed and marks:
         # the seam is no end
@@ -355,9 +351,7 @@ def stretches(branch: Branch, others: Iterable[Bifurcation] = ()) -> list[Stretc
         marks.append((marks[0][0] + whole, marks[0][1]))
     elif not branch.closed:
         known = list(others)
-        first, last = (
-            _met(j, known, branch, i) or float(branch.omega[i]) for j, i in ((branch.departs, 0), (branch.arrives, -1))
-        )
+        first, last = (_met(known, branch, end) or float(branch.omega[end]) for end in (0, -1))
         marks = [(-1.0, first), *marks, (whole + 1.0, last)]
     cut = []
     for (begin, one), (end, other) in pairwise(marks):
@@ -368,8 +362,9 @@ def stretches(branch: Branch, others: Iterable[Bifurcation] = ()) -> list[Stretc
     return cut
 
 
-def _met(junction: Junction | None, known: Sequence[Bifurcation], branch: Branch, end: int) -> Bifurcation | None:
-    """The bifurcation of another branch at which one leaves or meets it, at its first (0) or last (-1) point."""
+def _met(known: Sequence[Bifurcation], branch: Branch, end: int) -> Bifurcation | None:
+    """The bifurcation of another branch at which one leaves it, at its first point (0), or meets it, at its last."""
+    junction = branch.arrives if end else branch.departs
     if junction is None:
         return None
     first, last = branch.options["bounds"][branch.name]

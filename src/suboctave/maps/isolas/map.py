@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,11 +25,12 @@ from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
+from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.points import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, pass_on
-from suboctave.maps.catalogue import FAILURES, SearchRange, Work, branch_through, carrier_of, is_count, listed
+from suboctave.maps.catalogue import FAILURES, SearchRange, Work, branch_through, carrier_of, checked_values
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece, across, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, timed
@@ -45,10 +47,6 @@ if TYPE_CHECKING:
 _PROBED = (0.1, 0.5, 0.9)
 #: so much of the range of the design parameter may the ends differ from those of a closed branch
 _AGREES = 1e-3
-#: ends at places that differ by less, relatively, are one
-_SAME = 1e-5
-#: omega may turn a corner where a contact begins, and is interpolated worse
-_BESIDE = 1e-3
 
 
 @timed
@@ -107,14 +105,13 @@ def isola_map(
             f"the isola was found at {parameter} = {here:g}, outside the bounds ({low:g}, {high:g}): widen them, or "
             f"search with a system whose {parameter} lies within"
         )
-    if not is_count(probes, 0) and not all(is_number(value) and low <= value <= high for value in listed(probes)):
-        raise InputError(f"probes must be how many, or numbers within the bounds ({low:g}, {high:g}), not {probes!r}")
+    places = checked_values("probes", probes, (low, high), least=0)
     options = first.options if max_step is None else {**first.options, "max_step": max_step}
     regions = _Regions(system, name, parameter, (low, high), options)
     with regions.reporting(progress, f"isolas over {name} and {parameter}"):
         for number, isola in enumerate(items):
             regions.progress(number / len(items), f"isola {number + 1} of {len(items)}")
-            regions.follow(isola, probes)
+            regions.follow(isola, places)
     within = isolas.bounds if isinstance(isolas, Isolas) else None
     return IsolaMap(regions.regions, system, name, parameter, within, (low, high), regions.notes, regions.interruption)
 
@@ -181,22 +178,12 @@ class _Regions(Work):
     def _curve(self, end: IsolaEnd) -> TrackedBranch:
         """The curve of an extremum, once for all isolas that share it."""
         for known, curve in self.tracked:
-            if known.orbit is end.orbit or self._passes(curve, end):
+            if known.orbit is end.orbit or lies_on(end.orbit, curve.points, self.second, images=True):
                 return curve
         curve = track(end, self.second, self.bounds, **self.options)
         pass_on(curve.interruption)
         self.tracked.append((end, curve))
         return curve
-
-    def _passes(self, curve: TrackedBranch, end: IsolaEnd) -> bool:
-        """Whether a curve of extrema passes another one."""
-        here, beside = end.parameter(self.second), "omega" if "omega" in end.names else end.names[0]
-        for name, slack in ((end.parameter_name, _SAME), (beside, _BESIDE)):
-            value = end.parameter(name)
-            borders = [b for b in pieces_of(curve, self.second, name) if b.contains(here)]
-            if not any(abs(float(b.across(here)) - value) <= slack * abs(value) for b in borders):
-                return False
-        return True
 
     # --------------------------------------------------------------------------------------------- independent looks
     def _probes(self, region: IsolaRegion, probes: Any) -> Iterator[Probe]:
@@ -204,12 +191,10 @@ class _Regions(Work):
         span = region.span
         if isinstance(probes, int):
             shares = _PROBED if probes == len(_PROBED) else (np.arange(probes) + 0.5) / max(probes, 1)
-            places = [span.low + float(share) * (span.high - span.low) for share in shares]
-        else:
-            places = [float(value) for value in probes if span.contains(float(value))]
+            probes = [span.low + float(share) * (span.high - span.low) for share in shares]
         border = next((e for e in span.ends if isinstance(e, MonotonePiece)), None)
         if border is not None:
-            yield from (self._probe(region, border.node_beside(place)) for place in places)
+            yield from (self._probe(region, border.node_beside(s)) for s in map(float, probes) if span.contains(s))
 
     def _probe(self, region: IsolaRegion, node: TrackedPoint) -> Probe:
         """Follow the limit points at one value of the second parameter, and the branch in the middle of the range.
@@ -234,13 +219,13 @@ class _Regions(Work):
             detached = carrier_of(branch, (), options) is not None
         except FAILURES as failure:
             return Probe(place, middle, (low, high), None, str(failure))
+        if not detached:
+            return Probe(place, middle, (low, high), False, "the branch there is not detached")
         turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]
         ends = [float(end.across(place)) for end in region.span.ends if isinstance(end, MonotonePiece)]
         missed = [end for end in ends if not any(abs(turn - end) <= _AGREES * width for turn in turns)]
-        disagreement = "" if detached else "the branch there is not detached"
-        if missed and detached:
-            disagreement = f"its curve of limit points does not turn at {name} = {missed[0]:.7g}"
-        return Probe(place, middle, (low, high), detached, disagreement)
+        disagreement = f"its curve of limit points does not turn at {name} = {missed[0]:.7g}" if missed else ""
+        return Probe(place, middle, (low, high), True, disagreement)
 
 
 _WORDS = {"isola_centre": "birth (isola centre)", "isola_merging": "merging"}
@@ -287,8 +272,9 @@ def spans_of(
     second: str,
 ) -> Span:
     """The stretch of s around `start` over which both ends can be followed."""
-    down, up = (_reached(start, ends, bounds, second, upper) for upper in (False, True))
-    return Span(down[0], up[0], ends, (down[1], up[1]), (down[2], up[2]), (down[3], up[3]))
+    sides = (_reached(start, ends, bounds, second, upper) for upper in (False, True))
+    (low, high), reasons, closed, settled = zip(*sides, strict=True)
+    return Span(low, high, ends, reasons, closed, settled)
 
 
 def _reached(
@@ -299,22 +285,17 @@ def _reached(
     upper: bool,
 ) -> tuple[float, str, bool, bool]:
     """How far in one direction: the value of s, why no further, whether the range closes, whether that is settled."""
-    bound = bounds[1] if upper else bounds[0]
-    sign = 1.0 if upper else -1.0
-    slack = _ROUNDING * (bounds[1] - bounds[0])
-    reach = bound
-    for end in ends:
-        if isinstance(end, MonotonePiece):
-            edge = end.high if upper else end.low
-            reach = edge if sign * (edge - reach) < 0.0 else reach
+    bound, slack = bounds[upper], _ROUNDING * (bounds[1] - bounds[0])
+    edges = {end: end.high if upper else end.low for end in ends if isinstance(end, MonotonePiece)}
+    reach = (min if upper else max)([bound, *edges.values()])
     crossed = _crossing(start, reach, ends, upper)
     if crossed is not None:
         return crossed, f"the two ends of the range cross at {second} = {crossed:.7g}", True, False
     if abs(reach - bound) <= slack:
         return bound, f"{second} = {bound:.7g}, the end of the bounds", False, True
-    stops = [e for e in ends if isinstance(e, MonotonePiece) and abs((e.high if upper else e.low) - reach) <= slack]
-    events = [e.end(upper) for e in stops]
-    if len(stops) == 2 and events[0] is not None and events[1] is not None and events[0].orbit is events[1].orbit:
+    stops = [end for end, edge in edges.items() if abs(edge - reach) <= slack]
+    events = [event for end in stops if (event := end.end(upper)) is not None]
+    if len(events) == 2 and events[0].orbit is events[1].orbit:
         where = f"{second} = {reach:.7g}, {events[0].names[1]} = {events[0].parameter(events[0].names[1]):.7g}"
         return reach, f"born and merging meet at {where}: no isola beyond", True, True
     border = stops[0]
@@ -382,22 +363,13 @@ class IsolaRegion:
             return [("bounds", values, np.full(2, end))]
         values = np.unique(np.concatenate((np.linspace(self.span.low, self.span.high, 241), end.values)))
         values = values[(values >= self.span.low) & (values <= self.span.high)]
-        natures = [_WORDS.get(end.nodes[i].isola, "end") for i in (_nearest(end, value) for value in values)]
+        # by the inner nodes: at the ends of a border both natures meet
+        inner = np.arange(1, max(len(end.nodes) - 1, 2))
+        nearest = inner[np.argmin(np.abs(end.values[inner] - values[:, None]), axis=1)]
+        natures = [_WORDS.get(end.nodes[i].isola, "end") for i in nearest]
         where = end.across(values)
-        pieces: list[tuple[str, np.ndarray, np.ndarray]] = []
-        first = 0
-        for i in range(1, len(values) + 1):
-            if i == len(values) or natures[i] != natures[first]:
-                stop = min(i + 1, len(values))
-                pieces.append((natures[first], values[first:stop], where[first:stop]))
-                first = i
-        return pieces
-
-
-def _nearest(border: MonotonePiece, value: float) -> int:
-    """The inner node nearest to a value: at the ends of a border both natures meet."""
-    inner = np.arange(1, max(len(border.nodes) - 1, 2))
-    return int(inner[np.argmin(np.abs(border.values[inner] - value))])
+        cuts = [0, *(i for i in range(1, len(values)) if natures[i] != natures[i - 1]), len(values)]
+        return [(natures[a], values[a : b + 1], where[a : b + 1]) for a, b in pairwise(cuts)]
 
 
 @dataclass(eq=False, repr=False)
@@ -500,12 +472,13 @@ class IsolaMap(Stored):
 
     def to_table(self) -> Table:
         """The borders of the regions, point by point: region, end, what it is, and both parameters."""
-        rows: list[tuple[int, str, str, float, float]] = []
-        for number, region in enumerate(self.regions):
-            for upper in (False, True):
-                for nature, first, second in region.border(upper):
-                    side = "upper" if upper else "lower"
-                    rows += [(number, side, nature, float(a), float(b)) for a, b in zip(first, second, strict=True)]
+        rows = [
+            (number, side, nature, float(a), float(b))
+            for number, region in enumerate(self.regions)
+            for upper, side in enumerate(("lower", "upper"))
+            for nature, first, second in region.border(bool(upper))
+            for a, b in zip(first, second, strict=True)
+        ]
         own = ("region", "end", "border")
         names = (*own, *(parameter_column(name, own) for name in (self.second, self.parameter)))
         return Table.of_rows(names, rows, f"isolas over {self.second} and {self.parameter}")
@@ -530,19 +503,13 @@ class IsolaMap(Stored):
         low, high = self.bounds
         count = len(self.regions)
         regions = f"{count} region{'s' * (count != 1)}"
-        text = f"Isolas over {self.parameter} and {self.second} from {low:g} to {high:g}: {regions}."
+        lines = [f"Isolas over {self.parameter} and {self.second} from {low:g} to {high:g}: {regions}."]
         for region in self.regions:
             span = region.span
-            ends = ", ".join(
-                f"{self.parameter} from {a:.6g} to {b:.6g} at {self.second} = {value:.6g}"
-                for value, (a, b) in ((v, span.range(v)) for v in (span.low, span.high))
-            )
-            text += f"\n{period_name(region.isola.nu)} isola: {ends}"
-            for reason in span.reasons:
-                text += f"\n  {reason}"
+            ranges = ((value, *span.range(value)) for value in (span.low, span.high))
+            ends = [f"{self.parameter} from {a:.6g} to {b:.6g} at {self.second} = {s:.6g}" for s, a, b in ranges]
+            lines += [f"{period_name(region.isola.nu)} isola: {', '.join(ends)}", *(f"  {r}" for r in span.reasons)]
             if region.probes:
                 agreeing = sum(probe.agrees for probe in region.probes)
-                text += f"\n  {agreeing} of {len(region.probes)} closed branches followed within it agree"
-        for note in self.notes:
-            text += f"\nnote: {note}"
-        return text
+                lines.append(f"  {agreeing} of {len(region.probes)} closed branches followed within it agree")
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])

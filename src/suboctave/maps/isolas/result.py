@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,7 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.points import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, limited
-from suboctave.maps.catalogue import SearchRange, branch_through, is_count, listed
+from suboctave.maps.catalogue import SearchRange, branch_through, checked_values
 from suboctave.maps.pieces import MonotonePiece, stable_ranges
 from suboctave.model.system import System
 from suboctave.results.branch import Branch, TrackedBranch
@@ -198,16 +198,11 @@ class Isola:
 
     def _places(self, values: Any) -> list[float]:
         """Values of the parameter at which closed branches are wanted, within the range; InputError otherwise."""
-        low, high = self.range
-        if is_count(values, 1):
-            first, last = low + 0.02 * (high - low), high - 0.08 * (high - low)
-            return [float(v) for v in np.linspace(first, last, values)]
-        places = listed(values)
-        if not places or not all(is_number(value) and value in self for value in places):
-            raise InputError(
-                f"values must be how many, or numbers from {low:.9g} to {high:.9g}, where the isola is, not {values!r}"
-            )
-        return [float(value) for value in places]
+        places, (low, high) = checked_values("values", values, self.range), self.range
+        if not isinstance(places, int):
+            return places
+        first, last = low + 0.02 * (high - low), high - 0.08 * (high - low)
+        return [float(v) for v in np.linspace(first, last, places)]
 
     def __repr__(self) -> str:
         low, high = self.range
@@ -287,7 +282,8 @@ class Isolas(Stored, Sequence[Isola]):
     interruption: Interruption | None = None
 
     def __post_init__(self, isolas: Iterable[Isola]) -> None:
-        self._items = tuple(sorted(isolas, key=_birth))
+        # those whose birth is cut off come last, by the upper end of their range
+        self._items = tuple(sorted(isolas, key=lambda i: (i.born is None, i.range[1] if i.born is None else i.born)))
         self.limit_points, self.doublings = tuple(self.limit_points), tuple(self.doublings)
         self.notes = tuple(self.notes)
 
@@ -342,23 +338,20 @@ class Isolas(Stored, Sequence[Isola]):
 
         Curves of limit points come before those of period doublings; the column `curve` numbers them.
         """
-        makers: dict[str, Callable[[], pandas.DataFrame]] = {
-            "isolas": self._complete_frame,
-            "points": lambda: self._joined([curve.to_dataframe() for curve in self._curves]),
-            "bifurcations": lambda: self._joined([curve.bifurcations_frame() for curve in self._curves]),
-        }
-        if what not in makers:
-            raise InputError(f"to_csv writes isolas, points or bifurcations, not {what!r}{suggest(str(what), makers)}")
-        return write_csv(makers[what](), path, overwrite)
+        known = ("isolas", "points", "bifurcations")
+        if what not in known:
+            raise InputError(f"to_csv writes isolas, points or bifurcations, not {what!r}{suggest(str(what), known)}")
+        if what == "isolas":  # with what happens at the ends, and the notes
+            rows = [isola_row(isola) for isola in self]
+            more = {name: [row[name] for row in rows] for name in ("at_from", "at_to", "notes")}
+            return write_csv(self.to_dataframe().assign(**more), path, overwrite)
+        points = what == "points"
+        frames = [curve.to_dataframe() if points else curve.bifurcations_frame() for curve in self._curves]
+        return write_csv(self._joined(frames), path, overwrite)
 
     @property
     def _curves(self) -> tuple[TrackedBranch, ...]:
         return (*self.limit_points, *self.doublings)
-
-    def _complete_frame(self) -> pandas.DataFrame:
-        """The table with what happens at the ends, and the notes."""
-        rows = [isola_row(isola) for isola in self]
-        return self.to_dataframe().assign(**{name: [r[name] for r in rows] for name in ("at_from", "at_to", "notes")})
 
     def _joined(self, frames: Sequence[pandas.DataFrame]) -> pandas.DataFrame:
         import pandas
@@ -398,11 +391,6 @@ class Isolas(Stored, Sequence[Isola]):
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, *(repr(isola) for isola in self), *(f"note: {note}" for note in self.notes)])
-
-
-def _birth(isola: Isola) -> tuple[bool, float]:
-    """What isolas are sorted by: the value at which one is born; behind all these, the upper end of its range."""
-    return isola.born is None, isola.range[1] if isola.born is None else isola.born
 
 
 # ------------------------------------------------------------------------------------------------------------ tables

@@ -9,6 +9,7 @@ for is located by bisection and noted.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -178,18 +179,15 @@ class Search:
         events = [end for piece in self.catalogue.limit_points if piece.nu == nu for end in piece.ends]
         for curve in self.catalogue.curves:
             if curve.kind == "PD" and 2 * curve.nu == nu:
-                extrema = (e for e in curve.extrema if isinstance(e, TrackedEvent) and e.parameter_name == name)
-                events += extrema
+                events += (e for e in curve.extrema if isinstance(e, TrackedEvent) and e.parameter_name == name)
         sign = 1.0 if upper else -1.0
         ahead = {id(e): e for e in events if e is not None and sign * (e.parameter(name) - value) > near}
-        group: list[TrackedEvent] = []
+        groups: dict[float, list[TrackedEvent]] = {}
         for event in sorted(ahead.values(), key=lambda e: sign * e.parameter(name)):
-            if group and abs(event.parameter(name) - group[0].parameter(name)) > near:
-                yield group[0].parameter(name), group
-                group = []
-            group.append(event)
-        if group:
-            yield group[0].parameter(name), group
+            place = event.parameter(name)
+            begin = next(reversed(groups), math.inf)
+            groups.setdefault(begin if abs(place - begin) <= near else place, []).append(event)
+        yield from groups.items()
 
 
 # ---------------------------------------------------------------------------------------------- ranges of existence
@@ -253,9 +251,9 @@ class _Direction:
 
     def _behind(self, loop: Loop, value: float, events: list[TrackedEvent]) -> Loop | _End:
         """The detached branch behind events at a value, or how it ends there."""
-        own = [e for e in events if any(piece.end(self.upper) is e for piece in loop.pieces)]
-        ending = [piece for piece in loop.pieces if any(piece.end(self.upper) is e for e in own)]
-        lasting = [piece for piece in loop.pieces if piece not in ending and piece.contains(value)]
+        ends = {piece: piece.end(self.upper) for piece in loop.pieces}
+        own = [e for e in events if any(end is e for end in ends.values())]
+        lasting = [p for p, end in ends.items() if not any(end is e for e in own) and p.contains(value)]
         if not lasting:
             return _vanishing(value, own or events, self.name)
         behind = 0.5 * (value + self._next(loop, value))

@@ -111,11 +111,13 @@ def find_isolas(
     widen the bounds, or search for its period.
     """
     catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
-    search_at = checked_values(values, catalogue.bounds)
+    search_at = checked_values("values", values, catalogue.bounds, least=2)
+    if isinstance(search_at, int):
+        search_at = np.linspace(*catalogue.bounds, search_at).tolist()
     check_count("depth", depth, 0)
     other_levels, fine = checked_levels(levels), check_seeds(seeds) or COARSE
     orders = None if search is None else checked_orders(search, 2)
-    state = Search(catalogue, search_at)
+    state = Search(catalogue, sorted(set(search_at)))
     with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
         from_responses(state, depth)
         from_load_levels(state, other_levels, depth)

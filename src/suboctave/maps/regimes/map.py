@@ -8,8 +8,8 @@ stroboscopic point within a hundredth.
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -116,32 +116,31 @@ class RegimeMap(Stored):
         """
         seen = self.strip(value).value
 
-        def ends(there: float) -> tuple[float, float]:
-            low, high = arc.range(there)
-            return max(float(low), self.omega[0]), min(float(high), self.omega[1])
+        def ends(there: float) -> Array:
+            return np.clip(np.array(arc.range(there)), *self.omega)
 
         low, high = ends(value)
         share = (omega - low) / ((high - low) or 1.0)
 
-        def place(way: float) -> tuple[float, float]:
-            there = seen + way * (value - seen)
+        def place(there: float) -> float:
             first, last = ends(there)
-            return first + share * (last - first), there
+            return float(first + share * (last - first))
 
-        begin = place(0.0)[0]
+        begin = place(seen)
         orbit = min((p.orbit for p in arc.points), key=lambda o: abs(o.omega - begin))
         way, step = 0.0, _FIRST
         with one_thread():
             while way < 1.0:
                 target = min(1.0, way + step)
-                at, there = (omega, value) if target == 1.0 else place(target)
-                try:
+                there = seen + target * (value - seen)
+                at, there = (omega, value) if target == 1.0 else (place(there), there)
+                with suppress(ConvergenceError):
                     motion = motion_near(orbit, self.system.with_parameters({self.parameter: there}), at)
-                except ConvergenceError:
-                    motion = None
-                if motion is not None and _follows(orbit, motion):
-                    orbit, way = motion, target
-                    continue
+                    lasting = _own(motion) >= _LASTING * _own(orbit)
+                    # the next one of the arc: not far off, of the same period, stable as all of them are
+                    if lasting and apart(orbit, motion) <= _MOST and floquet_multipliers(motion.state()).stable:
+                        orbit, way = motion, target
+                        continue
                 step *= 0.5
                 if step < _SMALLEST:
                     where = f"omega = {omega:.6g}, {self.parameter} = {value:.6g}"
@@ -241,20 +240,15 @@ class RegimeMap(Stored):
         cells, regimes = self.raster()
         rows, columns = cells.shape
         (low, high), (first, last) = self.bounds, self.omega
-        parts_of_plane = []
+        regions = []
         for number, regime in enumerate(regimes):
-            parts, count = ndimage.label(cells == number)
-            for where, index in zip(ndimage.find_objects(parts), range(1, count + 1), strict=True):
-                up, across = where
-                parts_of_plane.append(
-                    Region(
-                        regime,
-                        float(np.count_nonzero(parts[where] == index) / cells.size),
-                        tuple(first + s / columns * (last - first) for s in (across.start, across.stop)),
-                        tuple(low + s / rows * (high - low) for s in (up.start, up.stop)),
-                    )
-                )
-        return tuple(sorted(parts_of_plane, key=lambda region: -region.share))
+            parts, _ = ndimage.label(cells == number)
+            for index, (up, across) in enumerate(ndimage.find_objects(parts), 1):
+                share = float(np.count_nonzero(parts[up, across] == index) / cells.size)
+                omega = (first + s / columns * (last - first) for s in (across.start, across.stop))
+                values = (low + s / rows * (high - low) for s in (up.start, up.stop))
+                regions.append(Region(regime, share, tuple(omega), tuple(values)))
+        return tuple(sorted(regions, key=lambda region: -region.share))
 
     @property
     def regimes(self) -> tuple[Regime, ...]:
@@ -303,19 +297,15 @@ class RegimeMap(Stored):
     def __repr__(self) -> str:
         (first, last), (low, high) = self.omega, self.bounds
         count = sum(strip.examined for strip in self.strips)
-        text = (
+        head = (
             f"Regimes for omega from {first:g} to {last:g}, {self.parameter} from {low:g} to {high:g}: "
             f"{len(self.regimes)} of stable motions up to {period_name(2**self.depth)}, from {len(self.curves)} curves "
             f"of bifurcations and branches at {count} values of {self.parameter}."
         )
-        shares: defaultdict[Regime, float] = defaultdict(float)
-        for region in self.regions:
-            shares[region.regime] += region.share
-        for regime, share in sorted(shares.items(), key=lambda item: -item[1]):
-            text += f"\n  {100.0 * share:5.1f} %  {regime}"
-        for note in self.notes:
-            text += f"\nnote: {note}"
-        return text
+        shares = {regime: sum(r.share for r in self.regions if r.regime == regime) for regime in self.regimes}
+        listed = sorted(shares.items(), key=lambda item: -item[1])
+        lines = [f"  {100.0 * share:5.1f} %  {regime}" for regime, share in listed]
+        return "\n".join([head, *lines, *(f"note: {note}" for note in self.notes)])
 
 
 #: stroboscopic points of one motion by both ways differ by less, in shares of its largest displacements and velocities
@@ -431,24 +421,26 @@ class RegimeCheck:
             f"{self.points} points, {len(self.landings)} trajectories: {100.0 * self.rate:.2f} % of those that settled "
             f"agree, {100.0 * self.agreeing:.2f} % of the points ({counts})"
         )
-        lines: Counter[str] = Counter()
-        for one in self.disagreements:
-            what = period_name(one.period) if one.period else "nothing periodic"
-            begun = "a random state" if one.start == "state" else f"the {one.start} motion"
-            lines[
-                f"omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
-                f"{one.amplitude:.4g}; the map has {one.expected}: {one.verdict}"
-            ] += 1
-        for line, times in lines.items():
+        for line, times in Counter(map(self._in_words, self.disagreements)).items():
             text += f"\n  {line}" + (f" ({times} trajectories)" if times > 1 else "")
         return text
+
+    def _in_words(self, one: Landing) -> str:
+        what = period_name(one.period) if one.period else "nothing periodic"
+        begun = "a random state" if one.start == "state" else f"the {one.start} motion"
+        return (
+            f"omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
+            f"{one.amplitude:.4g}; the map has {one.expected}: {one.verdict}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """A trajectory's beginning: at which point, from which of the known motions (None: a random state)."""
+    """A trajectory's beginning: where, from which of the motions known there (None: a random state)."""
 
-    point: int
+    omega: float
+    value: float
+    known: list[tuple[Arc, PeriodicOrbit]]
     arc: Arc | None
     state: Array
 
@@ -460,17 +452,16 @@ class _Check:
         self.regimes = regimes
         self.draw = np.random.default_rng(seed)
         sides = (regimes.omega, regimes.bounds)
-        self.places = np.column_stack([self.draw.uniform(low, high, points) for low, high in sides])
+        self.places = np.column_stack([self.draw.uniform(low, high, points) for low, high in sides]).tolist()
         self.sizes = _sizes(regimes)
         self.starts: list[_Start] = []
-        self.known: dict[int, list[tuple[Arc, PeriodicOrbit]]] = {}
         self.unsolved: list[Landing] = []
 
     def begin_at(self, number: int, states: int) -> None:
         """Starts at a point: beside its known motions, and at random states."""
         regimes, n = self.regimes, self.regimes.system.n
-        omega, value = (float(v) for v in self.places[number])
-        known = self.known[number] = []
+        omega, value = self.places[number]
+        known: list[tuple[Arc, PeriodicOrbit]] = []
         for arc in (arc for arc in regimes.arcs(omega, value) if arc.followed):
             try:
                 orbit = regimes.motion(arc, omega, value)
@@ -481,35 +472,31 @@ class _Check:
                 continue
             known.append((arc, orbit))
             beside = _DISTURBED * _extent(orbit) * self.draw.uniform(-1.0, 1.0, 2 * n)
-            self.starts.append(_Start(number, arc, orbit.start() + beside))
+            self.starts.append(_Start(omega, value, known, arc, orbit.start() + beside))
         smallest, largest = self.sizes
         for _ in range(states):
             # of every order of magnitude between the smallest motion and the largest
             scale = smallest * (_WIDE * largest / smallest) ** self.draw.uniform()
-            self.starts.append(_Start(number, None, scale * self.draw.uniform(-1.0, 1.0, 2 * n)))
+            self.starts.append(_Start(omega, value, known, None, scale * self.draw.uniform(-1.0, 1.0, 2 * n)))
 
     def landings(self, transient: int, report: Any) -> list[Landing]:
         """What the trajectories settle on, with verdicts, in the order of the points."""
-        if not self.starts:
-            return sorted(self.unsolved, key=lambda one: (one.omega, one.value))
-        everyone = list(range(len(self.starts)))
-        attractors = self._settled(everyone, [s.state for s in self.starts], transient, report)
-        moving = [i for i in everyone if not attractors[i].period and np.isfinite(attractors[i].points).all()]
+        reached: dict[_Start, Attractor] = {}
+        if self.starts:
+            reached = self._settled({start: start.state for start in self.starts}, transient, report)
+        moving = {s: a.points[-1] for s, a in reached.items() if not a.period and np.isfinite(a.points).all()}
         if moving:
-            again = self._settled(moving, [attractors[i].points[-1] for i in moving], _LONGER * transient, None)
-            for i, attractor in zip(moving, again, strict=True):
-                attractors[i] = attractor
-        judged = [self._judged(start, attractor) for start, attractor in zip(self.starts, attractors, strict=True)]
+            reached |= self._settled(moving, _LONGER * transient, None)
+        judged = [self._judged(start, attractor) for start, attractor in reached.items()]
         return sorted([*self.unsolved, *judged], key=lambda one: (one.omega, one.value))
 
-    def _settled(self, which: Sequence[int], states: Sequence[Array], periods: int, progress: Any) -> list[Attractor]:
-        """What trajectories from states settle on at the points of some of the starts."""
-        at = [self.starts[i].point for i in which]
+    def _settled(self, states: Mapping[_Start, Array], periods: int, progress: Any) -> dict[_Start, Attractor]:
+        """What trajectories settle on that go on from states at the points of some of the starts."""
         sections = poincare_sections(
             self.regimes.system,
-            np.array(states),
-            omega=self.places[at, 0],
-            parameters={self.regimes.parameter: self.places[at, 1]},
+            np.array(list(states.values())),
+            omega=np.array([start.omega for start in states]),
+            parameters={self.regimes.parameter: np.array([start.value for start in states])},
             transient=periods,
             periods=_KEPT,
             tolerance=_TOLERANCE,
@@ -518,13 +505,12 @@ class _Check:
             progress=progress,
         )
         pass_on(sections.interruption)
-        return [sections.attractor(i) for i in range(len(sections))]
+        return {start: sections.attractor(i) for i, start in enumerate(states)}
 
     def _judged(self, start: _Start, attractor: Attractor) -> Landing:
         """A trajectory with its verdict."""
-        omega, value = (float(v) for v in self.places[start.point])
-        label = self.regimes.label(omega, value)
-        same_period = [(arc, orbit) for arc, orbit in self.known[start.point] if arc.nu == attractor.period]
+        label = self.regimes.label(start.omega, start.value)
+        same_period = [(arc, orbit) for arc, orbit in start.known if arc.nu == attractor.period]
         alike = [arc for arc, orbit in same_period if _passes(orbit, attractor.state)]
         beyond = [nu for nu, _ in label.beyond]
         if alike and (start.arc is None or start.arc in alike):
@@ -537,8 +523,8 @@ class _Check:
             verdict = UNSETTLED if label.count else AGREES
         else:
             verdict = UNKNOWN
-        begun = "state" if start.arc is None else period_name(start.arc.nu)
-        return Landing(omega, value, begun, attractor.period, attractor.amplitude, str(label), verdict, attractor.state)
+        begun, at = "state" if start.arc is None else period_name(start.arc.nu), (start.omega, start.value)
+        return Landing(*at, begun, attractor.period, attractor.amplitude, str(label), verdict, attractor.state)
 
 
 def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
@@ -547,12 +533,8 @@ def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
     The linear response in resonance is what no motion of the load's period exceeds by much.
     """
     system, n = regimes.system, regimes.system.n
-    sizes = [
-        _extent(point.orbit)
-        for strip in regimes.strips
-        for arc in strip.arcs
-        for point in (arc.points[0], arc.points[len(arc.points) // 2], arc.points[-1])
-    ]
+    arcs = [arc.points for strip in regimes.strips for arc in strip.arcs]
+    sizes = [_extent(points[i].orbit) for points in arcs for i in (0, len(points) // 2, -1)]
     known = np.array(sizes) if sizes else np.ones((1, 2 * n))
     top = known.max(axis=0)
     curve = make_curve(system, "omega", regimes.omega[0], regimes.omega[1], 1, 1, None)
@@ -581,12 +563,6 @@ def _extent(orbit: PeriodicOrbit) -> Array:
     """Largest displacement and velocity of every DOF, shape (2n,)."""
     dofs = range(orbit.balance.system.n)
     return np.array([orbit.amplitude(i) for i in dofs] + [orbit.velocity_amplitude(i) for i in dofs])
-
-
-def _follows(orbit: PeriodicOrbit, motion: PeriodicOrbit) -> bool:
-    """Whether a motion may be the next one of an arc: not far off, of the same period, stable as all of them are."""
-    lasting = _own(motion) >= _LASTING * _own(orbit)
-    return lasting and apart(orbit, motion) <= _MOST and bool(floquet_multipliers(motion.state()).stable)
 
 
 def _own(orbit: PeriodicOrbit) -> float:

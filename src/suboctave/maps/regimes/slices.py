@@ -127,9 +127,7 @@ class Slice:
             self.branches, self.arcs, self.explained = [], [], []
             for branch in self._responses(reach):
                 self._add(branch, False)
-        done: list[MonotonePiece] = []
-        while (piece := self._unexplained(done)) is not None:
-            done.append(piece)
+        for piece in self._unexplained():
             for branch, isolated in self._through(piece):
                 self._add(branch, isolated)
         if len(self.branches) > before:
@@ -155,11 +153,13 @@ class Slice:
                     yield branch
             known += diagram.branches
 
-    def _unexplained(self, done: list[MonotonePiece]) -> MonotonePiece | None:
-        """A limit point within the range that lies on no branch."""
+    def _unexplained(self) -> Iterator[MonotonePiece]:
+        """Limit points within the range that lie on no branch that is known by then."""
         low, high = self.catalogue.omega
-        here = (p for p in self.catalogue.limit_points if p.contains(self.value) and p not in [*self.explained, *done])
-        return next((piece for piece in here if low <= float(piece.across(self.value)) <= high), None)
+        for piece in self.catalogue.pieces:  # to which more are added on the way
+            new = piece.kind == "LP" and piece not in self.explained and piece.contains(self.value)
+            if new and low <= float(piece.across(self.value)) <= high:
+                yield piece
 
     def _through(self, piece: MonotonePiece) -> Iterator[tuple[Branch, bool]]:
         """The branch through a limit point, its mirror image if that is another one, and what bifurcates from them."""
@@ -218,11 +218,11 @@ class Slice:
 
     def _add_arc(self, arc: Arc) -> None:
         """Branches begun at different ends may have a part in common: the longer one shows where it ends."""
-        alike = [i for i, other in enumerate(self.arcs) if other.nu == arc.nu and _shared(arc, other)]
-        if not alike:
+        alike = next((i for i, other in enumerate(self.arcs) if other.nu == arc.nu and _shared(arc, other)), None)
+        if alike is None:
             self.arcs.append(arc)
-        elif sum(edge.bound for edge in arc.edges) < sum(edge.bound for edge in self.arcs[alike[0]].edges):
-            self.arcs[alike[0]] = arc
+        elif sum(edge.bound for edge in arc.edges) < sum(edge.bound for edge in self.arcs[alike].edges):
+            self.arcs[alike] = arc
 
     def _arc(self, stretch: Stretch, isolated: bool, beyond: bool) -> Arc:
         catalogue = self.catalogue
@@ -241,9 +241,8 @@ class Slice:
                 )
             outside = -float("inf") if end <= low + slack else float("inf")
             edges.append(Edge(outside if bound else end, bound=bound))
-        edges.sort(key=lambda edge: edge.omega)
-        nu = stretch.branch.nu * (2 if beyond else 1)
-        return Arc(nu, isolated, (edges[0], edges[1]), stretch.points, not beyond)
+        first, last = sorted(edges, key=lambda edge: edge.omega)
+        return Arc(stretch.branch.nu * (1 + beyond), isolated, (first, last), stretch.points, not beyond)
 
 
 def _shared(one: Arc, other: Arc) -> bool:
