@@ -80,8 +80,8 @@ ROWS = [
     # ------------------------------------------------------------------------------------------------- switch_branch
     ("type misspelt", '"switch_branch"', '"swich_branch"', ["mean 'switch_branch'"], "analyses[2].type", "swich"),
     ("no start", SWITCH + "\n", "", ["missing"], "analyses[2].start", "[[analyses]]"),
-    ("start a name", SWITCH, 'start = "response"', ["must be a table"], "analyses[2].start", 'start = "response"'),
-    ("start numbers", SWITCH, "start = [0.1, 0.0]", ["must be a table"], "analyses[2].start", "start = [0.1"),
+    ("start a name", SWITCH, 'start = "response"', ["name the bifurcation"], "analyses[2].start", 'start = "response"'),
+    ("start numbers", SWITCH, "start = [0.1, 0.0]", ["a text or a table"], "analyses[2].start", "start = [0.1"),
     ("start a point", SWITCH, 'start = { analysis = "response", point = 3 }', ["name the bifurcation", '"PD" or "BP"'],
      "analyses[2].start", "point = 3"),
     ("start without an analysis", SWITCH, 'start = { bifurcation = "BP" }', ["missing"], "analyses[2].start.analysis",

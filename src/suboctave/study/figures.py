@@ -5,15 +5,15 @@ The keys of a figure are the options of the function that draws it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from suboctave.curves.junction import period_name
-from suboctave.errors import InputError, chosen_dof, suggest
+from suboctave.errors import InputError, Key, chosen_dof, suggest
 from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isolas
 from suboctave.model.inputs import check_element
@@ -27,18 +27,7 @@ from suboctave.results.diagram import BifurcationDiagram
 from suboctave.results.readings import gapped_elements
 from suboctave.store.motions import motion_datasets
 from suboctave.study.results import Result
-from suboctave.study.steps.base import (
-    CheckContext,
-    Complaint,
-    Motion,
-    Step,
-    check_branch,
-    check_motion,
-    chosen,
-    chosen_branch,
-    name_or_table,
-    tried,
-)
+from suboctave.study.steps.base import CheckContext, Complaint, Motion, Step, tried
 
 _VIEW = [field.name for field in fields(View)]
 _Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -54,7 +43,7 @@ class StudyCurves:
     @property
     def planes(self) -> dict[str, tuple[str, str] | None]:
         """The curves by name, with the two parameters of those that are tracked or bound isolas, else None."""
-        return {name: step.plane for name, step in self.steps.items() if step.drawn()}
+        return {name: step.plane for name, step in self.steps.items() if step.gives != "table"}
 
 
 class Figure(BaseModel):
@@ -75,7 +64,7 @@ class Figure(BaseModel):
     size: Any = None
 
     @property
-    def texts(self) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def texts(self) -> Iterator[tuple[Key, str]]:
         """What is written on it, with the key of each."""
         for key in ("title", "unit", "xlabel", "ylabel", "zlabel"):
             if getattr(self, key, None) is not None:
@@ -101,6 +90,8 @@ class Figure(BaseModel):
 
 class CurveFigure(Figure):
     """One figure of curves; what is drawn follows the keys of `View`."""
+
+    plot: ClassVar[Callable[..., Any]]
 
     analyses: list[str] = Field(default_factory=list)
     x: str | None = None
@@ -166,45 +157,42 @@ class CurveFigure(Figure):
         if not there:
             return False
         view = self.view
-        alone = results[there[0]] if len(there) == 1 else None
         given: list[str] | None = getattr(self, "labels", None)
-        labels: Sequence[str] | None = None
-        if given is not None:
-            labels = [label for name in there for label in self._labels(results[name], given[every.index(name)])]
-        elif isinstance(alone, BifurcationDiagram):
-            labels = alone.legend
-        if isinstance(alone, BifurcationDiagram) and view.marks is None:
-            view = replace(view, marks=alone.marks)
-        datasets = [dataset for name in there for dataset in self.datasets(results[name], view)]
-        if not datasets:
+        drawn = [
+            curve
+            for name in there
+            for curve in self._of_result(results[name], view, given[every.index(name)] if given else "")
+        ]
+        if not drawn:
             return False
-        self.drawing(datasets_of(datasets, view), path, labels, view)
+        labels = [label for _, label in drawn if label is not None] if given else None
+        alone = results[there[0]] if len(there) == 1 else None
+        if isinstance(alone, BifurcationDiagram):
+            labels = labels or alone.legend
+            view = replace(view, marks=alone.marks) if view.marks is None else view
+        datasets = datasets_of([dataset for dataset, _ in drawn], view)
+        type(self).plot(datasets, path, **self.options(labels, view))
         return True
 
-    def datasets(self, item: Result, view: View) -> list[Any]:
-        """What of a result is drawn."""
+    def _of_result(self, item: Result, view: View, label: str) -> list[tuple[Any, str | None]]:
+        """What of a result is drawn, each with its label: those of a diagram's branches name their periods, those of
+        isolas what they are; none for the regions.
+        """
         if isinstance(item, Isolas):
-            return self.of_isolas(item.to_xarray(readings=view.readings(0)))
-        return [branch.to_xarray(readings=view.readings(branch.nu)) for branch in _branches_of(item)]
+            datasets = item.to_xarray(readings=view.readings(0))
+            names = {id(dataset): name.split(": ")[-1] for name, dataset in datasets.items()}
+            shown = ((dataset, names[id(dataset)]) for dataset in self.of_isolas(datasets))
+            return [(dataset, None if name == "isolas" else f"{label}, {name}") for dataset, name in shown]
+        of_diagram = isinstance(item, BifurcationDiagram)
+        return [(b, f"{label}, {period_name(b.nu)}" if of_diagram else label) for b in _branches_of(item)]
 
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
         """What of isolas is drawn."""
         raise TypeError(f"{type(self).__name__} does not say what of isolas it draws")
 
-    def _labels(self, item: Result, label: str) -> list[str]:
-        """The label of a curve; those of a diagram's branches name their periods, those of isolas what they are."""
-        if isinstance(item, BifurcationDiagram):
-            return [f"{label}, {period_name(branch.nu)}" for branch in _branches_of(item)]
-        if isinstance(item, Isolas):
-            datasets = item.to_xarray()
-            shown = {id(dataset) for dataset in self.of_isolas(datasets)}
-            names = [name.split(": ")[-1] for name, dataset in datasets.items() if id(dataset) in shown]
-            return [f"{label}, {name}" for name in names if name != "isolas"]
-        return [label]
-
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        """Draw the datasets of its curves."""
-        raise TypeError(f"{type(self).__name__} does not say how it is drawn")
+    def options(self, labels: Sequence[str] | None, view: View) -> dict[str, Any]:
+        """What `plot` takes besides the datasets."""
+        return {"x": self.x, "labels": labels, "title": self.title, "size": self.size, "view": view}
 
 
 _CURVES = (Branch, BifurcationDiagram, Isolas)
@@ -239,6 +227,7 @@ class ResponseFigure(PlaneFigure):
     Of isolas that are named the closed branches known are drawn, or those at the values `at`.
     """
 
+    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_response)
     kind: str = "response"
     at: list[float] | None = None
 
@@ -252,17 +241,15 @@ class ResponseFigure(PlaneFigure):
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
         yield from super().check(study)
         for i, name in enumerate(self.analyses):
-            tracked = study.planes.get(name) is not None and not study.steps[name].gives_isolas
+            tracked = study.planes.get(name) is not None and study.steps[name].gives != "isolas"
             if tracked and self.x is None:
                 yield ("analyses", i), f'{name!r} is a curve of bifurcations: kind = "boundary" draws it, or give x'
-
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        plot_response(datasets, path, x=self.x, labels=labels, title=self.title, size=self.size, view=view)
 
 
 class BoundaryFigure(PlaneFigure):
     """Curves of bifurcations and regions of isolas in the plane of two parameters; with a `quantity`, this upwards."""
 
+    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_boundaries)
     kind: Literal["boundary"]
     y: str | None = None
 
@@ -299,9 +286,8 @@ class BoundaryFigure(PlaneFigure):
     def of_isolas(self, datasets: Mapping[str, Any]) -> list[Any]:
         return [dataset for dataset in datasets.values() if "isola" not in dataset.attrs]
 
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        axes: dict[str, Any] = {"x": self.x, "y": self.y, "projected": self.projected}
-        plot_boundaries(datasets, path, **axes, labels=labels, title=self.title, size=self.size, view=view)
+    def options(self, labels: Sequence[str] | None, view: View) -> dict[str, Any]:
+        return {**super().options(labels, view), "y": self.y, "projected": self.projected}
 
 
 class SpaceFigure(CurveFigure):
@@ -310,6 +296,7 @@ class SpaceFigure(CurveFigure):
     Of isolas the closed branches known are drawn, or those at the values `at`.
     """
 
+    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_space)
     kind: Literal["space"]
     y: str | None = None
     size: Any = (6.4, 5.0)
@@ -333,10 +320,9 @@ class SpaceFigure(CurveFigure):
         elif curves and not planes and self.y is None:
             yield ("y",), "is missing: the parameter into the depth, which no tracked curve tells here"
 
-    def drawing(self, datasets: list[Any], path: Path, labels: Sequence[str] | None, view: View) -> None:
-        own = {name: getattr(self, name) for name in ("x", "y", "zlabel", "elevation", "azimuth", "title", "size")}
-        units: dict[str, Any] = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
-        plot_space(datasets, path, **own, **units)
+    def options(self, labels: Sequence[str] | None, view: View) -> dict[str, Any]:
+        units = {name: getattr(view, name) for name in _VIEW if name in type(self).model_fields}
+        return {**self.model_dump(exclude={"kind", "file", "analyses", "at"}), **units}
 
 
 def _closed(datasets: Mapping[str, Any], values: Sequence[float] | None) -> list[Any]:
@@ -359,39 +345,25 @@ def _same(x: str | None, y: str | None) -> Iterator[Complaint]:
 
 
 # ------------------------------------------------------------------------------------------------------------ motions
-_Motion = Annotated[Annotated[str, Tag("name")] | Annotated[Motion, Tag("table")], Discriminator(name_or_table)]
-#: keys of a figure that are no options of what draws it
-_OWN = {"kind", "file", "motions", "dof"}
-
-
 class MotionFigure(Figure):
     """One figure of motions, each chosen as `start` chooses one."""
 
-    plot: ClassVar[Any]
+    plot: ClassVar[Callable[..., Any]]
     quantities: ClassVar[Sequence[str]] = ("displacement",)
 
-    motions: list[_Motion] = Field(min_length=1)
+    motions: list[Motion] = Field(min_length=1)
     overlay: bool = False
     labels: list[str] | None = None
-
-    @property
-    def chosen(self) -> list[Motion]:
-        """The motions; the name of an analysis alone means its last point."""
-        return [Motion(analysis=given) if isinstance(given, str) else given for given in self.motions]
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
         curves = list(study.planes)
         kinds = {name: type(step) for name, step in study.steps.items()}
-        around = None if study.system is None else CheckContext(study.system, kinds)
-        for i, motion in enumerate(self.chosen):
-            key: tuple[str | int, ...] = ("motions", i)
+        for i, motion in enumerate(self.motions):
+            key: Key = ("motions", i)
             if motion.analysis not in curves:
                 yield key, f"no analysis {motion.analysis!r} gives a curve{suggest(motion.analysis, curves)}"
-            elif around is not None:
-                named = key if isinstance(self.motions[i], str) else (*key, "analysis")
-                yield from check_branch(motion, named, around)
-            if around is not None:
-                yield from check_motion(motion, key, around)
+            elif study.system is not None:
+                yield from motion.check(key, CheckContext(study.system, kinds))
         if self.labels is not None and len(self.labels) != len(self.motions):
             yield ("labels",), f"{len(self.labels)} labels for {len(self.motions)} motions"
         quantity, element = getattr(self, "quantity", "displacement"), getattr(self, "element", None)
@@ -406,34 +378,33 @@ class MotionFigure(Figure):
         """See `Figure.draw`; False also where an analysis was interrupted before the motion."""
         element = getattr(self, "element", None)
         datasets = []
-        for motion in self.chosen:
+        for motion in self.motions:
             result = results.get(motion.analysis)
             if result is None or not len(result):
                 return False
             try:
-                branch, item = chosen_branch(motion, results), chosen(motion, results)
+                branch, item = motion.of(results), motion.chosen(results)
             except InputError:
                 if isinstance(result, _CURVES) and result.interrupted:
                     return False
                 raise
             dof = branch.observe if self.dof is None else self.dof
             datasets += motion_datasets(item, dof=dof, elements=() if element is None else (element,))
-        options = {name: getattr(self, name) for name in type(self).model_fields if name not in _OWN}
-        type(self).plot(datasets, path, **options)
+        type(self).plot(datasets, path, **self.model_dump(exclude={"kind", "file", "motions", "dof"}))
         return True
 
 
 class PhaseFigure(MotionFigure):
     """Phase portraits."""
 
-    plot: ClassVar[Any] = staticmethod(plot_phase)
+    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_phase)
     kind: Literal["phase"]
 
 
 class SpectrumFigure(MotionFigure):
     """Spectra."""
 
-    plot: ClassVar[Any] = staticmethod(plot_spectrum)
+    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_spectrum)
     quantities: ClassVar[Sequence[str]] = tuple(DERIVATIVES)
     kind: Literal["spectrum"]
     quantity: str = "displacement"
@@ -443,7 +414,7 @@ class SpectrumFigure(MotionFigure):
 class HistoryFigure(MotionFigure):
     """Time histories."""
 
-    plot: ClassVar[Any] = staticmethod(plot_history)
+    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_history)
     quantities: ClassVar[Sequence[str]] = (*DERIVATIVES, "force")
     kind: Literal["history"]
     quantity: str = "displacement"

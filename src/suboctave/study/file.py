@@ -68,10 +68,6 @@ class Study:
     allow_code: bool = False
     seconds: float | None = None
 
-    def system_of(self, step: Step) -> System:
-        """The system at the parameters of one analysis."""
-        return self.system.with_parameters(step.parameters) if step.parameters else self.system
-
     @cached_property
     def keys(self) -> dict[str, str]:
         """Of each analysis what it depends on, as a digest: version, system, arguments, the analyses it starts from.
@@ -150,8 +146,12 @@ def _what_is_left(given: Mapping[str, Any]) -> SystemSection | None:
 
 def _fits(key: str, value: Any) -> bool:
     if key == "analyses":
-        return isinstance(value, list) and all(isinstance(item, dict) for item in value)
+        return _is_tables(value)
     return key != "seconds" and isinstance(value, str if key == "title" else dict)
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(item, dict) for item in value)
 
 
 def _refused(source: Path, message: str, line: int = 0) -> StudyError:
@@ -210,26 +210,22 @@ def _steps(
         place = ("analyses", index)
         kind = given.get("type")
         if not isinstance(kind, str) or kind not in STEPS:
-            if kind is None:
-                mistakes.add((*place, "type"), f"is missing{suggest('', STEPS)}")
-            else:
-                mistakes.add((*place, "type"), f"there is no analysis of the type {kind!r}{suggest(str(kind), STEPS)}")
+            missing = f"is missing{suggest('', STEPS)}"
+            wrong = f"there is no analysis of the type {kind!r}{suggest(str(kind), STEPS)}"
+            mistakes.add((*place, "type"), missing if kind is None else wrong)
             steps.append(None)
         else:
-            named = {"name": kind, **given} if isinstance(kind, str) else dict(given)
-            step = _validated(STEPS[kind], named, place, mistakes)
+            step = _validated(STEPS[kind], {"name": kind, **given}, place, mistakes)
             steps.append(step)
-            if step is not None and system is not None:
-                here, motions = overridden(system, step.parameters, (*place, "parameters"), mistakes), None
-                if here is not None:
-                    around = CheckContext(here, before, allow_code, known)
-                    with mistakes.at(*place):
-                        wrong = list(step.check(around))
-                        for where, text in wrong:
-                            mistakes.add((*place, *where), text)
-                        motions = None if wrong else step.known(around)
-                if motions is not None:
-                    known[step.name] = motions
+            here = step and system and overridden(system, step.parameters, (*place, "parameters"), mistakes)
+            if here is not None:
+                around, before_it = CheckContext(here, before, allow_code, known), len(mistakes)
+                with mistakes.at(*place):
+                    for where, text in step.check(around):
+                        mistakes.add((*place, *where), text)
+                    motions = step.known(around)
+                    if motions is not None and len(mistakes) == before_it:
+                        known[step.name] = motions
         name = given.get("name", kind)
         if not isinstance(name, str):
             continue
@@ -251,7 +247,7 @@ def _outputs(
     plain = dict(given)
     figures = plain.pop("figures", [])
     sections: list[Figure] = []
-    if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
+    if not _is_tables(figures):
         mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
         figures = []
     for index, item in enumerate(figures):
@@ -266,8 +262,8 @@ def _outputs(
     if outputs is None or len(sections) < len(figures):
         return None
     complete: Outputs = outputs.model_copy(update={"figures": sections})
-    known = [step for step in steps if step is not None]
-    if len(known) == len(steps) and steps:
-        for key, text in check_outputs(complete, StudyCurves({step.name: step for step in known}, system)):
+    known = {step.name: step for step in steps if step is not None}
+    if steps and None not in steps:
+        for key, text in check_outputs(complete, StudyCurves(known, system)):
             mistakes.add(("outputs", *key), text)
     return complete

@@ -70,10 +70,8 @@ class Mistakes:
     def add_validation(self, prefix: Key, error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> None:
         """What pydantic found in the table at `prefix`, which is a `model`, in our words."""
         for item in error.errors(include_url=False):
-            path = (*prefix, *item["loc"])
-            self.add(
-                _shortened(path, self.lines, item["type"] == "missing"), _in_words(item, _keys(model, item["loc"]))
-            )
+            path = _shortened((*prefix, *item["loc"]), self.lines, item["type"] == "missing")
+            self.add(path, _in_words(item, _keys(model, item["loc"])))
 
     def __len__(self) -> int:
         return len(self._mistakes)
@@ -147,8 +145,7 @@ def _in_words(item: Any, known: list[str]) -> str:
         bound = "at least" if kind == "too_short" else "at most"
         return f"must have {bound} {wanted} item{'s' * (wanted != 1)}, not {about['actual_length']}"
     if kind == "union_tag_not_found":
-        ways = "a text or a table" if "name_or_table" in str(item["ctx"]) else "a text, a table or a list"
-        return f"must be {ways}, not {given!r}"
+        return f"must be a text, a table or a list, not {given!r}"
     if kind == "string_too_short":
         return "must not be empty"
     text = _WORDS.get(kind, text)
@@ -177,23 +174,17 @@ def _tokens(text: str) -> Iterator[tuple[str, int]]:
         line += match[0].count("\n")
 
 
-class Lines:
-    """The lines (from 1) of the keys of a TOML text."""
+class Lines(dict[Key, int]):
+    """The lines (from 1) of the keys of a TOML text; of a key that it does not have that of what it would stand in."""
 
     def __init__(self, text: str) -> None:
-        self._places: dict[Key, int] = {(): 1}
+        super().__init__({(): 1})
         self._tokens = deque(_tokens(text))
         with suppress(IndexError, RecursionError):  # what stands before it is still right
             self._walk()
 
-    def __getitem__(self, path: Key) -> int:
-        """The line of a key, or of what it would stand in."""
-        while path not in self._places:
-            path = path[:-1]
-        return self._places[path]
-
-    def __contains__(self, path: Key) -> bool:
-        return path in self._places
+    def __missing__(self, path: Key) -> int:
+        return self[path[:-1]]
 
     def _passed(self, mark: str) -> bool:
         """Whether this mark comes next, which is passed then."""
@@ -217,23 +208,22 @@ class Lines:
                 self._pair(table)
                 continue
             is_array = self._passed("[")
-            table = ()
-            keys = self._key("]")
+            table, keys = (), self._key("]")
             for place, key in enumerate(keys, 1):
                 table = (*table, key)
                 if is_array and place == len(keys):
                     self._tokens.popleft()
-                    self._places.setdefault(table, line)
+                    self.setdefault(table, line)
                     counts[table] = counts.get(table, -1) + 1
                 if table in counts:  # the name of an array of tables means its last table
                     table = (*table, counts[table])
-            self._places.setdefault(table, line)
+            self.setdefault(table, line)
 
     def _pair(self, table: Key) -> None:
         line = self._tokens[0][1]
         for key in self._key("="):
             table = (*table, key)
-            self._places.setdefault(table, line)
+            self.setdefault(table, line)
         self._value(table)
 
     def _key(self, end: str) -> list[str]:
@@ -241,18 +231,15 @@ class Lines:
         parts = []
         while not self._passed(end):
             part, _ = self._tokens.popleft()
-            if part[0] in "\"'":
-                part = next(iter(tomllib.loads(f"{part} = 0")))
-            elif part == ".":
-                continue
-            parts.append(part)
+            if part != ".":
+                parts.append(next(iter(tomllib.loads(f"{part} = 0"))))
         return parts
 
     def _value(self, path: Key) -> None:
         if self._passed("["):
             index = 0
             while self._more("]"):
-                self._places.setdefault((*path, index), self._tokens[0][1])
+                self.setdefault((*path, index), self._tokens[0][1])
                 self._value((*path, index))
                 index += 1
         elif self._passed("{"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -26,7 +25,6 @@ from suboctave.study.steps.base import Complaint, tried
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 #: bytes of a file name: disks take 255, and half a name more is needed while it is written
 _LONGEST = 200
-_REPORT = "suboctave.pictures.report"
 
 
 class Outputs(BaseModel):
@@ -44,17 +42,12 @@ class Outputs(BaseModel):
 def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
     """What is wrong with the outputs, before any work: key and message."""
     steps = list(study.steps.values())
-    names: list[Complaint] = [(("results",), outputs.results)]
-    yield from _wrong_suffix(("results",), outputs.results, (".nc",))
+    names: list[tuple[Key, str, Sequence[str]]] = [(("results",), outputs.results, (".nc",))]
     if outputs.html is not None:
-        names.append((("html",), outputs.html))
-        yield from _wrong_suffix(("html",), outputs.html, (".html", ".htm"))
-        if importlib.util.find_spec(_REPORT) is None:
-            yield ("html",), "this version writes no report pages: leave it out"
+        names.append((("html",), outputs.html, (".html", ".htm")))
     for index, figure in enumerate(outputs.figures):
         key = ("figures", index)
-        names.append(((*key, "file"), figure.file))
-        yield from _wrong_suffix((*key, "file"), figure.file, SUFFIXES)
+        names.append(((*key, "file"), figure.file, SUFFIXES))
         for where, text in figure.texts:
             yield from (((*key, *where), why) for _, why in tried("", partial(check_text, text)))
         yield from (((*key, *where), text) for where, text in figure.check(study))
@@ -63,7 +56,9 @@ def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
     if outputs.folder is not None and not _printable(outputs.folder):
         yield ("folder",), f"{outputs.folder!r} has characters that no name has"
-    for place, name in names:
+    for place, name, suffixes in names:
+        if PurePath(name).suffix.lower() not in suffixes:
+            yield place, f"{name!r} must end in {' or '.join(suffixes)}"
         if PurePath(name).name != name or name in (".", ".."):
             yield place, f"{name!r} is a name inside the folder of the outputs, without slashes"
         elif not _printable(name):
@@ -79,19 +74,14 @@ def _printable(name: str) -> bool:
     return all(character.isprintable() for character in name)
 
 
-def _wrong_suffix(key: Key, name: str, suffixes: Sequence[str]) -> Iterator[Complaint]:
-    if PurePath(name).suffix.lower() not in suffixes:
-        yield key, f"{name!r} must end in {' or '.join(suffixes)}"
-
-
 def csv_names(steps: Sequence[Step]) -> list[str]:
     """The names of the tables that `csv = true` writes."""
     names = []
     for step in steps:
         names.append(f"{step.name}.csv")
-        if step.gives_isolas:
+        if step.gives == "isolas":
             names.append(f"{step.name}_points.csv")
-        if step.drawn():
+        if step.gives != "table":
             names.append(f"{step.name}_bifurcations.csv")
     return names
 
@@ -130,11 +120,12 @@ def write_outputs(
             missing.append(f"outputs.figures[{index}] is not drawn: {error}")
     path = folder / (outputs.html or "")
     if outputs.html is not None and path not in left and any(drawable(item) for item in results.values()):
-        report: Any = importlib.import_module(_REPORT)
+        from suboctave.pictures.report import write_report
+
         # of isolas that none was found is said
         worth = {name: item for name, item in results.items() if isinstance(item, Isolas) or len(item)}
         shown = {name: _shown(item, results.details.get(name, {})) for name, item in worth.items()}
-        report.write_report(shown, path, title=title or "Study", overwrite=True)
+        write_report(shown, path, title=title or "Study", overwrite=True)
         yield path
     if missing:
         rest = "everything else is written; change the figure, and go on with --resume"

@@ -43,7 +43,10 @@ _OFTEN = 1.0
 
 @dataclass(frozen=True)
 class Finished:
-    """An analysis that is over: its result (None if it has none), the seconds it took, and what is to be said of it."""
+    """An analysis that is over: its result (None if it has none), the seconds it took, and what is to be said of it.
+
+    `interruption`: what stopped it before its end; it may have no result then.
+    """
 
     step: Step
     result: Result | None
@@ -51,6 +54,7 @@ class Finished:
     reused: bool = False
     failure: str = ""
     wrong_input: bool = False
+    interruption: Interruption | None = None
 
 
 @dataclass
@@ -127,29 +131,28 @@ def run_study(
         journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
         with time_limit(seconds) as limit:
             for step in study.steps:
-                whole = not any(name in unfinished for _, name in step.needs())
-                done, interruption = _one(study, step, results, journal, watch, whole)
-                if interruption is not None or not whole:
+                whole = unfinished.isdisjoint(name for _, name in step.needs())
+                done = _one(study, step, results, journal, watch, whole)
+                if done.interruption is not None or not whole:
                     unfinished.add(step.name)
-                if done is not None:
+                if done.result is not None:
+                    results[step.name] = done.result
+                    key = "" if step.name in unfinished else study.keys[step.name]
+                    arguments = step.model_dump_json(exclude_defaults=True)
+                    own = {"type": step.kind, "seconds": done.seconds, "key": key, "arguments": arguments}
+                    details[step.name] = own
+                if done.result is not None or done.failure:
                     outcome.finished.append(done)
-                    if done.result is not None:
-                        results[step.name] = done.result
-                        key = "" if step.name in unfinished else study.keys[step.name]
-                        arguments = step.model_dump_json(exclude_defaults=True)
-                        own = {"type": step.kind, "seconds": done.seconds, "key": key, "arguments": arguments}
-                        details[step.name] = own
                     if report is not None:
                         report(done)
-                if interruption is not None:
-                    outcome.interruption = interruption
+                if done.interruption is not None:
+                    outcome.interruption = done.interruption
                     # the time limit of an analysis stops that one alone
-                    if interruption.seconds is None or (limit is not None and limit.reached):
+                    if done.interruption.seconds is None or (limit is not None and limit.reached):
                         break
         if results:
             journal.extend([("output", {"file": path.name}, None) for path in targets])
-            everything = Results(results, _attributes(study, list(results)), details)
-            outcome.files = list(write_outputs(study.outputs, everything, place, study.title))
+            outcome.files = _written(study, results, details, place)
         if not (outcome.interrupted or outcome.failed):  # else --resume goes on from here
             journal.remove()
     return outcome
@@ -187,65 +190,57 @@ def _check_folder(place: Path) -> None:
         raise InputError(f"the folder {place} is not writable: write elsewhere with --out")
 
 
-def _attributes(study: Study, names: list[str]) -> dict[str, Any]:
-    """What a results file says of the study that it is of."""
-    return {"title": study.title, "study": study.text, "analyses": "\n".join(names)}
+def _written(
+    study: Study, results: dict[str, Result], details: dict[str, Any], place: Path, left: Sequence[Path] = ()
+) -> list[Path]:
+    """The files that are written of results; those in `left` are not."""
+    attributes = {"title": study.title, "study": study.text, "analyses": "\n".join(results)}
+    return list(write_outputs(study.outputs, Results(results, attributes, details), place, study.title, left))
 
 
 def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -> Outcome:
     """The results are there: write the outputs that are missing, or all. InputError if they are another study's."""
-    path = targets[0]
+    path, names = targets[0], [step.name for step in study.steps]
     results = load(path, allow_code=study.allow_code)
-    done = isinstance(results, Results) and all(
-        step.name in results and results.details[step.name].get("key") == study.keys[step.name] for step in study.steps
-    )
-    if not done:
+    if not isinstance(results, Results) or not all(
+        name in results and results.details[name].get("key") == study.keys[name] for name in names
+    ):
         raise InputError(
             f"there is nothing to resume: {path} holds the results of another study, or of this one before it was "
             "changed; --overwrite replaces it, --out writes elsewhere"
         )
-    assert isinstance(results, Results)
+    details = {name: results.details[name] for name in names}
     finished = [
-        Finished(step, results[step.name], float(results.details[step.name].get("seconds", 0.0)), True)
-        for step in study.steps
+        Finished(step, results[step.name], float(details[step.name].get("seconds", 0.0)), True) for step in study.steps
     ]
     left = [] if overwrite else [target for target in targets if target.exists()]
     if len(left) < len(targets):
         _check_folder(place)
-    details = {step.name: results.details[step.name] for step in study.steps}
-    everything = Results({name: results[name] for name in details}, _attributes(study, list(details)), details)
-    files = list(write_outputs(study.outputs, everything, place, study.title, left))
+    files = _written(study, {name: results[name] for name in names}, details, place, left)
     return Outcome(finished, files, complete=path, left=left)
 
 
 def _one(
-    study: Study,
-    step: Step,
-    results: dict[str, Result],
-    journal: Journal,
-    watch: Watch | None,
-    whole: bool,
-) -> tuple[Finished | None, Interruption | None]:
-    """One analysis: what came of it, and what stopped it; `whole`: what it starts from is complete, and so it may be
-    kept as complete.
-    """
+    study: Study, step: Step, results: dict[str, Result], journal: Journal, watch: Watch | None, whole: bool
+) -> Finished:
+    """What came of one analysis; `whole`: what it starts from is complete, and so it may be kept as complete."""
     key = study.keys[step.name]
     kept = finished(journal.records, key, study.allow_code) if whole else None
     if kept is not None:
         result, attributes = kept
-        return Finished(step, result, float(attributes.get("seconds", 0.0)), reused=True), None
+        return Finished(step, result, float(attributes.get("seconds", 0.0)), reused=True)
     missing = [name for _, name in step.needs() if name not in results]
     if missing:
-        return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing"), None
+        return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing")
     begin = perf_counter()
     interruption: Interruption | None = None
     outcome: Result | None = None
     failure, wrong = "", False
     with nullcontext() if watch is None else watch(step) as progress:
         try:
-            system = study.system_of(step)
-            keeper = BranchKeeper(journal, step, key, study.allow_code) if whole else None
-            noted = Noting(journal, step, progress)
+            system = study.system.with_parameters(step.parameters) if step.parameters else study.system
+            keeper = BranchKeeper(journal, step.name, key, study.allow_code) if whole else None
+            noted = Noting(journal, step.name, progress)
             with time_limit(step.seconds):
                 outcome = step.run(Context(system, results, noted, study.allow_code, keeper))
         except KeyboardInterrupt as cause:
@@ -263,9 +258,7 @@ def _one(
         interruption = interruption or outcome.interruption
         if interruption is None and whole:
             keep(journal, step.name, key, outcome, seconds)
-    if outcome is None and interruption is not None and not failure:
-        return None, interruption
-    return Finished(step, outcome, seconds, failure=failure, wrong_input=wrong), interruption
+    return Finished(step, outcome, seconds, False, failure, wrong, interruption)
 
 
 # ------------------------------------------------------------------------------------------------------- the journal
@@ -308,8 +301,8 @@ def _branches(records: Sequence[Record], key: str) -> dict[tuple[int, int], Reco
 class BranchKeeper:
     """Keeps the branches of a diagram in the journal when they are complete, and knows those of an earlier run."""
 
-    def __init__(self, journal: Journal, step: Step, key: str, allow_code: bool) -> None:
-        self.journal, self.name, self.key, self.allow_code = journal, step.name, key, allow_code
+    def __init__(self, journal: Journal, name: str, key: str, allow_code: bool) -> None:
+        self.journal, self.name, self.key, self.allow_code = journal, name, key, allow_code
         self._known = _branches(journal.records, key)
 
     def known(self, parent: int, event: int) -> Branch | None:
@@ -330,8 +323,8 @@ class BranchKeeper:
 class Noting:
     """A `progress=` that passes reports on and writes what there is so far to the journal now and then."""
 
-    def __init__(self, journal: Journal, step: Step, progress: Any) -> None:
-        self.journal, self.step, self.progress = journal, step, progress
+    def __init__(self, journal: Journal, name: str, progress: Any) -> None:
+        self.journal, self.name, self.progress = journal, name, progress
         self.since = perf_counter()
         self.points = self.events = 0
 
@@ -348,7 +341,7 @@ class Noting:
         self.since = now
         points, located = trace.points[self.points :], trace.bifurcations[self.events :]
         fields = {
-            "name": self.step.name,
+            "name": self.name,
             "from": self.points,
             "omega": [point.orbit.omega for point in points],
             "values": [dict(point.orbit.values) for point in points],

@@ -1,27 +1,33 @@
 """What a step of a study is: one analysis with its arguments, as a table of the study file.
 
 A new kind of step is a class derived from `Step` in a file of this folder; it registers itself. The class names its
-`kind` and its arguments as fields, says in `check` what is wrong before any work, and computes in `run`. Options of the
+`kind`, its verb and the arguments of that as fields, and says in `check` what is wrong before any work. Options of the
 verbs are tables as well: newton, stepping, harmonics, stability, formulation, seeds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
-from inspect import get_annotations
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    model_serializer,
+    model_validator,
+)
 
 from suboctave.analysis.diagram import Keeper
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.continuation import NewtonOptions, SteppingOptions
-from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, ExtendedSystem, formulation_of
-from suboctave.errors import InputError, suggest
-from suboctave.floquet.methods import Hill, KoopmanHill, Monodromy, method_of
+from suboctave.curves.events.formulation import FORMULATIONS, formulation_of
+from suboctave.errors import InputError, Key, suggest
+from suboctave.floquet.methods import METHODS, Arbitration, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isola, Isolas
@@ -30,48 +36,32 @@ from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.study.results import Result
 
-_METHODS: dict[str, Any] = {method.name: method for method in (Monodromy, Hill, KoopmanHill)}
-_FORMULATIONS: dict[str, Any] = {one.name: one for one in (BorderedSystem, ExtendedSystem, Alcorta2019)}
 
-
-def read_by(read: Callable[[Any], Any]) -> AfterValidator:
-    """What is given for a field stays as it is; where it cannot be read it is refused at its key."""
-
-    def check(given: Any) -> Any:
-        read(given)
-        return given
-
-    return AfterValidator(check)
-
-
+# ----------------------------------------------------------------------------------------------- options of the verbs
 def as_harmonics(given: Any) -> Any:
-    """A whole number, "adaptive", or the options of adaptive harmonics as a table; None stays None."""
+    """A whole number, "adaptive", or the options of adaptive harmonics as a table."""
     if isinstance(given, Mapping):
         return _options(AdaptiveHarmonics, "harmonics", given)
-    if given is None or given == "adaptive":
-        return given
-    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+    if given != "adaptive" and (isinstance(given, bool) or not isinstance(given, int) or given < 1):
         raise InputError(f'give a whole number of at least 1, "adaptive", or a table of its options, not {given!r}')
     return given
 
 
 def _named(what: str, key: str, kinds: Mapping[str, Any], by_name: Callable[[str], Any], given: Any) -> Any:
-    """An object by its name, or by a table with its name at `key` beside its options; None stays None."""
+    """An object by its name, or by a table with its name at `key` beside its options."""
     if isinstance(given, Mapping):
         table = dict(given)
         name = table.pop(key, None)
         if name not in kinds:
             raise InputError(f"there is no {what} {name!r} that takes options{suggest(str(name), kinds)}")
-        return _options(kinds[name], name, table)
-    if given is not None and not isinstance(given, str):
+        return _options(type(kinds[name]), name, table)
+    if not isinstance(given, str):
         raise InputError(f"give the name of a {what}, or a table with {key} = ..., not {given!r}")
-    return None if given is None else by_name(given)
+    return by_name(given)
 
 
-def _options(kind: Any, what: str, table: Mapping[str, Any] | None) -> Any:
-    """The options of a table as an object, each of the type of its default; None stays None."""
-    if table is None:
-        return None
+def _options(kind: Any, what: str, table: Mapping[str, Any]) -> Any:
+    """The options of a table as an object, each of the type of its default."""
     known = {f.name: f for f in fields(kind)}
     for name, value in table.items():
         if name not in known:
@@ -85,12 +75,23 @@ def _options(kind: Any, what: str, table: Mapping[str, Any] | None) -> Any:
     return kind(**table)
 
 
-#: what the tables of a study file give, by the option: an object for a table, or a name, None where there is none
-as_newton = partial(_options, NewtonOptions, "newton")
-as_stepping = partial(_options, SteppingOptions, "stepping")
-as_seeds = partial(_options, Seeds, "seeds")
+_METHODS = {name: method for name, method in METHODS.items() if name != Arbitration.name}
 as_stability = partial(_named, "method", "method", _METHODS, method_of)
-as_formulation = partial(_named, "formulation", "name", _FORMULATIONS, formulation_of)
+as_formulation = partial(_named, "formulation", "name", FORMULATIONS, formulation_of)
+#: how what a study file gives for an option becomes what the verbs take
+READERS: dict[str, Callable[[Any], Any]] = {
+    "harmonics": as_harmonics,
+    "newton": partial(_options, NewtonOptions, "newton"),
+    "stepping": partial(_options, SteppingOptions, "stepping"),
+    "seeds": partial(_options, Seeds, "seeds"),
+    "stability": as_stability,
+    "formulation": as_formulation,
+}
+
+
+def _as_tuples(value: Any) -> Any:
+    """Lists, and lists in them, as tuples: as scripts give ranges."""
+    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
 
 
 # -------------------------------------------------------------------------------------------------------------- steps
@@ -101,8 +102,11 @@ STEPS: dict[str, type[Step]] = {}
 _ENDS = ("isola_centre", "isola_merging")
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
+Verb = Callable[..., Any]
+#: what comes of a step
+Gives = Literal["branch", "diagram", "isolas", "table"]
 #: what a check reports: the key inside the table, and what to change
-Complaint = tuple[tuple[str | int, ...], str]
+Complaint = tuple[Key, str]
 
 
 @dataclass(frozen=True)
@@ -146,9 +150,10 @@ class Step(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     kind: ClassVar[str] = ""
-    gives_branch: ClassVar[bool] = False
-    gives_diagram: ClassVar[bool] = False
-    gives_isolas: ClassVar[bool] = False
+    verb: ClassVar[Verb]
+    gives: ClassVar[Gives] = "table"
+    #: fields that are no arguments of the verb
+    besides: ClassVar[tuple[str, ...]] = ()
 
     name: str = Field(min_length=1)
     type: str
@@ -156,49 +161,53 @@ class Step(BaseModel):
     seconds: float | None = Field(default=None, gt=0.0)
 
     @classmethod
-    def drawn(cls) -> bool:
-        """Whether it gives anything that is drawn as a curve."""
-        return cls.gives_branch or cls.gives_diagram or cls.gives_isolas
+    def __pydantic_init_subclass__(cls, **more: Any) -> None:
+        super().__pydantic_init_subclass__(**more)
+        if cls.kind:
+            STEPS[cls.kind] = cls
 
     @property
     def plane(self) -> tuple[str, str] | None:
         """The two parameters of a curve of bifurcations, or of isolas; None for any other result."""
         return None
 
-    @classmethod
-    def __pydantic_init_subclass__(cls, **more: Any) -> None:
-        super().__pydantic_init_subclass__(**more)
-        if cls.kind:
-            STEPS[cls.kind] = cls
+    def curves(self) -> Iterator[tuple[Key, Curve]]:
+        """The branches and motions of earlier analyses that it starts from, each with its key."""
+        for name in type(self).model_fields:
+            value = getattr(self, name)
+            if isinstance(value, Curve):
+                yield (name,), value
+            elif isinstance(value, list):
+                yield from (((name, i), part) for i, part in enumerate(value) if isinstance(part, Curve))
 
-    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
+    def needs(self) -> list[tuple[Key, str]]:
         """The analyses whose results it starts from: the key that names each, and the name."""
-        return []
+        return [(curve.key(*place), curve.analysis) for place, curve in self.curves()]
 
-    def own(self, *without: str) -> dict[str, Any]:
-        """The arguments that its kind has and no other, by name."""
-        names = [name for name in get_annotations(type(self)) if name in type(self).model_fields]
-        return {name: getattr(self, name) for name in names if name not in without}
+    def arguments(self, context: CheckContext | Context) -> dict[str, Any]:
+        """The arguments of its verb that are given, as that takes them."""
+        without = (*Step.model_fields, *self.besides)
+        own = {name: getattr(self, name) for name in type(self).model_fields if name not in without}
+        return {n: _as_tuples(value) for n, value in own.items() if value is not None and not isinstance(value, Curve)}
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         """What is wrong with the arguments, before any work."""
-        yield from ()
+        for place, curve in self.curves():
+            yield from curve.check(place, around)
 
     def known(self, around: CheckContext) -> Known | None:
         """What is known of its motions before it runs; None where that is nothing, or they are none."""
         return None
 
+    def computed(self, context: Context, *first: Any, **more: Any) -> Any:
+        """What its verb gives with `first` in place of the system, and with other arguments besides."""
+        given = {**self.arguments(context), **more, "progress": context.progress}
+        return type(self).verb(*(first or (context.system,)), **given)
+
     def run(self, context: Context) -> Result:
         """The result. Raises InputError or ConvergenceError; on Ctrl-C what was computed comes back, or nothing."""
-        raise TypeError(f"{type(self).__name__} does not say how it runs")
-
-
-def as_table(names: Sequence[str], kinds: Sequence[Any], rows: Sequence[Sequence[Any]]) -> dict[str, np.ndarray]:
-    """Rows as columns by name, each of its kind."""
-    return {
-        name: np.array([row[i] for row in rows], dtype=kind)
-        for i, (name, kind) in enumerate(zip(names, kinds, strict=True))
-    }
+        result: Result = self.computed(context)
+        return result
 
 
 def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:
@@ -211,7 +220,7 @@ def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:
 
 # ------------------------------------------------------------------------------------------------- motions of a branch
 class Curve(BaseModel):
-    """A branch of an earlier analysis.
+    """A branch of an earlier analysis; the name of that alone stands for a table with no more in it.
 
     Of a diagram one of its branches, by number or by how its label begins; of isolas the curve of limit points of one
     of them, or with `at`, a value of the parameter, its closed branch there.
@@ -224,6 +233,20 @@ class Curve(BaseModel):
     label: str | None = Field(default=None, min_length=1)
     isola: int | None = Field(default=None, ge=0)
     at: float | None = None
+    _is_name: bool = PrivateAttr(default=False)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _read(cls, given: Any, read: Callable[[Any], Self]) -> Self:
+        if not isinstance(given, str | Mapping | Curve):
+            raise ValueError(f"must be a text or a table, not {given!r}")
+        curve = read({"analysis": given} if isinstance(given, str) else given)
+        curve._is_name = isinstance(given, str)
+        return curve
+
+    @model_serializer(mode="wrap")
+    def _written(self, write: Callable[[Self], Any]) -> Any:
+        return self.analysis if self._is_name else write(self)
 
     @property
     def words(self) -> str:
@@ -234,9 +257,71 @@ class Curve(BaseModel):
             return f"{self.analysis}, isola {self.isola}" + ("" if self.at is None else f" at {self.at:g}")
         return self.analysis if self.branch is None else f"{self.analysis}, branch {self.branch}"
 
+    def key(self, *place: str | int) -> Key:
+        """The key at which the name of the analysis stands, that of the curve being `place`."""
+        return place if self._is_name else (*place, "analysis")
+
+    def check(self, place: Key, around: CheckContext) -> Iterator[Complaint]:
+        """Refuse an analysis that is not there, not before this one, or gives no branch, and a choice too vague."""
+        name, key = self.analysis, self.key(*place)
+        if name not in around.before:
+            yield key, f"there is no analysis {name!r} before this one{suggest(name, around.before)}"
+            return
+        gives = around.before[name].gives
+        given = [choice for choice in ("branch", "label", "isola", "at") if getattr(self, choice) is not None]
+        wrong, why = ("isola", "at"), "looks for no isolas"
+        if gives == "isolas":
+            wrong, why = ("branch", "label"), "gives isolas, not a diagram"
+        for choice in given:
+            if choice in wrong:
+                yield (*place, choice), f"the analysis {name!r} {why}: leave {choice} out"
+        own = [choice for choice in given if choice not in wrong]
+        if gives == "isolas":
+            if self.isola is None:
+                text = "say which, and at which value"
+                example = f'{{ analysis = "{name}", isola = 0, at = 0.3 }}; without at is its curve of limit points'
+                yield key, f"the analysis {name!r} gives isolas: {text}, {example}"
+            elif self.at is not None and getattr(self, "bifurcation", None) in _ENDS:
+                yield (*place, "at"), "an end of an isola has a value of its own: leave at out"
+        elif gives == "diagram":
+            if len(own) == 2:
+                yield key, "choose a branch of the diagram by its number or by its label, not by both"
+            elif not own:
+                example = f'{{ analysis = "{name}", branch = 0 }} (the response) or label = "2T"'
+                yield key, f"the analysis {name!r} gives a diagram: say which of its branches, {example}"
+        elif gives != "branch":
+            yield key, f"the analysis {name!r} gives no branch to start from"
+        elif own:
+            yield (*place, own[0]), f"the analysis {name!r} gives one branch, not a diagram: leave {own[0]} out"
+
+    def of(self, results: Mapping[str, Result]) -> Branch:
+        """The branch that the analysis gave, or one of a diagram or of an isola; InputError where there is none."""
+        result = results.get(self.analysis)
+        if isinstance(result, Isolas):
+            isola = self.isola_of(result)
+            return isola.limit_points if self.at is None else isola.at(self.at)
+        if isinstance(result, BifurcationDiagram):
+            which = self.branch if self.label is None else self.label
+            assert which is not None
+            try:
+                return result[which].branch
+            except InputError as error:
+                raise InputError(f"{self.analysis!r}: {error}") from None
+        if not isinstance(result, Branch):
+            raise InputError(f"the analysis {self.analysis!r} gave no branch")
+        return result
+
+    def isola_of(self, isolas: Isolas) -> Isola:
+        """The isola that is named; InputError where it was not found."""
+        number = self.isola or 0
+        if number >= len(isolas):
+            count = "no isola" if not len(isolas) else f"only {len(isolas)} isola{'s' * (len(isolas) > 1)}"
+            raise InputError(f"{self.analysis!r} found {count}, so that there is none with number {number}")
+        return isolas[number]
+
 
 class Motion(Curve):
-    """One motion of an earlier branch: a point, a bifurcation of a kind, or the point nearest to given values.
+    """One motion of an earlier branch: a point (the last one), a bifurcation of a kind, the point nearest to values.
 
     Of isolas the bifurcations "isola_centre" and "isola_merging" are the ends of one.
     """
@@ -246,134 +331,47 @@ class Motion(Curve):
     index: int = 0
     nearest: dict[str, float] | None = None
 
+    def check(self, place: Key, around: CheckContext) -> Iterator[Complaint]:
+        """As of a curve, and what is wrong with the choice."""
+        yield from super().check(place, around)
+        yield from self.check_choice(place, around.system)
 
-def name_or_table(given: Any) -> str | None:
-    """Which way a branch or a motion is given, so that a mistake in it is told once, as one in that way."""
-    return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Curve) else None
+    def check_choice(self, place: Key, system: System) -> Iterator[Complaint]:
+        """What is wrong with the choice of a motion, as far as that is known before the branch is."""
+        if sum(way is not None for way in (self.point, self.bifurcation, self.nearest)) > 1:
+            yield place, "choose by point, by bifurcation or by nearest, not by several of them"
+        if self.bifurcation is not None and self.bifurcation not in KINDS:
+            kinds = suggest(self.bifurcation, KINDS)
+            yield (*place, "bifurcation"), f"there is no kind of bifurcation {self.bifurcation!r}{kinds}"
+        known = ["omega", "amplitude", *system.parameters]
+        for name in self.nearest or {}:
+            if name not in known:
+                yield (*place, "nearest", name), f"neither omega, amplitude nor a parameter{suggest(name, known)}"
 
-
-#: a branch as a step names it: the name of an analysis alone, or with one of a diagram's branches
-Named = Annotated[Annotated[str, Tag("name")] | Annotated[Curve, Tag("table")], Discriminator(name_or_table)]
-
-
-def as_curve(given: str | Curve) -> Curve:
-    """A branch by name."""
-    return Curve(analysis=given) if isinstance(given, str) else given
-
-
-def key_of_curve(given: str | Curve, key: str) -> tuple[str | int, ...]:
-    """The key at which the name of the analysis stands."""
-    return (key,) if isinstance(given, str) else (key, "analysis")
-
-
-def check_motion(motion: Motion, key: tuple[str | int, ...], around: CheckContext) -> Iterator[Complaint]:
-    """What is wrong with the choice of a motion, as far as that is known before the branch is."""
-    ways = [motion.point is not None, motion.bifurcation is not None, motion.nearest is not None]
-    if sum(ways) > 1:
-        yield key, "choose by point, by bifurcation or by nearest, not by several of them"
-    if motion.bifurcation is not None and motion.bifurcation not in KINDS:
-        kinds = suggest(motion.bifurcation, KINDS)
-        yield (*key, "bifurcation"), f"there is no kind of bifurcation {motion.bifurcation!r}{kinds}"
-    for name in motion.nearest or {}:
-        known = ["omega", "amplitude", *around.system.parameters]
-        if name not in known:
-            yield (*key, "nearest", name), f"neither omega, amplitude nor a parameter{suggest(name, known)}"
-
-
-def check_branch(curve: Curve, key: tuple[str | int, ...], around: CheckContext) -> Iterator[Complaint]:
-    """Refuse an analysis that is not there, not before this one, or gives no branch, and a choice that says too little.
-
-    `key` is that of the name of the analysis.
-    """
-    name = curve.analysis
-    if name not in around.before:
-        yield key, f"there is no analysis {name!r} before this one{suggest(name, around.before)}"
-        return
-    step, place = around.before[name], key[:-1]
-    given = [choice for choice in ("branch", "label", "isola", "at") if getattr(curve, choice) is not None]
-    wrong, why = ("isola", "at"), "looks for no isolas"
-    if step.gives_isolas:
-        wrong, why = ("branch", "label"), "gives isolas, not a diagram"
-    for choice in given:
-        if choice in wrong:
-            yield (*place, choice), f"the analysis {name!r} {why}: leave {choice} out"
-    own = [choice for choice in given if choice not in wrong]
-    if step.gives_isolas:
-        if curve.isola is None:
-            yield (
-                key,
-                f'the analysis {name!r} gives isolas: say which, and at which value, {{ analysis = "{name}", isola = '
-                "0, at = 0.3 }; without at it is its curve of limit points",
-            )
-        elif curve.at is not None and getattr(curve, "bifurcation", None) in _ENDS:
-            yield (*place, "at"), "an end of an isola has a value of its own: leave at out"
-    elif step.gives_diagram:
-        if len(own) == 2:
-            yield key, "choose a branch of the diagram by its number or by its label, not by both"
-        elif not own:
-            yield (
-                key,
-                f"the analysis {name!r} gives a diagram: say which of its branches, "
-                f'{{ analysis = "{name}", branch = 0 }} (the response) or label = "2T"',
-            )
-    elif not step.gives_branch:
-        yield key, f"the analysis {name!r} gives no branch to start from"
-    elif own:
-        yield (*place, own[0]), f"the analysis {name!r} gives one branch, not a diagram: leave {own[0]} out"
-
-
-def _isola(curve: Curve, isolas: Isolas) -> Isola:
-    """The isola that is named; InputError where it was not found."""
-    number = curve.isola or 0
-    if number >= len(isolas):
-        count = "no isola" if not len(isolas) else f"only {len(isolas)} isola{'s' * (len(isolas) > 1)}"
-        raise InputError(f"{curve.analysis!r} found {count}, so that there is none with number {number}")
-    return isolas[number]
-
-
-def chosen_branch(curve: Curve, results: Mapping[str, Result]) -> Branch:
-    """The branch that an earlier analysis gave, or one of a diagram or of an isola; InputError where there is none."""
-    result = results.get(curve.analysis)
-    if isinstance(result, Isolas):
-        isola = _isola(curve, result)
-        return isola.limit_points if curve.at is None else isola.at(curve.at)
-    if isinstance(result, BifurcationDiagram):
-        which = curve.branch if curve.label is None else curve.label
-        assert which is not None
-        try:
-            return result[which].branch
-        except InputError as error:
-            raise InputError(f"{curve.analysis!r}: {error}") from None
-    if not isinstance(result, Branch):
-        raise InputError(f"the analysis {curve.analysis!r} gave no branch")
-    return result
-
-
-def chosen(motion: Motion, results: Mapping[str, Result]) -> Any:
-    """The point or bifurcation of an earlier branch; InputError where there is none."""
-    result = results.get(motion.analysis)
-    if isinstance(result, Isolas) and motion.bifurcation in _ENDS:
-        isola = _isola(motion, result)
-        end = isola.born if motion.bifurcation == "isola_centre" else isola.merges
-        if end is None:
-            raise InputError(f"{motion.words} has no {motion.bifurcation}: {'; '.join(isola.reasons)}")
-        return end
-    branch = chosen_branch(motion, results)
-    words = repr(motion.analysis) if motion.words == motion.analysis else motion.words
-    if motion.bifurcation is not None:
-        met = branch.bifurcations[motion.bifurcation]
-        if not -len(met) <= motion.index < len(met):
-            count = "no" if not met else f"only {len(met)}"
-            kind = motion.bifurcation
-            raise InputError(f"{words} has {count} {kind}, so that there is none with index {motion.index}")
-        return met[motion.index]
-    if motion.nearest is not None:
-        distance = np.zeros(len(branch))
-        for name, value in motion.nearest.items():
-            values = branch.amplitude if name == "amplitude" else branch.parameter(name)
-            distance += ((values - value) / max(float(np.ptp(values)), abs(value), 1e-300)) ** 2
-        return branch.points[int(np.argmin(distance))]
-    point = -1 if motion.point is None else motion.point
-    if not -len(branch) <= point < len(branch):
-        raise InputError(f"{words} has {len(branch)} points, so that there is no point {point}")
-    return branch.points[point]
+    def chosen(self, results: Mapping[str, Result]) -> Any:
+        """The point or bifurcation of an earlier branch; InputError where there is none."""
+        result, kind = results.get(self.analysis), self.bifurcation
+        if isinstance(result, Isolas) and kind in _ENDS:
+            isola = self.isola_of(result)
+            end = isola.born if kind == "isola_centre" else isola.merges
+            if end is None:
+                raise InputError(f"{self.words} has no {kind}: {'; '.join(isola.reasons)}")
+            return end
+        branch = self.of(results)
+        words = repr(self.analysis) if self.words == self.analysis else self.words
+        if kind is not None:
+            met = branch.bifurcations[kind]
+            if not -len(met) <= self.index < len(met):
+                count = "no" if not met else f"only {len(met)}"
+                raise InputError(f"{words} has {count} {kind}, so that there is none with index {self.index}")
+            return met[self.index]
+        if self.nearest is not None:
+            distance = np.zeros(len(branch))
+            for name, value in self.nearest.items():
+                values = branch.amplitude if name == "amplitude" else branch.parameter(name)
+                distance += ((values - value) / max(float(np.ptp(values)), abs(value), 1e-300)) ** 2
+            return branch.points[int(np.argmin(distance))]
+        point = -1 if self.point is None else self.point
+        if not -len(branch) <= point < len(branch):
+            raise InputError(f"{words} has {len(branch)} points, so that there is no point {point}")
+        return branch.points[point]

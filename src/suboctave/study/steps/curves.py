@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from suboctave.analysis.branches import check_left, continue_branch, frequency_response, switch_branch
 from suboctave.analysis.diagram import bifurcation_diagram
@@ -17,29 +17,22 @@ from suboctave.analysis.options import settings_of
 from suboctave.analysis.track import motion_kind, track
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH
 from suboctave.continuation import Event
-from suboctave.errors import InputError, is_number, suggest
+from suboctave.errors import InputError, suggest
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
-from suboctave.results.branch import Branch
-from suboctave.results.diagram import BifurcationDiagram
+from suboctave.study.results import Result
 from suboctave.study.steps.base import (
+    READERS,
     CheckContext,
     Complaint,
     Context,
+    Gives,
     Known,
     Motion,
     Range,
     Step,
-    as_formulation,
-    as_harmonics,
-    as_newton,
-    as_stability,
-    as_stepping,
-    check_branch,
-    check_motion,
-    chosen,
-    read_by,
+    Verb,
     tried,
 )
 
@@ -57,104 +50,86 @@ def _way(given: Any) -> str | None:
     """Which way a start is given, so that a mistake in it is told once, as one in that way."""
     if isinstance(given, list):
         return "rows" if given and all(isinstance(row, list) for row in given) else "numbers"
-    return "name" if isinstance(given, str) else "table" if isinstance(given, dict | Motion) else None
+    return "motion" if isinstance(given, str | dict | Motion) else None
 
 
 Start = Annotated[
-    Annotated[str, Tag("name")]
-    | Annotated[Motion, Tag("table")]
+    Annotated[Motion, Tag("motion")]
     | Annotated[list[float], Tag("numbers")]
     | Annotated[list[list[float]], Tag("rows")],
     Discriminator(_way),
 ]
 
+_MOST = 8000  # unknowns of a dense problem, as the verbs have it
+
 
 class FollowingStep(Step):
     """The options of all verbs that follow curves."""
 
-    harmonics: Annotated[Any, read_by(as_harmonics)] = None
+    harmonics: Any = None
     max_step: float | None = None
     observe: int | None = None
-    newton: Annotated[dict[str, Any] | None, read_by(as_newton)] = None
-    stepping: Annotated[dict[str, Any] | None, read_by(as_stepping)] = None
-    stability: Annotated[Any, read_by(as_stability)] = None
+    newton: dict[str, Any] | None = None
+    stepping: dict[str, Any] | None = None
+    stability: Any = None
+
+    @field_validator(*READERS, check_fields=False)
+    @classmethod
+    def _readable(cls, given: Any, info: ValidationInfo) -> Any:
+        """Options stay as they are given; what cannot be read is refused at its key."""
+        if given is not None:
+            READERS[str(info.field_name)](given)
+        return given
+
+    def arguments(self, context: CheckContext | Context) -> dict[str, Any]:
+        given = super().arguments(context)
+        return {name: READERS[name](value) if name in READERS else value for name, value in given.items()}
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """The options of every verb."""
-        given = self._given(around.allow_code)
-        for key, value in given.items():
-            beside = {"stepping": given["stepping"]} if key == "max_step" else {}
-            yield from tried(key, partial(settings_of, around.system, {key: value, **beside}))
+        yield from super().check(around)
+        given = self.arguments(around)
+        for key in ("max_step", "observe", "newton", "stepping", "stability", "events", "formulation"):
+            beside = {"stepping": given.get("stepping")} if key == "max_step" else {}
+            yield from tried(key, partial(settings_of, around.system, {key: given.get(key), **beside}))
         if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * around.system.n > _MOST:
             yield ("harmonics",), f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics"
-
-    def _given(self, allow_code: bool) -> dict[str, Any]:
-        """The options as the verbs take them."""
-        return {
-            "max_step": self.max_step,
-            "observe": self.observe,
-            "newton": as_newton(self.newton),
-            "stepping": as_stepping(self.stepping),
-            "stability": as_stability(self.stability),
-        }
-
-    def options(self, context: Context) -> dict[str, Any]:
-        """The arguments of the verb that were given."""
-        own = {"harmonics": as_harmonics(self.harmonics), "progress": context.progress}
-        given = {**own, **self._given(context.allow_code)}
-        return {name: value for name, value in given.items() if value is not None and value != ()}
 
 
 class CurveStep(FollowingStep):
     """The arguments that `frequency_response` and `continue_branch` share."""
 
-    gives_branch: ClassVar[bool] = True
+    gives: ClassVar[Gives] = "branch"
 
     start: Start | None = None
     events: list[EventTable] = Field(default_factory=list)
-    formulation: Annotated[Any, read_by(as_formulation)] = None
+    formulation: Any = None
 
     @property
     def motion(self) -> Motion | None:
-        """The motion of an earlier branch that it starts from; the name of one alone means its last point."""
-        if isinstance(self.start, str):
-            return Motion(analysis=self.start)
+        """The motion of an earlier branch that it starts from."""
         return self.start if isinstance(self.start, Motion) else None
 
-    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        if self.motion is None:
-            return []
-        return [(("start",) if isinstance(self.start, str) else ("start", "analysis"), self.motion.analysis)]
+    def arguments(self, context: CheckContext | Context) -> dict[str, Any]:
+        given = super().arguments(context)
+        if events := given.pop("events"):
+            read = partial(from_plain, arrays={}, allow_code=context.allow_code)
+            given["events"] = tuple(Event(e.name, read({"callable": e.function})) for e in events)
+        return given
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        """The options of the verb, and where it starts."""
-        wrong = list(tried("events", lambda: self._events(around.allow_code)))
+        wrong = list(tried("events", lambda: self.arguments(around)))
         yield from wrong
-        if not wrong:
-            yield from super().check(around)
-        if self.motion is not None:
-            for key, _ in self.needs():
-                yield from check_branch(self.motion, key, around)
-            yield from check_motion(self.motion, ("start",), around)
-
-    def _given(self, allow_code: bool) -> dict[str, Any]:
-        own = {"events": tuple(self._events(allow_code)), "formulation": as_formulation(self.formulation)}
-        return super()._given(allow_code) | own
-
-    def _events(self, allow_code: bool) -> list[Event]:
-        return [Event(e.name, from_plain({"callable": e.function}, {}, allow_code)) for e in self.events]
+        yield from Step.check(self, around) if wrong else super().check(around)
 
     def started(self, context: Context) -> Any:
-        """What the curve starts from: a motion of an earlier branch, numbers, or None."""
-        return self.start if self.motion is None else self._moved(chosen(self.motion, context.results).orbit, context)
-
-    def _moved(self, orbit: Any, context: Context) -> Any:
-        """The motion as it is: a step that starts from one keeps its parameters."""
-        changed = {name: value for name, value in self.parameters.items() if orbit.values[name] != value}
+        """The point or bifurcation that it starts from, whose parameters are kept."""
+        assert self.motion is not None
+        item = self.motion.chosen(context.results)
+        changed = [name for name, value in self.parameters.items() if item.orbit.values[name] != value]
         if changed:
             names = ", ".join(changed)
             raise InputError(f"the motion it starts from has other values of {names}: leave them out of parameters")
-        return orbit
+        return item
 
     def known(self, around: CheckContext) -> Known | None:
         """See `Step.known`: the frequency varies, the parameters are those of the system."""
@@ -173,9 +148,6 @@ class CurveStep(FollowingStep):
                 yield ("parameters", name), f"the motion that it starts from has {name} = {there:g}: leave it out"
 
 
-_MOST = 8000  # unknowns of a dense problem, as the verbs have it
-
-
 def check_sweep(omega: list[float], around: CheckContext) -> Iterator[Complaint]:
     """What is wrong with a range of frequencies, or with the system there."""
     wrong = list(tried("omega", lambda: check_range("omega", omega, positive=True)))
@@ -187,6 +159,7 @@ class FrequencyResponse(CurveStep):
     """`so.frequency_response`; `start` may be a motion of an earlier branch, a state or coefficients."""
 
     kind: ClassVar[str] = "frequency_response"
+    verb: ClassVar[Verb] = staticmethod(frequency_response)
 
     omega: Range
 
@@ -194,37 +167,31 @@ class FrequencyResponse(CurveStep):
         yield from super().check(around)
         yield from check_sweep(self.omega, around)
 
-    def run(self, context: Context) -> Branch | BifurcationDiagram:
-        options: dict[str, Any] = self.options(context)
-        start = self.started(context)
-        first, last = self.omega
-        return frequency_response(context.system, (first, last), start=start, **options)
-
-    def _moved(self, orbit: Any, context: Context) -> Any:
-        return orbit  # a first guess at other parameters, too
+    def computed(self, context: Context, *first: Any, **more: Any) -> Any:
+        if self.motion is not None:  # a first guess, at other parameters, too
+            more["start"] = self.motion.chosen(context.results).orbit
+        return super().computed(context, *first, **more)
 
 
 class Diagram(FrequencyResponse):
     """`so.bifurcation_diagram`: a frequency response, and `depth` bifurcations deep what leaves it."""
 
     kind: ClassVar[str] = "bifurcation_diagram"
-    gives_branch: ClassVar[bool] = False
-    gives_diagram: ClassVar[bool] = True
+    verb: ClassVar[Verb] = staticmethod(bifurcation_diagram)
+    gives: ClassVar[Gives] = "diagram"
 
     depth: int = Field(default=2, ge=0)
     max_branches: int = Field(default=32, ge=1)
 
-    def run(self, context: Context) -> BifurcationDiagram:
-        options: dict[str, Any] = self.options(context)
-        omega: Any = tuple(self.omega)
-        options |= {"start": self.started(context), "max_branches": self.max_branches}
-        return bifurcation_diagram(context.system, omega, self.depth, keeper=context.keeper, **options)
+    def run(self, context: Context) -> Result:
+        return self.computed(context, keeper=context.keeper)
 
 
 class ContinueBranch(CurveStep):
     """`so.continue_branch` from a motion of an earlier branch, or from the system with `omega`."""
 
     kind: ClassVar[str] = "continue_branch"
+    verb: ClassVar[Verb] = staticmethod(continue_branch)
 
     parameter: str
     bounds: Range
@@ -242,7 +209,7 @@ class ContinueBranch(CurveStep):
             yield from tried("", lambda: check_system(around.system))
             if self.omega is None:
                 yield (), "needs start = {analysis = ...}, or omega, the frequency that is kept"
-        if self.omega is not None and not (is_number(self.omega) and self.omega > 0.0):
+        if self.omega is not None and not self.omega > 0.0:
             yield ("omega",), f"must be positive, in rad per unit time, not {self.omega:g}"
         if self.parameter in self.parameters:
             yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
@@ -256,17 +223,15 @@ class ContinueBranch(CurveStep):
         values = around.system.parameters if source is None else source.values
         return Known(self.parameter, {name: value for name, value in values.items() if name != self.parameter})
 
-    def run(self, context: Context) -> Branch:
-        options: dict[str, Any] = self.options(context)
-        start = context.system if self.motion is None else self.started(context)
-        bounds: Any = tuple(self.bounds)
-        return continue_branch(start, self.parameter, bounds, omega=self.omega, **options)
+    def run(self, context: Context) -> Result:
+        return self.computed(context, context.system if self.motion is None else self.started(context).orbit)
 
 
 class SwitchBranch(CurveStep):
     """`so.switch_branch` at a bifurcation of an earlier branch; what is not given is as it was there."""
 
     kind: ClassVar[str] = "switch_branch"
+    verb: ClassVar[Verb] = staticmethod(switch_branch)
 
     start: Motion
     side: Literal[1, -1] | None = None
@@ -293,13 +258,8 @@ class SwitchBranch(CurveStep):
     def known(self, around: CheckContext) -> Known | None:
         return self.inherited(around)
 
-    def run(self, context: Context) -> Branch:
-        item = chosen(self.start, context.results)
-        self._moved(item.orbit, context)
-        options: dict[str, Any] = self.options(context)
-        if self.bounds is not None:
-            options["bounds"] = tuple(self.bounds)
-        return switch_branch(item, self.side, **options)
+    def run(self, context: Context) -> Result:
+        return self.computed(context, self.started(context))
 
 
 #: what is tracked in a third parameter: extrema along curves, the ends of isolas
@@ -310,6 +270,7 @@ class Track(CurveStep):
     """`so.track`: `start` names a bifurcation of an earlier branch."""
 
     kind: ClassVar[str] = "track"
+    verb: ClassVar[Verb] = staticmethod(track)
 
     parameter: str | list[str]
     bounds: Range | list[Range]
@@ -356,19 +317,14 @@ class Track(CurveStep):
         if wrong or motion_kind(self.onto) is not None:
             yield from wrong
             if self.motion is None:
-                yield (
-                    ("start",),
-                    'name a motion: start = { analysis = "response", nearest = { omega = 1.0 } }',
-                )
+                yield ("start",), 'name a motion: start = { analysis = "response", nearest = { omega = 1.0 } }'
             return
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
         elif kind not in (*TRACKED_KINDS, *_EXTREMA, *CURVES_THROUGH):
-            yield (
-                ("start", "bifurcation"),
-                f"{kind} cannot be tracked{suggest(kind, (*TRACKED_KINDS, *CURVES_THROUGH))}",
-            )
+            known = suggest(kind, (*TRACKED_KINDS, *CURVES_THROUGH))
+            yield ("start", "bifurcation"), f"{kind} cannot be tracked{known}"
         elif kind in _EXTREMA and not isinstance(self.parameter, str):
             yield ("parameter",), "of an extremum is one name: the third parameter"
         if self.onto is None or kind is None:
@@ -383,13 +339,5 @@ class Track(CurveStep):
         """See `Step.known`: what varies along it are parameters, too."""
         return None
 
-    def run(self, context: Context) -> Branch:
-        options: dict[str, Any] = self.options(context)
-        assert self.motion is not None
-        start = chosen(self.motion, context.results)
-        self._moved(start.orbit, context)
-        if self.omega is not None:
-            options["omega"] = (self.omega[0], self.omega[1])
-        if self.onto is not None:
-            options["onto"] = self.onto
-        return track(start, self.parameter, self.bounds, **options)
+    def run(self, context: Context) -> Result:
+        return self.computed(context, self.started(context))

@@ -16,6 +16,7 @@ from suboctave.experiments.lyapunov import lyapunov_exponents
 from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine
 from suboctave.model.inputs import check_range, start_state
 from suboctave.results.branch import TrackedBranch
+from suboctave.store.plain import padded
 from suboctave.store.table import Table
 from suboctave.study.steps.base import (
     CheckContext,
@@ -23,17 +24,10 @@ from suboctave.study.steps.base import (
     Context,
     Curve,
     Motion,
-    Named,
     Range,
     Step,
-    as_curve,
+    Verb,
     as_stability,
-    as_table,
-    check_branch,
-    check_motion,
-    chosen as chosen_motion,
-    chosen_branch,
-    key_of_curve,
     tried,
 )
 from suboctave.verification.branch import verify
@@ -44,37 +38,32 @@ class Basins(Step):
     """`so.basins`; `branches` are earlier ones whose stable motions at `omega` give the names, `what` the rows."""
 
     kind: ClassVar[str] = "basins"
+    verb: ClassVar[Verb] = staticmethod(basins)
+    besides: ClassVar[tuple[str, ...]] = ("coordinates", "branches", "what")
 
     omega: float = Field(gt=0.0)
     box: list[Range] = Field(min_length=2, max_length=2)
     grid: list[int] = Field(default=[200, 200], min_length=2, max_length=2)
     coordinates: list[str] | None = None
     rest: list[float] | None = None
-    branches: list[Named] = Field(default_factory=list)
+    branches: list[Curve] = Field(default_factory=list)
     periods: int = Field(default=500, ge=1)
     tolerance: float = Field(default=1e-8, ge=1e-15, le=1e-2)
     what: Literal["shares", "states"] = "shares"
 
-    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        return [(("branches", i, *key_of_curve(b, "")[1:]), as_curve(b).analysis) for i, b in enumerate(self.branches)]
-
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        for i, branch in enumerate(self.branches):
-            yield from check_branch(as_curve(branch), ("branches", i, *key_of_curve(branch, "")[1:]), around)
+        yield from super().check(around)
         for i, side in enumerate(self.box):
-            for _, text in tried("box", partial(check_range, "box", (side[0], side[1]), False)):
-                yield ("box", i), text
+            yield from ((("box", i), text) for _, text in tried("box", partial(check_range, "box", side)))
         if any(count < 1 for count in self.grid):
             yield ("grid",), "needs two positive numbers of states"
-        yield from tried(
-            "coordinates", lambda: check_plane(around.system, self.coordinates, around.system.observed_dof)
-        )
-        yield from tried("rest", lambda: start_state(around.system, self.rest))
+        system = around.system
+        yield from tried("coordinates", lambda: check_plane(system, self.coordinates, system.observed_dof))
+        yield from tried("rest", lambda: start_state(system, self.rest))
 
     def run(self, context: Context) -> Table:
-        given = {as_curve(one).words: chosen_branch(as_curve(one), context.results) for one in self.branches}
-        own = self.own("coordinates", "branches", "what") | {"plane": self.coordinates}
-        result = basins(context.system, attractors=given or None, progress=context.progress, **own)
+        attractors = {one.words: one.of(context.results) for one in self.branches}
+        result = self.computed(context, plane=self.coordinates, attractors=attractors or None)
         title = f"basins at omega = {self.omega:g}"
         if self.what == "shares":
             frame = result.to_dataframe()
@@ -93,6 +82,7 @@ class Lyapunov(Step):
     """`so.lyapunov_exponents` from a `state`, default rest, at one frequency."""
 
     kind: ClassVar[str] = "lyapunov_exponents"
+    verb: ClassVar[Verb] = staticmethod(lyapunov_exponents)
 
     omega: float = Field(gt=0.0)
     state: list[float] | None = None
@@ -108,7 +98,7 @@ class Lyapunov(Step):
             yield ("count",), f"is at most {2 * around.system.n}, two for each degree of freedom"
 
     def run(self, context: Context) -> Table:
-        result = lyapunov_exponents(context.system, progress=context.progress, **self.own())
+        result = self.computed(context)
         values = (result.exponents, result.standard_errors, result.per_period)
         columns = dict(zip(("exponent", "standard_error", "per_period"), values, strict=True))
         return Table(columns, f"Lyapunov exponents at omega = {self.omega:g}", result)
@@ -122,6 +112,7 @@ class SteppedSineStep(Step):
     """`so.stepped_sine` over `omega` in `steps`; `state` and the rest as there."""
 
     kind: ClassVar[str] = "stepped_sine"
+    verb: ClassVar[Verb] = staticmethod(stepped_sine)
 
     omega: Range
     steps: int = Field(default=200, ge=1)
@@ -135,36 +126,30 @@ class SteppedSineStep(Step):
     seed: int = Field(default=0, ge=0)
     observe: int | None = None
 
-    def _arguments(self) -> dict[str, Any]:
+    def arguments(self, context: CheckContext | Context) -> dict[str, Any]:
         tap = self.tap and (self.tap[0], int(self.tap[1]), self.tap[2])
-        return self.own("omega") | {"tap": tap}
+        return {**super().arguments(context), "tap": tap, "state": self.state}
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         if self.tap is not None and self.tap[1] != int(self.tap[1]):
             yield ("tap",), "tap is [omega, degree of freedom, change of velocity]: the second is a whole number"
             return
-        arguments = self._arguments()
-        yield from tried("omega", lambda: check_stepped_sine(around.system, tuple(self.omega), **arguments))
+        yield from tried("omega", lambda: check_stepped_sine(around.system, **self.arguments(around)))
 
     def run(self, context: Context) -> Table:
-        result = stepped_sine(context.system, tuple(self.omega), progress=context.progress, **self._arguments())
-        frame = result.to_dataframe()
-        columns = {str(name): np.asarray(frame[name].tolist()) for name in frame}
+        result = self.computed(context)
         title = f"stepped sine {' and '.join(result.directions)}, amplitudes of x_{result.observed}"
-        return Table(columns, title, result)
+        return Table(result.to_table().columns, title, result)
 
 
 # ----------------------------------------------------------------------------------------- motions of an earlier branch
 class BranchStep(Step):
     """What it says is of the motions of a `branch`, at the parameters that they were computed with."""
 
-    branch: Named
-
-    def needs(self) -> list[tuple[tuple[str | int, ...], str]]:
-        return [(key_of_curve(self.branch, "branch"), as_curve(self.branch).analysis)]
+    branch: Curve
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        yield from check_branch(as_curve(self.branch), key_of_curve(self.branch, "branch"), around)
+        yield from super().check(around)
         if self.parameters:
             yield ("parameters",), "its motions have the parameters that they were computed with: leave them out"
 
@@ -179,43 +164,35 @@ class Verify(BranchStep):
     tolerance: float = Field(default=1e-3, gt=0.0, lt=1.0)
 
     def run(self, context: Context) -> Table:
-        curve = as_curve(self.branch)
-        branch = chosen_branch(curve, context.results)
+        branch = self.branch.of(context.results)
         points = [] if self.what == "bifurcations" else range(0, len(branch), self.every)
         bifurcations = self.what != "points"
+        whole, rows = None, []
         if isinstance(branch, TrackedBranch):  # its points as motions, and its special points, one by one
             things: list[tuple[str, Any]] = [(f"point {i}", branch.points[i]) for i in points]
             things += [(item.kind, item) for item in branch.bifurcations.met] if bifurcations else []
-            whole, rows = None, []
             for done, (name, thing) in enumerate(things):
                 if context.progress is not None:
                     context.progress(done / len(things), name)
                 one = verify(thing, self.tolerance)
-                outcome = "agrees" if one.agrees else "disagrees"
-                rows.append(_row(name, one, one.multiplier_error, _word(one.stable), outcome, thing.orbit.omega))
+                rows.append(_row(name, thing.orbit.omega, one, one.multiplier_error, one.stable))
         else:
-            progress = context.progress
-            whole = verify(branch, self.tolerance, points=points, bifurcations=bifurcations, progress=progress)
-            rows = [
-                _row(f"point {p.index}", p, p.multiplier_error, _word(p.stable), p.outcome, p.omega)
-                for p in whole.points
-            ]
-            rows += [
-                _row(b.kind, b, float("nan"), "", "agrees" if b.agrees else "disagrees", b.omega)
-                for b in whole.bifurcations
-            ]
+            asked: dict[str, Any] = {"points": points, "bifurcations": bifurcations, "progress": context.progress}
+            whole = verify(branch, self.tolerance, **asked)
+            rows = [_row(f"point {p.index}", p.omega, p, p.multiplier_error, p.stable, p.outcome) for p in whole.points]
+            rows += [_row(b.kind, b.omega, b) for b in whole.bifurcations]
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "outcome", "reason")
-        kinds: tuple[Any, ...] = (str, float, float, float, str, bool, str, str)
-        return Table(as_table(names, kinds, rows), f"{curve.words}, held against shooting", whole)
+        table = Table.of_rows(names, rows, f"{self.branch.words}, held against shooting")
+        return Table(table.columns, table.title, whole)
 
 
-def _row(what: str, check: Any, error: float, stable: str, outcome: str, omega: float) -> tuple[Any, ...]:
+def _row(
+    what: str, omega: float, check: Any, error: float = np.nan, stable: bool | None = None, outcome: str = ""
+) -> tuple[Any, ...]:
     """What a table says of something that was held against shooting."""
-    return what, omega, check.distance, error, stable, check.agrees, outcome, check.reason
-
-
-def _word(stable: bool | None) -> str:
-    return "" if stable is None else "yes" if stable else "no"
+    verdict = "" if stable is None else "yes" if stable else "no"
+    outcome = outcome or ("agrees" if check.agrees else "disagrees")
+    return what, omega, check.distance, error, verdict, check.agrees, outcome, check.reason
 
 
 class Stability(BranchStep):
@@ -229,40 +206,37 @@ class Stability(BranchStep):
     methods: list[Any] | None = None
 
     def _motion(self, **choice: Any) -> Motion:
-        curve = as_curve(self.branch)
-        return Motion(**{name: getattr(curve, name) for name in Curve.model_fields}, **choice)
+        return Motion(**{name: getattr(self.branch, name) for name in Curve.model_fields}, **choice)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
         if self.points is None and not self.bifurcations and self.nearest is None:
             yield (), "choose motions: points = [...], bifurcations = [...] or nearest = {omega = ...}"
         for i, kind in enumerate(self.bifurcations):
-            for key, text in check_motion(self._motion(bifurcation=kind), (), around):
-                yield ("bifurcations", i) if "bifurcation" in key else key, text
-        yield from check_motion(self._motion(nearest=self.nearest), (), around)
+            for _, text in self._motion(bifurcation=kind).check_choice((), around.system):
+                yield ("bifurcations", i), text
+        yield from self._motion(nearest=self.nearest).check_choice((), around.system)
         for method in self.methods or []:
             yield from tried("methods", partial(as_stability, method))
 
     def run(self, context: Context) -> Table:
-        motions: list[tuple[str, Any]] = []
-        for point in self.points or []:
-            motions.append((f"point {point}", chosen_motion(self._motion(point=point), context.results)))
-        branch = chosen_branch(as_curve(self.branch), context.results)
-        for kind in self.bifurcations:
-            motions += [(kind, item) for item in branch.bifurcations[kind]]
+        results, branch = context.results, self.branch.of(context.results)
+        motions: list[tuple[str, Any]] = [
+            (f"point {point}", self._motion(point=point).chosen(results)) for point in self.points or []
+        ]
+        motions += [(kind, item) for kind in self.bifurcations for item in branch.bifurcations[kind]]
         if self.nearest is not None:
-            motions.append(("nearest", chosen_motion(self._motion(nearest=self.nearest), context.results)))
+            motions.append(("nearest", self._motion(nearest=self.nearest).chosen(results)))
         rows, multipliers, errors = [], [], []
         for name, motion in motions:
             for method in self.methods or [None]:
-                verdict = stability(motion.orbit, as_stability(method))
+                verdict = stability(motion.orbit, None if method is None else as_stability(method))
                 rows.append((name, motion.orbit.omega, verdict.method, verdict.stable, verdict.decided, verdict.note))
                 multipliers.append(verdict.multipliers)
                 errors.append(verdict.errors)
         names = ("what", "omega", "method", "stable", "decided", "note")
-        kinds: tuple[Any, ...] = (str, float, str, bool, bool, str)
-        columns = as_table(names, kinds, rows)
-        for i in range(max((len(mu) for mu in multipliers), default=0)):
-            for name, lists, sort in (("multiplier", multipliers, complex), ("error", errors, float)):
-                columns[f"{name}_{i}"] = np.array([row[i] if i < len(row) else np.nan for row in lists], dtype=sort)
-        return Table(columns, f"multipliers of {as_curve(self.branch).words}")
+        table = Table.of_rows(names, rows, f"multipliers of {self.branch.words}")
+        columns = dict(table.columns)
+        for i, both in enumerate(zip(padded(multipliers, complex).T, padded(errors, float).T, strict=True)):
+            columns |= dict(zip((f"multiplier_{i}", f"error_{i}"), both, strict=True))
+        return Table(columns, table.title)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field
 
 from suboctave.errors import ConvergenceError, suggest
-from suboctave.maps.catalogue import checked_orders
-from suboctave.maps.isolas.map import isola_map
+from suboctave.maps.catalogue import checked_orders, checked_values
+from suboctave.maps.isolas.map import IsolaMap, isola_map
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.isolas.verb import checked_levels, find_isolas
+from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.verb import regime_map
 from suboctave.model.inputs import check_bounds, check_parameter
 from suboctave.store.table import Table
-from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, as_seeds, read_by, tried
+from suboctave.study.steps.base import CheckContext, Complaint, Context, Gives, Range, Verb, tried
 from suboctave.study.steps.curves import FollowingStep, check_sweep
 
 
@@ -34,25 +35,9 @@ class DesignStep(FollowingStep):
             yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
         yield from check_sweep(self.omega, around)
 
-    def options(self, context: Context) -> dict[str, Any]:
-        """The arguments of the verb that were given."""
-        return super().options(context) | {"max_curves": self.max_curves}
-
-    @property
-    def ranges(self) -> tuple[tuple[float, float], str, tuple[float, float]]:
-        """omega, the design parameter, its bounds."""
-        return (self.omega[0], self.omega[1]), self.parameter, (self.bounds[0], self.bounds[1])
-
-    def _check_values(self, values: int | list[float], key: str = "values") -> Iterator[Complaint]:
-        """Values of the design parameter: how many, or which."""
+    def _check_values(self, values: int | list[float]) -> Iterator[Complaint]:
         low, high = sorted(self.bounds)
-        if isinstance(values, int):
-            if values < 2:
-                yield (key,), f"must be at least 2, or values of {self.parameter} themselves, not {values}"
-            return
-        for i, value in enumerate(values):
-            if not low <= value <= high:
-                yield (key, i), f"{value:g} lies outside the bounds ({low:g}, {high:g})"
+        yield from tried("values", lambda: checked_values("values", values, (low, high), least=2))
 
 
 def check_design(name: str, bounds: list[float], keys: tuple[str, str], around: CheckContext) -> Iterator[Complaint]:
@@ -69,13 +54,15 @@ class FindIsolas(DesignStep):
     """`so.find_isolas`; `at` are values of the parameter at which the closed branches are followed and kept."""
 
     kind: ClassVar[str] = "find_isolas"
-    gives_isolas: ClassVar[bool] = True
+    verb: ClassVar[Verb] = staticmethod(find_isolas)
+    gives: ClassVar[Gives] = "isolas"
+    besides: ClassVar[tuple[str, ...]] = ("at",)
 
     values: int | list[float] = 5
     depth: int = Field(default=1, ge=0)
     levels: list[float] | None = None
     search: list[int] | None = None
-    seeds: Annotated[dict[str, Any] | None, read_by(as_seeds)] = None
+    seeds: dict[str, Any] | None = None
     at: list[float] = Field(default_factory=list)
 
     @property
@@ -84,17 +71,16 @@ class FindIsolas(DesignStep):
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        if isinstance(self.values, list) and not self.values:
-            yield ("values",), f"must be how many, or values of {self.parameter}, at least one"
         yield from self._check_values(self.values)
-        yield from self._check_values(self.at, "at")
+        low, high = sorted(self.bounds)
+        for i, value in enumerate(self.at):
+            if not low <= value <= high:
+                yield ("at", i), f"{value:g} lies outside the bounds ({low:g}, {high:g})"
         yield from tried("search", lambda: checked_orders(self.search or (), 2))
         yield from tried("levels", lambda: checked_levels(self.levels))
 
     def run(self, context: Context) -> Isolas:
-        given = self.own("at") | {"seeds": as_seeds(self.seeds)}
-        options = self.options(context) | {name: value for name, value in given.items() if value is not None}
-        return self._with_branches(find_isolas(context.system, *self.ranges, **options), context.progress)
+        return self._with_branches(self.computed(context), context.progress)
 
     def _with_branches(self, isolas: Isolas, progress: Any) -> Isolas:
         """The closed branches at the values asked for are followed; what fails is noted."""
@@ -121,6 +107,8 @@ class IsolaRegions(DesignStep):
     """`so.find_isolas` over `parameter`, then `so.isola_map` over `second`, as a table (`IsolaMap.to_table`)."""
 
     kind: ClassVar[str] = "isola_map"
+    verb: ClassVar[Verb] = staticmethod(find_isolas)
+    besides: ClassVar[tuple[str, ...]] = ("second", "second_bounds", "probes")
 
     second: str
     second_bounds: Range
@@ -142,22 +130,21 @@ class IsolaRegions(DesignStep):
         yield from self._check_values(self.values)
 
     def run(self, context: Context) -> Table:
-        options = self.options(context)
-        isolas = find_isolas(context.system, *self.ranges, values=self.values, depth=self.depth, **options)
+        isolas: Isolas = self.computed(context)
         if not isolas or isolas.interrupted:
             title = "; ".join([isolas.summary, *(f"note: {note}" for note in isolas.notes if isolas.interrupted)])
             return Table({}, title, stopped=isolas.interruption)
         bounds = self.second_bounds[0], self.second_bounds[1]
         regions = isola_map(isolas, self.second, bounds, probes=self.probes, progress=context.progress)
-        table = regions.to_table()
-        title = "; ".join([table.title, *(f"note: {note}" for note in regions.notes)])
-        return Table(table.columns, title, regions)
+        return _table_of(regions)
 
 
 class Regimes(DesignStep):
     """`so.regime_map` as a table (`RegimeMap.to_table`); with `check` the title says what time integration found."""
 
     kind: ClassVar[str] = "regime_map"
+    verb: ClassVar[Verb] = staticmethod(regime_map)
+    besides: ClassVar[tuple[str, ...]] = ("check_points", "seed")
 
     depth: int = Field(default=2, ge=0)
     values: int = Field(default=5, ge=1)
@@ -172,12 +159,15 @@ class Regimes(DesignStep):
         yield from tried("search", lambda: checked_orders(self.search, 1))
 
     def run(self, context: Context) -> Table:
-        given = self.own("check_points", "seed") | self.options(context)
-        regimes = regime_map(context.system, *self.ranges, **given)
-        table = regimes.to_table()
-        title = [table.title, *(f"note: {note}" for note in regimes.notes)]
-        if self.check_points and not regimes.interrupted:
-            checked = regimes.check(self.check_points, self.seed, progress=context.progress)
-            rate = 100.0 * checked.rate
-            title.insert(1, f"{rate:.1f} % of {len(checked.landings)} trajectories in time agree")
-        return Table(table.columns, "; ".join(title), regimes)
+        regimes: RegimeMap = self.computed(context)
+        if not self.check_points or regimes.interrupted:
+            return _table_of(regimes)
+        checked = regimes.check(self.check_points, self.seed, progress=context.progress)
+        return _table_of(regimes, f"{100.0 * checked.rate:.1f} % of {len(checked.landings)} trajectories in time agree")
+
+
+def _table_of(of_map: IsolaMap | RegimeMap, *more: str) -> Table:
+    """The table of a map, which is kept beside it, its notes in the title."""
+    table = of_map.to_table()
+    title = [table.title, *more, *(f"note: {note}" for note in of_map.notes)]
+    return Table(table.columns, "; ".join(title), of_map)
