@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.store.table import Table
 from suboctave.study.file import read_study
+from suboctave.study.screen import console
+from suboctave.study.shown import print_result
 
 ONE_MASS = (Path(__file__).parent / "one_mass.toml").read_text(encoding="utf-8")
 STUDY = f"""
@@ -63,6 +66,11 @@ def test_a_region_of_isolas(study_file, suboctave):
     assert set(table["border"]) == {"birth (isola centre)", "merging"}
 
 
+def test_an_analysis_that_found_nothing_is_shown(capsys):
+    print_result(console(), "region", Table({}, "no isola was found"))
+    assert capsys.readouterr().out == "\nregion: no isola was found\n"
+
+
 @pytest.mark.parametrize(
     ("text", "old", "new", "words"),
     [
@@ -76,7 +84,7 @@ def test_a_region_of_isolas(study_file, suboctave):
         (STUDY, "depth = 0", "observe = 3", ["observe", "out of range"]),
         (ISOLAS, 'second = "k1"', 'second = "F"', ["second", "another parameter"]),
         (ISOLAS, 'second = "k1"', 'second = "alph"', ["second", "did you mean 'alpha'"]),
-        (ISOLAS, 'second = "k1"', 'second = "alpha"\nvalues = [0.3]', ["values", "outside"]),
+        (ISOLAS, 'second = "k1"', 'second = "alpha"\nvalues = [0.3]', ["values", "not [0.3]"]),
         (ISOLAS, 'second = "k1"\nsecond_bounds = [0.95, 1.3]', 'second = "alpha"\nsecond_bounds = [2.0, 3.0]',
          ["second_bounds", "system's own alpha = 1"]),
     ],

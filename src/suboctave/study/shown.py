@@ -76,13 +76,9 @@ def _(diagram: BifurcationDiagram, out: Console, note: str) -> None:
     count = f"{len(diagram)} branch{'es' * (len(diagram) != 1)}"
     out.print(f": along {diagram.root.branch.name}, {count}{note}\n", markup=False)
     out.print(tree_text(diagram, out.width, head=False), markup=False, soft_wrap=True)
-    lines = [
-        (str(node.number), *line)
-        for node in diagram
-        if len(node.branch)
-        for line in event_lines(branch_dataset(node.branch))
-        if line[0] not in CONTACT_KINDS
-    ]
+    branches = [node for node in diagram if len(node.branch)]
+    events = ((str(node.number), *line) for node in branches for line in event_lines(branch_dataset(node.branch)))
+    lines = [line for line in events if line[1] not in CONTACT_KINDS]
     if len(lines) > _LISTED:
         out.print(f"{len(lines)} bifurcations: --csv, or csv = true in [outputs], writes them all", markup=False)
     elif lines:
@@ -133,18 +129,17 @@ def _in_one_line(branch: Branch) -> str:
 def _(table: Table, out: Console, note: str) -> None:
     """The columns that fit, the longest texts below it."""
     out.print(f": {table.title}{note}", markup=False)
-    shown: list[str] = []
-    texts: dict[str, list[str]] = {}
+    shown: dict[str, list[str]] = {}
     room = out.width
     for column in table.columns:
-        texts[column] = [_number(value) for value in table[column]]
-        width = max([len(column), *(len(text) for text in texts[column])]) + 2
-        if width <= room and width <= 40:
-            shown.append(column)
+        texts = [_number(value) for value in table[column]]
+        width = max(map(len, [column, *texts])) + 2
+        if width <= min(room, 40):
+            shown[column] = texts
             room -= width
     kinds = [name for name in shown if table[name].dtype.kind in "OU"]
-    lines = [[texts[name][i] for name in shown] for i in range(len(table))]
-    print_texts(out, shown, lines, left=kinds)
+    if shown:
+        print_texts(out, list(shown), list(zip(*shown.values(), strict=True)), left=kinds)
     left_out = [name for name in table.columns if name not in shown]
     if left_out:
         out.print(f"not shown: {', '.join(left_out)} (--csv writes everything)", markup=False)
