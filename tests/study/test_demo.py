@@ -32,7 +32,7 @@ SHOOTING = {
 @pytest.mark.parametrize("case", demo.CASES, ids=lambda case: f"p={case.p:g},j={case.j:g}")
 def test_every_bifurcation_is_where_shooting_found_it(case):
     seen = []
-    dataset = demo.compute(case, lambda fraction, text: seen.append(fraction)).dataset
+    dataset = demo.compute(case, lambda fraction, text: seen.append(fraction)).to_xarray()
     expected = SHOOTING[case.p, case.j]
     touching = dataset["event_kind"].to_numpy() == "grazing"
     # the stop at -1 is first touched with amplitude 1, and so is the one at 1

@@ -61,17 +61,18 @@ def new(
     from suboctave.atomic import free_place, replace_file
     from suboctave.study.screen import console, print_texts
 
-    known = {name: text.splitlines()[0].removeprefix("# ") for name, text in examples().items()}
+    texts = examples()
     if names:
+        known = {name: text.splitlines()[0].removeprefix("# ") for name, text in texts.items()}
         if json_wanted:
             _answer(json_wanted, {"examples": known})
         else:
             print_texts(console(), ("example", "what it is"), list(known.items()), left=("example", "what it is"))
         return
-    if example not in known:
-        raise InputError(f"there is no example {example!r}{suggest(example, known)}")
+    if example not in texts:
+        raise InputError(f"there is no example {example!r}{suggest(example, texts)}")
     target = free_place(path, overwrite, (".toml",))
-    text = examples()[example].replace("THIS_FILE", str(path))
+    text = texts[example].replace("THIS_FILE", str(path))
     replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
     answer = {"file": target, "example": example}
     _answer(json_wanted, answer, f"{target} is written; run it: suboctave run {target}")
@@ -116,7 +117,7 @@ def run(
     from suboctave.study.file import read_study
     from suboctave.study.runner import Finished, run_study
     from suboctave.study.screen import console
-    from suboctave.study.shown import print_result
+    from suboctave.study.shown import as_plain, print_result
 
     read = read_study(study, allow_code)
     screen = console(quiet=json_wanted)
@@ -142,39 +143,27 @@ def run(
     if others := [file.name for file in outcome.left if file != outcome.complete]:
         text = f"left as they are: {', '.join(others)} (--resume --overwrite writes them again)"
         screen.print(text, markup=False, soft_wrap=True)
-    status = _status(outcome)
+    status = 0
     if outcome.interruption is not None:
-        how = "Go on" if outcome.interruption == Interruption() else "Give more seconds, and go on"
+        by_user = outcome.interruption == Interruption()
+        status, how = (INTERRUPTED, "Go on") if by_user else (FAILED, "Give more seconds, and go on")
         why = f"{outcome.interruption}; what was computed is kept"
         screen.print(f"{why}. {how}: suboctave run {study} --resume", markup=False)
-    elif status:
+    elif outcome.failed:
+        status = WRONG if any(item.wrong_input for item in outcome.failed) else FAILED
         failed = ", ".join(item.step.name for item in outcome.failed)
         screen.print(f"failed: {failed}. Change the study, and go on with --resume", markup=False)
     if json_wanted:
-        _answer(json_wanted, _summary(outcome, status))
+        analyses = [
+            {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
+            | {"reused": item.reused, "failure": item.failure}
+            | ({} if item.result is None else as_plain(item.result))
+            for item in outcome.finished
+        ]
+        state = {"ok": status == 0, "status": status, "interrupted": outcome.interrupted}
+        _answer(json_wanted, state | {"analyses": analyses, "files": outcome.files, "left": outcome.left})
     if status:
         raise typer.Exit(status)
-
-
-def _status(outcome: Any) -> int:
-    if outcome.interrupted:
-        return INTERRUPTED if outcome.interruption == Interruption() else FAILED
-    if any(item.wrong_input for item in outcome.failed):
-        return WRONG
-    return FAILED if outcome.failed else 0
-
-
-def _summary(outcome: Any, status: int) -> dict[str, Any]:
-    from suboctave.study.shown import as_plain
-
-    analyses = [
-        {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
-        | {"reused": item.reused, "failure": item.failure}
-        | ({} if item.result is None else as_plain(item.result))
-        for item in outcome.finished
-    ]
-    state = {"ok": status == 0, "status": status, "interrupted": outcome.interrupted}
-    return state | {"analyses": analyses, "files": outcome.files, "left": outcome.left}
 
 
 @application.command()
@@ -207,8 +196,7 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
     from suboctave.study.screen import console
     from suboctave.study.shown import as_plain, print_result
 
-    loaded = load(path, allow_code=allow_code)
-    results = loaded
+    results = load(path, allow_code=allow_code)
     if not isinstance(results, Results):
         results = Results({path.stem: results if isinstance(results, Result) else results.to_table()})
     written = write_tables(results, csv, overwrite) if csv is not None else []
@@ -216,11 +204,10 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
         listed = {name: as_plain(item) for name, item in results.items()}
         _answer(json_wanted, {"attributes": results.attributes, "analyses": listed, "files": written})
         return
-    screen = console()
-    if results.attributes.get("title"):
-        screen.print(str(results.attributes["title"]), style="bold", markup=False)
-    if "written" in results.attributes:
-        origin = results.attributes
+    screen, origin = console(), results.attributes
+    if origin.get("title"):
+        screen.print(str(origin["title"]), style="bold", markup=False)
+    if "written" in origin:
         screen.print(f"suboctave {origin.get('suboctave')}, {origin['written']}", markup=False)
     for name, item in results.items():
         seconds = results.details.get(name, {}).get("seconds")
@@ -245,9 +232,8 @@ def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
     screen.print(repr(study.system), markup=False)
     screen.print("\nanalyses", style="bold")
     for step in study.steps:
-        arguments = {k: v for k, v in given[step.name].items() if k not in ("name", "type")}
-        listed = ", ".join(f"{name} = {_written(value)}" for name, value in arguments.items())
-        screen.print(f"  {step.name}: {step.kind}({listed})", markup=False)
+        arguments = (f"{k} = {_written(v)}" for k, v in given[step.name].items() if k not in ("name", "type"))
+        screen.print(f"  {step.name}: {step.kind}({', '.join(arguments)})", markup=False)
     screen.print(f"\noutputs in {study.folder}", markup=False, soft_wrap=True)
 
 
@@ -267,10 +253,8 @@ def _show_journal(path: Path, json_wanted: bool) -> None:
         return
     screen = console()
     screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
-    rows = [
-        [item.name, item.state, str(item.points), str(item.bifurcations), str(item.branches or "")] for item in analyses
-    ]
     names = ("analysis", "state", "points", "bifurcations", "branches")
+    rows = [(a.name, a.state, str(a.points), str(a.bifurcations), str(a.branches or "")) for a in analyses]
     print_texts(screen, names, rows, left=("analysis", "state"))
     for item in analyses:
         if item.events:
@@ -327,10 +311,15 @@ def main() -> None:
         sys.exit(0)
     except (SuboctaveError, OSError) as error:
         status = WRONG if isinstance(error, InputError | OSError) else FAILED
+        message = str(error)
+        if isinstance(error, OSError) and error.strerror and error.filename is not None:
+            message = f"{error.filename}: {error.strerror}; nothing was changed there"
         if "--json" in sys.argv[1:]:
-            print(json.dumps(_as_object(error, status), ensure_ascii=False))
+            listed = [{"key": m.key, "line": m.line, "message": m.message} for m in getattr(error, "mistakes", ())]
+            answer = {"ok": False, "status": status, "message": message, "mistakes": listed}
+            print(json.dumps(answer, ensure_ascii=False))
         else:
-            print(_readable(f"suboctave: {_sentence(error)}"), file=sys.stderr)
+            print(_readable(f"suboctave: {message}"), file=sys.stderr)
         sys.exit(status)
 
 
@@ -342,13 +331,6 @@ def _note(usual: Any, message: Warning | str, category: type[Warning], *place: A
         usual(message, category, *place, **more)
 
 
-def _sentence(error: Exception) -> str:
-    """A refusal of the operating system, without its number."""
-    if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        return f"{error.filename}: {error.strerror}; nothing was changed there"
-    return str(error)
-
-
 def _readable(text: str) -> str:
     """Broken into lines between words where somebody reads it; for other programs a line stays a line."""
     if not sys.stderr.isatty():
@@ -357,14 +339,7 @@ def _readable(text: str) -> str:
     import textwrap
 
     width = min(80, shutil.get_terminal_size().columns)
-    lines = text.splitlines()
-    return "\n".join(
-        textwrap.fill(line, width, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
-        for line in lines
+    fill = partial(
+        textwrap.fill, width=width, subsequent_indent=" " * 6, break_long_words=False, break_on_hyphens=False
     )
-
-
-def _as_object(error: Exception, status: int) -> dict[str, Any]:
-    mistakes = getattr(error, "mistakes", ())
-    listed = [{"key": m.key, "line": m.line, "message": m.message} for m in mistakes]
-    return {"ok": False, "status": status, "message": _sentence(error), "mistakes": listed}
+    return "\n".join(map(fill, text.splitlines()))

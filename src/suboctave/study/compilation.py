@@ -9,9 +9,8 @@ equations and stability have in common with them.
 from __future__ import annotations
 
 import warnings
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
 import numpy as np
@@ -74,18 +73,11 @@ def run(number: int) -> None:
 
 
 def compile_all(report: Report, processes: int = 2) -> None:
-    """Compile every kernel that is not in the cache; `report(share done, what is being compiled)` is called."""
-    pending = deque(range(len(COMPUTATIONS)))
-    running: dict[Future[None], int] = {}
-    done = 0
+    """Compile every kernel that is not in the cache; `report(share done, what is left)` is called."""
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        while pending or running:
-            while pending and len(running) < processes:
-                number = pending.popleft()
-                running[pool.submit(run, number)] = number
-            report(done / len(COMPUTATIONS), "; ".join(COMPUTATIONS[number][0] for number in running.values()))
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                future.result()
-                del running[future]
-                done += 1
-    report(1.0, "")
+        left = {pool.submit(run, number): name for number, (name, _) in enumerate(COMPUTATIONS)}
+        report(0.0, "; ".join(left.values()))
+        for future in as_completed(list(left)):
+            future.result()
+            del left[future]
+            report(1.0 - len(left) / len(COMPUTATIONS), "; ".join(left.values()))

@@ -8,15 +8,13 @@ s = 3000, for the three cases of Figs 6 and 7 of Alcorta, Baguet, Prabel, Piteau
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.track import track
+from suboctave.interruption import pass_on
 from suboctave.model import System, library
 from suboctave.pictures import plot_boundaries, plot_panels, plot_response
 from suboctave.progress import bar
@@ -25,17 +23,13 @@ from suboctave.store.layout import events_met
 from suboctave.study.screen import console, event_lines, print_events
 from suboctave.study.shown import to_json
 
-if TYPE_CHECKING:
-    import xarray
-
 OMEGA = (4.5, 1.25)
 REGULARIZATION = 3000.0
 
 Progress = Callable[[float, str], None]
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """One response curve of the demonstration: forcing amplitude `p`, right gap `j` (the left gap is 1)."""
 
     title: str
@@ -51,20 +45,6 @@ class Case:
         return f"p = {self.p:g}, j = {self.j:g}"
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A case with its computed curve, and the seconds that it took."""
-
-    case: Case
-    branch: Branch
-    seconds: float
-
-    @cached_property
-    def dataset(self) -> xarray.Dataset:
-        """The curve as pictures and tables take it."""
-        return self.branch.to_xarray()
-
-
 CASES = (
     Case("weak forcing, equal gaps", 0.55, 1.0),
     Case("weak forcing, one gap closed", 0.55, 0.0),
@@ -72,23 +52,20 @@ CASES = (
 )
 
 
-def compute(case: Case, progress: Progress | None = None) -> Curve:
+def compute(case: Case, progress: Progress | None = None) -> Branch:
     """The response curve of one case, with stability and located bifurcations; `progress(fraction, text)` is called."""
-    begin = perf_counter()
-    branch = frequency_response(case.system, omega=OMEGA, progress=progress)
-    return Curve(case, branch, perf_counter() - begin)
+    return frequency_response(case.system, omega=OMEGA, progress=progress)
 
 
-def draw(curves: Sequence[Curve], folder: Path) -> list[Path]:
+def draw(curves: Sequence[Branch], folder: Path) -> list[Path]:
     """Two figures in `folder`, PNG: weak forcing with its two cases side by side, and strong forcing."""
-    weak = [curve for curve in curves if curve.case.p < 1.0]
-    files = [folder / "weak_forcing.png"]
-    titles = [f"({letter}) {curve.case}" for letter, curve in zip("ab", weak, strict=False)]
-    plot_panels([curve.dataset for curve in weak], files[0], titles=titles)
-    for strong in curves[len(weak) :]:
-        files.append(folder / "strong_forcing.png")
-        plot_response(strong.dataset, files[-1], title=str(strong.case))
-    return files
+    weak, strong = folder / "weak_forcing.png", folder / "strong_forcing.png"
+    titles = [f"({letter}) {case}" for letter, case in zip("ab", CASES, strict=False)]
+    plot_panels([curve.to_xarray() for curve in curves[:2]], weak, titles=titles[: len(curves)])
+    if len(curves) < len(CASES):
+        return [weak]
+    plot_response(curves[2].to_xarray(), strong, title=str(CASES[2]))
+    return [weak, strong]
 
 
 def sequel(weak: Branch, strong: System, folder: Path, progress: Progress | None = None) -> list[tuple[str, Path]]:
@@ -96,39 +73,34 @@ def sequel(weak: Branch, strong: System, folder: Path, progress: Progress | None
 
     The branches that leave the response of the `strong`ly forced system at its period doublings; the border of the
     first ones of the `weak` response over the frequency and the gap, with the curve of limit points that begins on it;
-    and, off that border, a resonance of twice the period that no sweep meets.
+    and, off that border, a resonance of twice the period that no sweep meets. Ctrl-C, which the verbs end politely at,
+    ends it.
     """
-
-    def whole(result: Any) -> Any:
-        """Ctrl-C, which the verbs end politely at, ends the demonstration too."""
-        if result.interrupted:
-            raise KeyboardInterrupt
-        return result
-
-    beside: list[tuple[str, Path]] = []
+    cascade, boundary, hidden = (folder / f"{name}.png" for name in ("cascade", "boundary", "isola"))
     diagram = bifurcation_diagram(strong, omega=OMEGA, depth=2, progress=progress)
-    count = len(diagram) - 1
-    beside.append((f"p = 1.7, j = 0: {count} branches leave the response", folder / "cascade.png"))
-    diagram.plot(beside[-1][1])
-    whole(diagram)
+    diagram.plot(cascade)
+    pass_on(diagram.interruption)
+    leaving = f"p = 1.7, j = 0: {len(diagram) - 1} branches leave the response"
 
     gaps: dict[str, Any] = {"parameter": "j", "bounds": (0.0, 1.0), "progress": progress}
-    border = whole(track(weak.bifurcations["PD"][0], **gaps))
-    limits = whole(track(border.bifurcations["GPD"][-1], **gaps))
-    highest = max(e.parameter("j") for e in border.extrema)
-    text = f"p = 0.55: the response doubles its period for gaps up to j = {highest:.5f}"
-    beside.append((text, folder / "boundary.png"))
-    plot_boundaries([border.to_xarray(), limits.to_xarray()], beside[-1][1])
+    border = track(weak.bifurcations["PD"][0], **gaps)
+    pass_on(border.interruption)
+    limits = track(border.bifurcations["GPD"][-1], **gaps)
+    pass_on(limits.interruption)
+    plot_boundaries([border.to_xarray(), limits.to_xarray()], boundary)
+    highest, born = (max(e.parameter("j") for e in curve.extrema) for curve in (border, limits))
 
     fold = min(limits.orbits, key=lambda orbit: abs(orbit.values["j"] - 0.5))
     gap = fold.values["j"]
     isola = continue_branch(fold, "omega", OMEGA, progress=progress)
     response = frequency_response(weak.system.with_parameters({"j": gap}), omega=OMEGA, progress=progress)
-    born = max(e.parameter("j") for e in limits.extrema)
-    text = f"up to j = {born:.5f} an isolated resonance of twice the period hides beside it: at j = {gap:.3f}"
-    beside.append((text, folder / "isola.png"))
-    plot_response([response.to_xarray(), isola.to_xarray()], beside[-1][1], title=f"p = 0.55, j = {gap:.3f}")
-    return beside
+    plot_response([response.to_xarray(), isola.to_xarray()], hidden, title=f"p = 0.55, j = {gap:.3f}")
+    beside = f"an isolated resonance of twice the period hides beside it: at j = {gap:.3f}"
+    return [
+        (leaving, cascade),
+        (f"p = 0.55: the response doubles its period for gaps up to j = {highest:.5f}", boundary),
+        (f"up to j = {born:.5f} {beside}", hidden),
+    ]
 
 
 def run_demo(out: Path, json_wanted: bool = False) -> None:
@@ -142,32 +114,32 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
         f"omega from {OMEGA[0]:g} to {OMEGA[1]:g}.",
         markup=False,
     )
-    curves: list[Curve] = []
+    curves: list[Branch] = []
     for case in CASES:
         with bar(str(case)) as report:
             curve = compute(case, report)
         curves.append(curve)
         screen.print(f"\n{case}: {case.title}", style="bold", markup=False)
-        print_events(screen, event_lines(curve.dataset))
-        screen.print(f"{len(curve.branch)} points in {curve.seconds:.2f} s; {curve.branch.ended}.", markup=False)
-        if curve.branch.interrupted:
+        print_events(screen, event_lines(curve.to_xarray()))
+        screen.print(f"{len(curve)} points in {curve.seconds:.2f} s; {curve.ended}.", markup=False)
+        if curve.interrupted:
             break
-    interrupted = curves[-1].branch.interrupted
     screen.print()
-    figures = list(draw(curves, out))
+    figures = draw(curves, out)
     for path in figures:
         screen.print(f"figure: {path}", markup=False, soft_wrap=True)
+    interrupted = curves[-1].interrupted
     if not interrupted:
         with bar("what hides beside them") as report:
-            hidden = sequel(curves[1].branch, CASES[2].system, out, report)
+            hidden = sequel(curves[1], CASES[2].system, out, report)
         for text, path in hidden:
             screen.print(f"\n{text}\nfigure: {path}", markup=False, soft_wrap=True)
             figures.append(path)
     if json_wanted:
         listed = [
-            {"p": c.case.p, "j": c.case.j, "points": len(c.branch), "seconds": c.seconds, "ended": c.branch.ended}
-            | {"events": [{"kind": event.kind, "omega": event.omega} for event in events_met(c.branch)]}
-            for c in curves
+            {"p": case.p, "j": case.j, "points": len(curve), "seconds": curve.seconds, "ended": curve.ended}
+            | {"events": [{"kind": event.kind, "omega": event.omega} for event in events_met(curve)]}
+            for case, curve in zip(CASES, curves, strict=False)
         ]
         print(to_json({"ok": not interrupted, "curves": listed, "files": figures}))
     if interrupted:

@@ -100,22 +100,18 @@ def _published(section: SystemSection, mistakes: Mistakes) -> System | None:
     for what in ("elements", "loads"):
         if getattr(section, what):
             mistakes.add(("system", what), "a published system comes with its own; write the system out to add to it")
-    function = functions[section.library]
-    known = list(inspect.signature(function).parameters)
-    wrong = [name for name in section.arguments if name not in known]
+    function, given = functions[section.library], section.arguments
+    known = inspect.signature(function).parameters
+    wrong = [name for name in given if name not in known]
     for name in wrong:
         mistakes.add(("system", "arguments", name), f"{section.library} has no such argument{suggest(name, known)}")
-    missing = [
-        name
-        for name, parameter in inspect.signature(function).parameters.items()
-        if parameter.default is parameter.empty and name not in section.arguments
-    ]
+    missing = [name for name, one in known.items() if one.default is one.empty and name not in given]
     if missing:
         mistakes.add(("system", "arguments"), f"{section.library} needs {', '.join(missing)}")
     if wrong or missing:
         return None
     try:
-        system = function(**section.arguments)
+        system = function(**given)
     except (InputError, TypeError, ZeroDivisionError) as error:
         mistakes.add(("system", "library"), str(error))
         return None
@@ -187,19 +183,16 @@ def given_matrix(value: Any, folder: Path) -> Any:
             if not isinstance(value["file"], str):
                 raise InputError(f"file is the name of a file, not {value['file']!r}")
             return read_matrix(folder / value["file"], value.get("key"))
-        return {
-            float(factor) if _is_number(factor) else factor: given_matrix(matrix, folder)
-            for factor, matrix in value.items()
-        }
+        return {_number_in(factor): given_matrix(matrix, folder) for factor, matrix in value.items()}
     return value
 
 
-def _is_number(text: str) -> bool:
+def _number_in(text: str) -> float | str:
+    """A text that is a number as that."""
     try:
-        float(text)
+        return float(text)
     except ValueError:
-        return False
-    return True
+        return text
 
 
 def read_matrix(path: Path, key: str | None) -> Any:
