@@ -9,10 +9,11 @@ word.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import index
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from suboctave.kinds import KINDS
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
-from suboctave.verification.motion import Verification, distance_from_gap, pairing, verify_motion
+from suboctave.verification.motion import LOCATED, Verification, distance_from_gap, pairing, verify_motion
 from suboctave.verification.result import (
     AGREES,
     DISAGREES,
@@ -40,7 +41,7 @@ from suboctave.verification.result import (
 )
 
 
-def verify_branch(
+def _verify_branch(
     branch: Branch,
     tolerance: float,
     points: int | Iterable[int] | None,
@@ -49,7 +50,6 @@ def verify_branch(
     workers: int | None,
     progress: Any,
 ) -> BranchVerification:
-    """See `verification.verify`."""
     if isinstance(branch, TrackedBranch):
         raise InputError(
             "this is a curve of bifurcations in two parameters: take its points or its .bifurcations one by one"
@@ -68,10 +68,9 @@ def verify_branch(
     interruption: Interruption | None = None
     with reporting(progress, "verifying") as report, one_thread():
         try:
-            for begin in range(0, len(which), shots.at_once):
+            for part in shots.batches(which):
                 if report is not None:
-                    report(begin / whole, f"{begin} of {len(which)} points")
-                part = which[begin : begin + shots.at_once]
+                    report(len(checked) / whole, f"{len(checked)} of {len(which)} points")
                 for i, shot in zip(part, shots.motions([branch.points[i].orbit for i in part]), strict=True):
                     checked.append(_judged(branch, i, shot, tolerance))
             quick = _quick(shots, items, tolerance)
@@ -148,29 +147,17 @@ def _quick(shots: Shots, items: Sequence[Bifurcation], tolerance: float) -> dict
     located = [item for item in items if item.kind in LOCATED]
     places: dict[int, Place] = {}
     contacts = [item for item in items if item.kind in CONTACT_KINDS]
-    for begin in range(0, len(contacts), shots.at_once):
-        part = contacts[begin : begin + shots.at_once]
+    for part in shots.batches(contacts):
         for item, shot in zip(part, shots.motions([item.orbit for item in part]), strict=True):
             places[id(item)] = Place(shot, float("nan"), shot.omega)
-    for begin in range(0, len(located), shots.at_once):
-        part = located[begin : begin + shots.at_once]
+    for part in shots.batches(located):
         places_of_part = shots.places([item.orbit for item in part], [item.kind for item in part], tolerance)
         places |= {id(item): place for item, place in zip(part, places_of_part, strict=True)}
     return places
 
 
-def _confirmed(
-    item: Bifurcation,
-    place: Place | None,
-    tolerance: float,
-    observe: int,
-) -> VerifiedBifurcation:
-    amplitude = item.orbit.amplitude(observe)
-
-    def verdict(omega: float, distance: float, agrees: bool, reason: str) -> VerifiedBifurcation:
-        place = (item.kind, item.omega, item.parameters, amplitude)
-        return VerifiedBifurcation(*place, omega, distance, agrees, reason)
-
+def _confirmed(item: Bifurcation, place: Place | None, tolerance: float, observe: int) -> VerifiedBifurcation:
+    verdict = partial(VerifiedBifurcation, item.kind, item.omega, item.parameters, item.orbit.amplitude(observe))
     if place is not None and place.shot.converged and place.shot.distance <= tolerance:
         if item.kind in CONTACT_KINDS:
             along = distance_from_gap(item, place.shot.state, place.omega)
@@ -188,8 +175,7 @@ def _confirmed(
 
 
 # ---------------------------------------------------------------------------------------- multiple shooting, in batches
-#: the kinds whose place along the curve of motions is looked for
-LOCATED = ("LP", "BP", "PD", "NS")
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -223,10 +209,10 @@ class Shots:
         self.system = orbit.balance.system
         self.shooting = MultipleShooting(self.system, orbit.basis.nu, workers)
 
-    @property
-    def at_once(self) -> int:
-        """How many motions one batch may have."""
-        return self.shooting.at_once
+    def batches(self, items: Sequence[Item]) -> Iterator[Sequence[Item]]:
+        """Items in as many at once as one batch may have motions."""
+        count = self.shooting.at_once
+        return (items[begin : begin + count] for begin in range(0, len(items), count))
 
     def motions(self, orbits: Sequence[PeriodicOrbit]) -> list[Shot]:
         """The true motions beside these."""
@@ -259,12 +245,8 @@ class Shots:
             largest = [np.abs(orbit.displacement(fine)).max(), np.abs(orbit.velocity(fine)).max()]
             largest = [largest[0] or 1.0, largest[1] or orbit.omega]
             sizes.append(np.repeat(largest, self.system.n))
-        names = [
-            name
-            for name, value in self.system.parameters.items()
-            if any(orbit.values[name] != value for orbit in orbits)
-        ]
-        parameters = {name: np.array([orbit.values[name] for orbit in orbits]) for name in names}
+        values = {name: np.array([orbit.values[name] for orbit in orbits]) for name in self.system.parameters}
+        parameters = {name: own for name, own in values.items() if (own != self.system.parameters[name]).any()}
         return np.array(states), np.array([o.omega for o in orbits]), parameters, np.array(sizes)
 
 
@@ -379,7 +361,7 @@ def verify(
     if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
         raise InputError(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
     if isinstance(what, Branch):
-        return verify_branch(what, tolerance, points, every, bifurcations, workers, progress)
+        return _verify_branch(what, tolerance, points, every, bifurcations, workers, progress)
     if points is not None or every != 1:
         raise InputError("points= and every= choose among the points of a branch; this is a single motion")
     return verify_motion(what, tolerance)

@@ -23,8 +23,8 @@ from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting
 
 __all__ = ["Verification", "distance_from_gap", "stability", "verify_motion"]
 
-#: the kinds that shooting locates by themselves
-_LOCATED = ("LP", "BP", "PD", "NS")
+#: the kinds that shooting locates by themselves, along the curve of motions
+LOCATED = ("LP", "BP", "PD", "NS")
 #: how far along the curve of motions one is searched, in tolerances, and the passes through it that may be spent
 _REACH, _PASSES = 100.0, 120
 
@@ -93,7 +93,7 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else stability(motion)
     start = motion.start()
     touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
-    kind = what.kind if isinstance(what, Bifurcation) and what.kind in _LOCATED else None
+    kind = what.kind if isinstance(what, Bifurcation) and what.kind in LOCATED else None
     try:
         if kind is None:
             solution = shoot(system, start, motion.omega, periods=motion.basis.nu)

@@ -176,11 +176,8 @@ class BranchVerification(TimeResult):
             for name, kind in POINT_COLUMNS.items()
         }
         for name in VERDICTS:
-            verdicts = (getattr(p, name) for p in points)
-            variables[name] = (
-                "point",
-                np.array([-1 if verdict is None else int(verdict) for verdict in verdicts], dtype=int),
-            )
+            verdicts = [getattr(p, name) for p in points]
+            variables[name] = ("point", np.array([-1 if v is None else int(v) for v in verdicts], dtype=int))
         variables["multipliers"] = (("point", "multiplier"), padded([p.multipliers for p in points], complex))
         variables["multiplier_errors"] = (("point", "error"), padded([p.errors for p in points], float))
         variables |= {
@@ -202,18 +199,14 @@ class BranchVerification(TimeResult):
         """One row per point: distance, true multiplier that leads, errors, verdicts, outcome and reason."""
         import pandas as pd
 
-        names = ("index", "omega", "amplitude", "distance", "multiplier_error", "stable", "computed", "outcome")
-        more = ("multiplier_real", "multiplier_imag", "margin", "reason")
-        rows = []
-        name = self.branch.name
-        free = {} if name == "omega" else {parameter_column(name, (*names, *more)): self.branch.parameter(name)}
-        for point in self.points:
-            leading = point.multipliers[0] if len(point.multipliers) else complex("nan")
-            row = {name: getattr(point, name) for name in names} | {n: v[point.index] for n, v in free.items()}
-            rows.append(row | {"multiplier_real": leading.real, "multiplier_imag": leading.imag, "margin": point.margin,
-                               "reason": point.reason})  # fmt: skip
-        columns = [*names[:2], *free, *names[2:], *more]
-        return pd.DataFrame(rows, columns=columns)
+        names = ["index", "omega", "amplitude", "distance", "multiplier_error", "stable", "computed", "outcome"]
+        names += ["multiplier_real", "multiplier_imag", "margin", "reason"]
+        frame = pd.DataFrame([{name: getattr(p, name, None) for name in names} for p in self.points], columns=names)
+        leading = np.array([p.multipliers[0] if len(p.multipliers) else np.nan for p in self.points], dtype=complex)
+        frame["multiplier_real"], frame["multiplier_imag"] = leading.real, leading.imag
+        if (name := self.branch.name) != "omega":
+            frame.insert(2, parameter_column(name, names), self.branch.parameter(name)[frame["index"].astype(int)])
+        return frame
 
     def bifurcations_frame(self) -> pandas.DataFrame:
         """One row per bifurcation: kind, frequencies, distance, whether it is confirmed, why."""
