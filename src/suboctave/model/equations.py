@@ -10,7 +10,6 @@ elements along that direction, as if made by hand (`CubicSpring`, `ElasticStop`,
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -34,6 +33,7 @@ from suboctave.model.expressions.derivatives import (
     expanded_size,
     force_expression,
     number,
+    real_number,
     symbol,
 )
 from suboctave.model.expressions.law import harmonic_of
@@ -330,7 +330,7 @@ class _Forces:
                 continue
             for j, slope in zip(inside[1:], slopes[1:], strict=True):
                 ratio = sympy.cancel(slope / slopes[0]) if expanded_size(slope) < _MOST_TERMS else slope / slopes[0]
-                factor = _real(ratio)
+                factor = real_number(ratio)
                 if factor is None or direction[j] not in (0.0, factor):
                     return None
                 direction[j] = factor
@@ -420,14 +420,3 @@ def _fresh(name: str, taken: set[str]) -> str:
     while name in taken:
         name += "_"
     return name
-
-
-def _real(value: Any) -> float | None:
-    """A real number, None for all else (an expression, a complex number, infinity)."""
-    if not value.is_number:
-        return None
-    try:
-        real = float(value)
-    except (TypeError, OverflowError):
-        return None
-    return real if math.isfinite(real) else None

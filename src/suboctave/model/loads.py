@@ -24,10 +24,9 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.description import Recorded
 from suboctave.model.elements.base import Array, Dof, Place, required
-from suboctave.model.expressions.coefficients import ZERO, Coefficient, coefficient, named_coefficient
+from suboctave.model.expressions.coefficients import ZERO, Coefficient, Number, coefficient, named_coefficient
 from suboctave.model.matrices import MatrixCoefficient
 
-Number = float | str | Coefficient
 _QUARTER = coefficient("-pi/2")
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
 _HIGHEST = 10_000

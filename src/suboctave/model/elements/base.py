@@ -22,7 +22,7 @@ from suboctave.errors import InputError, located
 from suboctave.model.description import Recorded
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
 from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling, WholeLaw
-from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
+from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
 
 Array: TypeAlias = NDArray[np.float64]
 Dof: TypeAlias = int | Sequence[int]
@@ -104,7 +104,7 @@ class BaseElement(Recorded, ABC, family="element"):
     def __init__(
         self,
         dof: Dof | None = None,
-        coefficients: Sequence[float | str | Coefficient | None] = (),
+        coefficients: Sequence[Number | None] = (),
         *,
         direction: ArrayLike | None = None,
     ) -> None:

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, shortened
 from suboctave.model.elements.base import Array, Dof, Element, central_difference, required, shift_derivative, step_of
 from suboctave.model.elements.smoothness import AdaptiveSampling
-from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.expressions.coefficients import Number
 
-Number = float | str | Coefficient
 #: step of complex differences
 _COMPLEX = 1e-30
 _CHECKED = 9

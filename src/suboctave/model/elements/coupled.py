@@ -21,7 +21,7 @@ from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Plac
 from suboctave.model.elements.batch_form import BatchForm, WrittenForm
 from suboctave.model.elements.smoothness import Sampling
 from suboctave.model.elements.written import WrittenElement
-from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.expressions.coefficients import Number
 from suboctave.model.expressions.reader import RESERVED
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class CoupledElement(BaseElement):
         self,
         dof: Dof | None = None,
         inputs: Sequence[Dof | ArrayLike] = (),
-        coefficients: Sequence[float | str | Coefficient | None] = (),
+        coefficients: Sequence[Number | None] = (),
         *,
         direction: ArrayLike | None = None,
     ) -> None:

@@ -11,10 +11,8 @@ from suboctave.errors import InputError
 from suboctave.model.elements.base import Array, Dof
 from suboctave.model.elements.smoothness import CornerSampling, SharpVelocitySampling
 from suboctave.model.elements.written import WrittenElement
-from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.expressions.coefficients import Number
 from suboctave.model.matrices import warn_of_negative
-
-Number = float | str | Coefficient
 
 
 class _Damper(WrittenElement):

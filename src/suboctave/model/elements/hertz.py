@@ -11,10 +11,9 @@ from suboctave.errors import InputError, suggest
 from suboctave.model.elements.base import Array, Dof, required
 from suboctave.model.elements.smoothness import CornerSampling
 from suboctave.model.elements.written import WrittenElement
-from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.expressions.coefficients import Number
 from suboctave.model.matrices import warn_of_negative
 
-Number = float | str | Coefficient
 _SIDES = ("right", "left")
 
 

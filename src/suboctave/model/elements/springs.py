@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, is_number
 from suboctave.model.elements.base import Array, DeclaredElement, Dof, required
 from suboctave.model.elements.smoothness import PolynomialSampling
-from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.expressions.coefficients import Number
 
-Number = float | str | Coefficient
 #: largest power of a displacement, as in texts: 2**1024 is no floating-point number any more
 LARGEST_POWER = 1000
 

@@ -28,12 +28,11 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, suggest
 from suboctave.model.elements.base import Array, DeclaredElement, Dof, required
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear, SharpSampling
-from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
+from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
 
 if TYPE_CHECKING:
     from suboctave.model.expressions.law import Law
 
-Number = float | str | Coefficient
 _SIDES = {"right": 1, "left": -1}
 #: sharpness, and sharpness times gap, beyond which the squares of rounded laws leave the range of floats
 _SHARPEST = 1e100

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.model.expressions.reader import FUNCTIONS, Form, number_form, read
@@ -79,6 +79,9 @@ class Coefficient:
 
     def __reduce__(self) -> tuple[Any, ...]:  # closures cannot be pickled: read again on the other side
         return restored, (self.text, self.by)
+
+
+Number: TypeAlias = float | str | Coefficient
 
 
 def restored(text: str, by: Iterable[str] = ()) -> Coefficient:

@@ -92,16 +92,18 @@ def force_expression(text: str, where: str, names: Iterable[str] | None = None) 
 
     plain = text.replace("\u2032", "'").replace("\u2019", "'").replace("'", PRIME)
     expression = expression_of(read(plain, where, {**FUNCTIONS, **CORNERS}, refusal))
-    if not all(map(_finite, expression.atoms(sympy.Number))):
+    if any(real_number(factor) is None for factor in expression.atoms(sympy.Number)):
         raise InputError(f"{where}: a factor of {text!r:.60} is not a finite real number")
     return expression
 
 
-def _finite(factor: Any) -> bool:
+def real_number(value: Any) -> float | None:
+    """A finite real number, None for all else (an expression, a complex number, infinity)."""
     try:
-        return math.isfinite(float(factor))
-    except OverflowError:
-        return False
+        real = float(value)
+    except (TypeError, OverflowError):
+        return None
+    return real if math.isfinite(real) else None
 
 
 def expression_of(form: Form) -> Any:
@@ -225,11 +227,8 @@ class _Text(StrPrinter):
 
 
 def _float_text(e: Any) -> str:
-    try:
-        value = float(e)
-    except (TypeError, OverflowError):
-        value = math.nan
-    if not math.isfinite(value):
+    value = real_number(e)
+    if value is None:
         raise InputError(f"{e} is not a finite real number")
     return repr(value)
 

@@ -31,6 +31,7 @@ from suboctave.model.expressions.derivatives import (
     expanded_size,
     force_expression,
     lines_of_code,
+    real_number,
     symbol,
 )
 from suboctave.model.expressions.reader import PRIME
@@ -148,22 +149,20 @@ class Law:
 
     def _polynomial(self) -> int | None:
         """Total degree in q of a polynomial whose time enters by sines and cosines, else None."""
-        waves = [a for a in _functions(self.expression) if self.phase in a.free_symbols]
-        swapped, generators, harmonics = self.expression, list(self.q), [0] * len(self.q)
-        for i, wave in enumerate(waves):
-            stand_in = sympy.Symbol(f"wave_{i}")
-            swapped = swapped.subs(wave, stand_in)
-            generators.append(stand_in)
-            harmonics.append(abs(int(wave.args[0].coeff(self.phase))))
-        if self.phase in swapped.free_symbols or not swapped.is_polynomial(*generators):
+        waves = [wave for wave in self.expression.atoms(sympy.sin, sympy.cos) if self.phase in wave.free_symbols]
+        generators = [*self.q, *sympy.symbols(f"wave_:{len(waves)}")]
+        harmonics = [0] * len(self.q) + [abs(int(wave.args[0].coeff(self.phase))) for wave in waves]
+        swapped = self.expression.xreplace(dict(zip(waves, generators[len(self.q) :], strict=True)))
+        if (
+            self.phase in swapped.free_symbols
+            or not swapped.is_polynomial(*generators)
+            or expanded_size(swapped) > 1000
+        ):
             return None
-        if expanded_size(swapped) > 1000:
-            return None
-        polynomial = sympy.Poly(swapped, *generators)
-        degree = 0
-        for powers in polynomial.monoms():
-            degree = max(degree, sum(powers[: len(self.q)]))
-            self.time_harmonic = max(self.time_harmonic, sum(p * h for p, h in zip(powers, harmonics, strict=True)))
+        monomials = sympy.Poly(swapped, *generators).monoms()
+        products = [sum(p * h for p, h in zip(powers, harmonics, strict=True)) for powers in monomials]
+        self.time_harmonic = max(self.time_harmonic, *products)
+        degree = max(sum(powers[: len(self.q)]) for powers in monomials)
         return degree if degree <= _HIGHEST_DEGREE else None
 
     def sampling(self, c: Array) -> Sampling:
@@ -191,12 +190,7 @@ class Law:
         return array_function([_off_corners(part) for part in parts], self.q, self.phase, self.c)
 
     def scalar_code(
-        self,
-        parts: list[Any],
-        states: list[str],
-        number: Callable[[int], str],
-        prefix: str,
-        more: Mapping[str, str],
+        self, parts: list[Any], states: list[str], number: Callable[[int], str], prefix: str, more: Mapping[str, str]
     ) -> tuple[list[str], list[str]]:
         """Lines of code and an expression for each of the parts, for a compiler: of numbers instead of arrays.
 
@@ -298,8 +292,5 @@ def harmonic_of(argument: Any) -> int | None:
     slope = argument.diff(t)
     if t in slope.free_symbols or omega in argument.subs(t, 0).free_symbols:
         return None
-    multiple = slope / omega
-    if multiple.free_symbols or not multiple.is_number:
-        return None
-    value = float(multiple)
-    return int(value) if value.is_integer() and value != 0.0 else None
+    value = real_number(slope / omega)
+    return int(value) if value and value.is_integer() else None
