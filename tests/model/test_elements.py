@@ -258,7 +258,8 @@ def test_changes_of_a_rounded_stop_are_those_of_its_derivatives(side, gap):
     for rates in np.vstack((np.eye(3), [0.3, -2.0, 0.1])):
         step = 1e-6
         ahead, behind = (stop.tangent(u, 0.0 * u, c + sign * step * rates) for sign in (1.0, -1.0))
-        force, stiffness, damping = stop.coefficient_change(u, 0.0 * u, c, rates)
+        f_c, f_uc, damping = stop.coefficient_tangent(u, 0.0 * u, c)
+        force, stiffness = rates @ f_c, rates @ f_uc
         assert damping is None
         np.testing.assert_allclose(force, (ahead[0] - behind[0]) / (2.0 * step), rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(stiffness, (ahead[1] - behind[1]) / (2.0 * step), rtol=1e-5, atol=1e-4)

@@ -212,11 +212,6 @@ class Element(BaseElement):
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array | None]:
         """`(f_c, f_uc, f_vc)`, (nc, N) each; `f_vc` is None for a law without velocity."""
 
-    def coefficient_change(self, u: Array, v: Array, c: Array, rates: Array) -> tuple[Array, Array, Array | None]:
-        """What a change of the coefficients, `rates` (nc,), does to `(f, f_u, f_v)`, (N,) each."""
-        f_c, f_uc, f_vc = self.coefficient_tangent(u, v, c)
-        return rates @ f_c, rates @ f_uc, None if f_vc is None else rates @ f_vc
-
     @abstractmethod
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""

@@ -156,10 +156,6 @@ def _of_law(name: str) -> Any:
 
 def changed_law(element: BaseElement, q: Array, theta: Array, c: Array, rates: Array) -> tuple[Array, Array]:
     """What a change of the coefficients, `rates` (nc,), does to f and f_q, (N,) and (Q, N)."""
-    if isinstance(element, Element):
-        moving = element.depends_on_velocity
-        f, f_u, f_v = element.coefficient_change(q[0], q[1] if moving else np.zeros_like(q[0]), c, rates)
-        return f, np.array([f_u, f_v] if moving else [f_u])
     f_c, f_qc = as_coupled(element).coefficient_tangent(q, theta, c)
     return rates @ f_c, np.tensordot(rates, f_qc, 1)
 

@@ -109,18 +109,6 @@ class SharpSampling:
         steps = self._steps(u)
         return sum((-2.0 * step * r / (math.pi * (w * (1.0 + r * r)) ** 2) for r, w, step in steps), np.zeros_like(u))
 
-    def changed(self, u: Array, by: SharpSampling) -> tuple[Array, Array]:
-        """Changes of `f, f_u` with the rates `by` of all numbers, each in its place."""
-        force, stiffness = by.constant + by.slope * u, np.full_like(u, by.slope)
-        rates = zip(by.points, by.widths, by.steps or (), strict=True)
-        for (ratio, width, step), (by_point, by_width, by_step) in zip(self._steps(u), rates, strict=True):
-            angle, square = np.arctan(ratio), ratio * ratio
-            factor, logarithm = step / math.pi, 0.5 * np.log1p(square)
-            grown = by_step / math.pi
-            force += grown * width * (ratio * angle - logarithm) - factor * (by_point * angle + by_width * logarithm)
-            stiffness += grown * angle - factor / width * (by_point + by_width * ratio) / (1.0 + square)
-        return force, stiffness
-
     def _steps(self, u: Array) -> list[tuple[Array, float, float]]:
         """y_i / w_i (N,), w_i and step of each."""
         numbers = zip(self.points, self.widths, self.steps or (), strict=True)

@@ -53,18 +53,14 @@ def _text(side: int, gap: str, regularised: bool) -> str:
     return f"stiffness*({law})"
 
 
-def _constant(side: int, b: float, s: float) -> tuple[float, float, float]:
-    """The constant of a regularised law per unit of stiffness, `r - side b / 2`; its rates by gap and sharpness."""
-    phi_y, log = 0.5 + math.atan(-s * b) / math.pi, math.log1p((s * b) ** 2) / (2.0 * math.pi * s)
-    preloaded = 1.0 if side * b < 0.0 else 0.0
-    return side * (b * (phi_y - 0.5) + log) - preloaded * b, side * (phi_y - 0.5) - preloaded, -side * log / s
-
-
 @lru_cache(maxsize=256)
 def _arctan_steps(sides: tuple[int, ...], c: tuple[float, ...]) -> SharpSampling:
     """All stops with the coefficients c: stiffness, gaps, sharpness."""
     k, *gaps, s = c
-    constant = k * sum(_constant(side, b, s)[0] for side, b in zip(sides, gaps, strict=True))
+    constant = 0.0
+    for side, b in zip(sides, gaps, strict=True):
+        rounded = math.log1p((s * b) ** 2) / (2.0 * math.pi * s) - b * math.atan(s * b) / math.pi
+        constant += side * k * (max(-side * b, 0.0) + rounded)
     steps = tuple(k * side for side in sides)
     return SharpSampling(tuple(gaps), (1.0 / s,) * len(gaps), constant, 0.5 * k * len(gaps), steps)
 
@@ -122,20 +118,6 @@ class _Stops(DeclaredElement):
         if self.regularised:
             return _arctan_steps(self.sides, tuple(c.tolist()))
         return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
-
-    def coefficient_change(self, u: Array, v: Array, c: Array, rates: Array) -> tuple[Array, Array, None]:
-        """See `Element.coefficient_change`: rounded steps change by the rates of their places, widths and sizes."""
-        if not self.regularised:
-            f_c, f_uc, _ = self.coefficient_tangent(u, v, c)
-            return rates @ f_c, rates @ f_uc, None
-        (k, *gaps, s), (by_k, *by_gaps, by_s) = c.tolist(), rates.tolist()
-        constant = 0.0
-        for side, gap, by_gap in zip(self.sides, gaps, by_gaps, strict=True):
-            value, slope, by_sharpness = _constant(side, gap, s)
-            constant += by_k * value + k * (slope * by_gap + by_sharpness * by_s)
-        widths, steps = (-by_s / s**2,) * len(gaps), tuple(by_k * side for side in self.sides)
-        by = SharpSampling(tuple(by_gaps), widths, constant, 0.5 * by_k * len(gaps), steps)
-        return *_arctan_steps(self.sides, (k, *gaps, s)).changed(u, by), None
 
     def _written(self) -> tuple[Law, list[int], list[int]]:
         """The law as a text; where its coefficients, in alphabetical order, stand among those here, and conversely."""
